@@ -1,0 +1,75 @@
+/* The points of a run as pages: bricks of 64 points in spatial order, and a
+ * tree of boxes over them, 32 children a page.  Both kinds are 1,536 bytes, so
+ * one pager serves both and the number of points has no bound but 2^32.
+ *
+ * Vertex number = 64 * brick + slot.  Every brick is full but the last of each
+ * region.  Level 0 pages are bricks; page i of level k+1 holds the boxes of the
+ * children [32 i, 32 i + 32) of level k.  The root is the one page of the
+ * highest level, which is at least 1.
+ *
+ *     struct incode_tree tree;
+ *     incode_tree_init(&tree, bricks, 0);
+ *     root = tree.base[tree.levels - 1];
+ */
+#ifndef INCODE_PAGES_H
+#define INCODE_PAGES_H
+
+#include <stdint.h>
+
+enum {
+    INCODE_BRICK_POINTS = 64,   /* points a brick, at most */
+    INCODE_LEAF_POINTS = 8,     /* points a leaf box inside a brick */
+    INCODE_BRICK_LEAVES = 8,
+    INCODE_FANOUT = 32,         /* children a box page, at most */
+    INCODE_PAGE_BYTES = 1536,
+    INCODE_LEVELS_MAX = 8,      /* bricks, then up to 7 levels of boxes */
+    INCODE_PAGE_WORDS = 384     /* uint32 a page of the uniform grid's lists */
+};
+
+#define INCODE_NONE UINT32_MAX
+
+/* A brick: coordinates of slots [0, count); the rest repeats the last point. */
+struct incode_brick {
+    double x[INCODE_BRICK_POINTS];
+    double y[INCODE_BRICK_POINTS];
+    double z[INCODE_BRICK_POINTS];
+};
+
+/* Tight boxes of up to 32 children; absent children have lo > hi (+inf,-inf)
+ * in every dimension. */
+struct incode_boxes {
+    double lo[3][INCODE_FANOUT];
+    double hi[3][INCODE_FANOUT];
+};
+
+/* A page of the uniform grid's two lists (index `grid` only): first[cell] and
+ * the vertex numbers sorted by cell. */
+struct incode_words {
+    uint32_t word[INCODE_PAGE_WORDS];
+};
+
+union incode_page {
+    struct incode_brick brick;
+    struct incode_boxes boxes;
+    struct incode_words words;
+};
+
+/* Page numbers: level k's page i is base[k] + i; then the uniform grid's cell
+ * starts (cells + 1 words) from cells_base, its vertex list from list_base. */
+struct incode_tree {
+    uint32_t bricks;
+    uint32_t levels;                       /* levels used, bricks included */
+    uint32_t base[INCODE_LEVELS_MAX + 1];  /* base[levels] = tree pages */
+    uint32_t count[INCODE_LEVELS_MAX];     /* pages of each level */
+    uint32_t cells_base, list_base, pages; /* grid lists; pages = total */
+};
+
+/* Lays out the page numbers for 1 <= bricks; cells = 0 where there is no
+ * uniform grid, otherwise the number of its cells. */
+void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
+                      uint32_t cells);
+
+/* Level of a page, or tree->levels for the uniform grid's pages. */
+uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page);
+
+#endif

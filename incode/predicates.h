@@ -1,0 +1,51 @@
+/* Exact geometric predicates on finite doubles, with ties broken so that one
+ * point set has one Delaunay triangulation, whoever computes it.
+ *
+ * Memory: no state but the caller's counters; a bounded stack (stated in
+ * predicates.c).  Work: bounded for any finite input, denormals and 2^1023
+ * included.
+ *
+ *     struct incode_tally tally = {0};
+ *     if (incode_orient3d(&tally, a, b, c, d) > 0 &&
+ *         incode_in_sphere(&tally, a, b, c, d, e) > 0) ... e is inside
+ */
+#ifndef INCODE_PREDICATES_H
+#define INCODE_PREDICATES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* How often the static filter could not tell and the exact stage decided. */
+struct incode_tally {
+    uint64_t exact_orient3d;
+    uint64_t exact_in_sphere;
+};
+
+/* Sign of the determinant with rows b-a, c-a, d-a: +1, 0 or -1, exact. */
+int incode_orient3d(struct incode_tally *tally, const double a[3],
+                    const double b[3], const double c[3], const double d[3]);
+
+/* +1: e lies inside the sphere through a, b, c, d; -1: outside.  Never 0: five
+ * cospherical points are told apart by the symbolic perturbation of Devillers
+ * and Teillaud (CGTA 44:160-168, 2011).  Precondition: the five points are
+ * distinct and orient3d(a,b,c,d) > 0. */
+int incode_in_sphere(struct incode_tally *tally, const double a[3],
+                     const double b[3], const double c[3], const double d[3],
+                     const double e[3]);
+
+/* Sign of a - b in the lexicographic order of (x, y, z). */
+int incode_lexicographic(const double a[3], const double b[3]);
+
+/* Sign of |a-p|^2 - |b-p|^2, exact. */
+int incode_compare_distance(const double p[3], const double a[3],
+                            const double b[3]);
+
+/* Whether a, b, c lie on one line, exact. */
+bool incode_collinear(const double a[3], const double b[3], const double c[3]);
+
+/* NULL where the arithmetic of this machine is sound; else what is wrong:
+ * products fused into sums, denormals flushed, rounding not to nearest even,
+ * words not little-endian.  A program must refuse to run on a message. */
+const char *incode_arithmetic_fault(void);
+
+#endif

@@ -1,0 +1,131 @@
+/* A node's triangulator: closes the star of every vertex of its bricks and
+ * hands out the tetrahedra that are its own, with points that come page by
+ * page and a front that may spill.
+ *
+ * Memory: one arena, divided by incode_triangulator_init alone (memory map:
+ * struct incode_map).  Work: a call of incode_triangulator_step closes at most
+ * one star, or takes one search as far as one missing page.
+ *
+ *     incode_triangulator_init(&t, arena, bytes, &setup, &ports, &error);
+ *     incode_triangulator_start(&t, &job);
+ *     while (incode_triangulator_step(&t) != INCODE_FINISHED) deliver pages;
+ */
+#ifndef INCODE_TRIANGULATOR_H
+#define INCODE_TRIANGULATOR_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "pages.h"
+#include "predicates.h"
+
+enum incode_index { INCODE_NAIVE, INCODE_GRID, INCODE_KD };
+enum incode_face_rule { INCODE_FACE_OWN, INCODE_FACE_PAPER };
+
+/* What every node of a run is told once. */
+struct incode_setup {
+    uint32_t bricks;
+    uint8_t index;          /* enum incode_index */
+    uint8_t face_rule;      /* enum incode_face_rule */
+    uint16_t reserved;
+    uint64_t shuffle_seed;  /* 0: pages are ready as they arrive */
+    double lo[3], hi[3];    /* box of all points, tight */
+    uint32_t cells[3];      /* index `grid`: cells in x, y, z; else 0 */
+    uint32_t reserved2;
+};
+
+/* The vertices of bricks [first, last) are this node's own. */
+struct incode_job {
+    uint32_t first, last;
+    double lo[3], hi[3]; /* the region's box, for the face rule `paper` */
+};
+
+enum incode_step {
+    INCODE_WORKED,   /* call again */
+    INCODE_WAITING,  /* nothing to do until a page or a spilled list arrives,
+                        or until emit or spill has room */
+    INCODE_FINISHED, /* the job is done, every brick committed */
+    INCODE_BROKEN    /* an invariant failed: see `fault` */
+};
+
+struct incode_face {
+    uint32_t v[3]; /* key first: the list it belongs to */
+};
+
+/* How the triangulator reaches the world.  All calls return at once. */
+struct incode_ports {
+    void *context;
+    /* Asks for a page; the frame is reserved.  False: no credit now, the
+     * triangulator asks again later. */
+    bool (*request)(void *context, uint32_t page);
+    /* Room for results: how many tetrahedra emit would take now. */
+    size_t (*emit_room)(void *context);
+    /* Tetrahedra (vertex, apexes[i][0..2]), each of positive orientation. */
+    void (*emit)(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
+                 size_t count);
+    /* Brick committed: all tetrahedra whose lexicographically smallest vertex
+     * lies in it have been emitted before this call. */
+    void (*commit)(void *context, uint32_t brick);
+    /* Spilled toggles, to be kept in order with their brick (= v[0] / 64);
+     * v[1] = INCODE_NONE: vertex v[0] was reached.  False: no room now. */
+    bool (*spill)(void *context, const struct incode_face *faces,
+                  size_t count);
+    /* Asks for a brick's spilled toggles; they come by
+     * incode_triangulator_unspill, the last call with `last` set. */
+    bool (*unspill)(void *context, uint32_t brick);
+};
+
+/* The memory map: bytes of each table, summing to at most the arena. */
+struct incode_map {
+    size_t control, frames, frame_count, afl, afl_faces, bricks, brick_entries,
+        gather, tasks, total;
+};
+
+struct incode_statistics {
+    uint64_t tetrahedra_built, tetrahedra_kept, make_tetra_calls, hull_facets;
+    uint64_t candidates;        /* points whose distance was evaluated */
+    uint64_t wide_searches, seeds, vertices, vertices_waited;
+    uint64_t page_requests, page_faults, page_evictions;
+    uint64_t afl_max, afl_spilled;
+    uint64_t memory_high_water; /* bytes of the arena ever in use */
+    struct incode_tally tally;
+    uint64_t candidates_histogram[24]; /* calls by log2 of candidates, half
+                                          octaves */
+};
+
+struct incode_triangulator; /* opaque: lives at the start of the arena */
+
+/* Smallest arena that works for this setup, bytes. */
+size_t incode_arena_min(const struct incode_setup *setup);
+
+/* Divides the arena (aligned to 64 bytes).  Returns the triangulator inside
+ * it, or NULL with *why set to a static string. */
+struct incode_triangulator *
+incode_triangulator_init(void *arena, size_t bytes,
+                         const struct incode_setup *setup,
+                         const struct incode_ports *ports, const char **why);
+
+/* Begins a job; the one before must be finished or is abandoned.  Resident
+ * pages stay. */
+void incode_triangulator_start(struct incode_triangulator *t,
+                               const struct incode_job *job);
+
+/* A page has arrived: `bytes` of it, INCODE_PAGE_BYTES or, for a brick, 24
+ * times its number of points: x[count], y[count], z[count].  Returns 0, or -1
+ * where the page was not asked for or its size is wrong (it is dropped). */
+int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
+                             const void *data, size_t bytes);
+
+int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
+                                const struct incode_face *faces, size_t count,
+                                bool last);
+
+enum incode_step incode_triangulator_step(struct incode_triangulator *t);
+
+const struct incode_statistics *
+incode_triangulator_statistics(const struct incode_triangulator *t);
+const struct incode_map *
+incode_triangulator_map(const struct incode_triangulator *t);
+const char *incode_triangulator_fault(const struct incode_triangulator *t);
+
+#endif

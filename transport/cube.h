@@ -1,0 +1,82 @@
+/* A hypercube of nodes wired point to point, and a host attached to node 0.
+ * Messages of up to CUBE_PAYLOAD_MAX bytes travel hop by hop along the e-cube
+ * path (lowest differing dimension first), in order between any two ends;
+ * broadcasts run along binomial trees.  Link d of a node leads to node
+ * self ^ (1 << d); link `dimension` of node 0 leads to the host.
+ *
+ * Memory: one arena of cube_arena_bytes(): a send and a receive window for each
+ * link, nothing shared between links (Dally and Seitz, 1987: e-cube routing is
+ * free of deadlock with buffers of each channel's own).  Work: cube_poll handles
+ * at most one window of frames a link.
+ *
+ *     cube_init(&cube, arena, bytes, &config);
+ *     while (cube_read(&cube, &message)) { use; cube_release(&cube); }
+ *     cube_write(&cube, CUBE_HOST, type, data, size) == 0 || try again later;
+ */
+#ifndef TRANSPORT_CUBE_H
+#define TRANSPORT_CUBE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "link.h"
+
+enum {
+    CUBE_DIMENSION_MAX = 10,
+    CUBE_LINKS_MAX = CUBE_DIMENSION_MAX + 1, /* node 0 has the host's too */
+    CUBE_PAYLOAD_MAX = 1600,
+    CUBE_HOST = 0xfffe,
+    CUBE_ALL = 0xffff
+};
+
+struct cube_config {
+    uint16_t self;        /* 0 .. 2^dimension - 1, or CUBE_HOST */
+    uint8_t dimension;
+    uint16_t window;      /* frames a link and direction, 1 .. LINK_WINDOW_MAX */
+    uint32_t epoch;       /* of this start of the node, never repeated */
+    struct link_pipe pipes[CUBE_LINKS_MAX]; /* the bytes of each link; the host
+                                               uses pipes[0] alone */
+};
+
+struct cube_message {
+    uint16_t source; /* node, or CUBE_HOST */
+    uint16_t size;   /* bytes of data */
+    uint8_t type;    /* the application's */
+    const uint8_t *data;
+};
+
+struct cube; /* opaque: lives at the start of its arena */
+
+size_t cube_arena_bytes(const struct cube_config *config);
+struct cube *cube_init(void *arena, size_t bytes,
+                       const struct cube_config *config);
+
+/* Moves bytes and frames on all links; now_us: monotonic microseconds. Returns
+ * the number of frames handled (0: nothing to do until bytes or time come). */
+int cube_poll(struct cube *cube, uint64_t now_us);
+
+/* Queues a message.  dest: a node, CUBE_HOST or CUBE_ALL (every node but the
+ * sender, along the binomial tree rooted at the sender; the host's goes by
+ * node 0).  0, or CUBE_AGAIN while the first link has no room. */
+int cube_write(struct cube *cube, uint16_t dest, uint8_t type,
+               const void *data, size_t size);
+#define CUBE_AGAIN (-1)
+
+/* Messages cube_write would take now towards dest. */
+unsigned cube_room(const struct cube *cube, uint16_t dest);
+
+/* The next message for this node, valid until cube_release; false: none.  An
+ * unread message keeps its buffer, and so holds back its link alone. */
+bool cube_read(struct cube *cube, struct cube_message *message);
+void cube_release(struct cube *cube);
+
+/* State of link d: counters, and whether its peer is up. */
+const struct link_statistics *cube_link_statistics(const struct cube *cube,
+                                                   unsigned d);
+enum link_state cube_link_state(const struct cube *cube, unsigned d);
+
+/* Microseconds until cube_poll must be called again even if no byte comes. */
+uint64_t cube_next_due_us(const struct cube *cube, uint64_t now_us);
+
+#endif
