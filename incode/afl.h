@@ -1,0 +1,77 @@
+/* The active face list: faces with one of their two tetrahedra built, each in
+ * the list of its key vertex (its first), found by a hash of that key; and the
+ * table of bricks that the front has touched.
+ *
+ * Memory: incode_afl_bytes(faces, bricks), fixed.  Work: a toggle looks at the
+ * faces of one key vertex and of those that share its hash, constant as long as
+ * stars stay bounded (star.c sees to that).
+ *
+ *     incode_afl_toggle(&afl, key, b, c);    opens the face, or closes its twin
+ *     n = incode_afl_take(&afl, v, pairs, 256);       empties the list of v
+ */
+#ifndef INCODE_AFL_H
+#define INCODE_AFL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* What is known of a brick from its first touch until it is finished. */
+struct incode_touched {
+    uint64_t reached; /* a tetrahedron has this vertex */
+    uint64_t pending; /* its list may hold faces */
+    uint64_t waiting; /* a task waits for a page on its behalf */
+    uint64_t hub;     /* open faces at it go to its neighbours' lists */
+    uint32_t brick;
+    uint32_t faces;   /* in the lists of its vertices */
+    uint32_t next;
+    uint32_t spare;
+};
+
+struct incode_afl_node {
+    uint32_t key, b, c, next;
+};
+
+struct incode_afl {
+    struct incode_afl_node *nodes;
+    uint32_t *heads;
+    struct incode_touched *touched;
+    uint32_t *touched_heads;
+    uint32_t capacity, mask, free, count, count_max;
+    uint32_t touched_capacity, touched_mask, touched_free, touched_count,
+        touched_max;
+    uint32_t hubs; /* hub bits ever set */
+};
+
+#define INCODE_AFL_NIL UINT32_MAX
+
+/* capacity, bricks: powers of two. */
+size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks);
+void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
+                     uint32_t bricks);
+void incode_afl_clear(struct incode_afl *afl);
+
+/* The entry of a brick, made where there is none; asserts that there is room
+ * (the caller keeps enough free). */
+struct incode_touched *incode_afl_touch(struct incode_afl *afl,
+                                        uint32_t brick);
+/* The entry of a brick, or NULL. */
+struct incode_touched *incode_afl_find(const struct incode_afl *afl,
+                                       uint32_t brick);
+/* Forgets a brick, which must have no face left. */
+void incode_afl_drop(struct incode_afl *afl, uint32_t brick);
+
+/* Opens the face (key, b, c), whose unknown side is where orient3d(key, b, c,
+ * p) > 0; or closes it where its twin (key, c, b) is open. */
+void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
+                       uint32_t c);
+
+/* Closes the twin (key, c, b) where it is open; false: it is not. */
+bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
+                           uint32_t c);
+
+/* Takes up to `limit` faces out of the list of v; *more: some remain. */
+uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
+                         uint32_t (*pairs)[2], uint32_t limit, bool *more);
+
+#endif

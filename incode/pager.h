@@ -1,0 +1,76 @@
+/* Pages in fixed frames, replaced least recently used first.  A frame is
+ * reserved before its page is asked for, so that a reply always has room.
+ *
+ * Memory: incode_pager_bytes(frames).  Work: constant a call, but for a brick's
+ * arrival, which computes the boxes of its 8 leaves.
+ *
+ *     struct incode_frame *f = incode_pager_get(&pager, page);
+ *     if (f == NULL) wait: the page has been asked for, or will be;
+ *     else use f->page until the next call that delivers;
+ */
+#ifndef INCODE_PAGER_H
+#define INCODE_PAGER_H
+
+#include <stdalign.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "pages.h"
+
+enum incode_frame_state {
+    INCODE_FRAME_FREE,
+    INCODE_FRAME_LOADING, /* reserved, the page is on its way */
+    INCODE_FRAME_HELD,    /* arrived, kept back by the test's shuffle */
+    INCODE_FRAME_READY
+};
+
+struct incode_frame {
+    alignas(64) union incode_page page;
+    alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES];
+    alignas(64) double leaf_hi[3][INCODE_BRICK_LEAVES];
+    uint32_t number;      /* the page */
+    uint16_t newer, older; /* the ring of use */
+    uint16_t chain;       /* next frame of the same hash */
+    uint8_t state;
+    uint8_t count;        /* points of a brick */
+};
+
+struct incode_pager {
+    struct incode_frame *frames;
+    uint16_t *heads; /* hash of page numbers to frames */
+    uint32_t frame_count, hash_mask;
+    uint32_t loading, loading_max, held;
+    uint32_t bricks;           /* pages below this are bricks */
+    uint16_t newest, oldest, free;
+    uint64_t shuffle; /* state of the test's shuffle; 0: none */
+    bool (*request)(void *context, uint32_t page);
+    void *context;
+    uint64_t requests, evictions;
+    uint32_t frames_used; /* high water */
+};
+
+#define INCODE_NO_FRAME UINT16_MAX
+
+size_t incode_pager_bytes(uint32_t frames);
+
+/* memory: aligned to 64 bytes; 1 <= frames < INCODE_NO_FRAME. */
+void incode_pager_init(struct incode_pager *pager, void *memory,
+                       uint32_t frames, uint32_t bricks);
+
+/* The frame of a page that is ready, now the most recently used; NULL: it is
+ * not, and is asked for as far as credit and frames allow. */
+struct incode_frame *incode_pager_get(struct incode_pager *pager,
+                                      uint32_t page);
+
+/* Whether the page is on its way. */
+bool incode_pager_loading(const struct incode_pager *pager, uint32_t page);
+
+/* 0, or -1 where the page was not asked for or the size is wrong. */
+int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
+                         const void *data, size_t bytes);
+
+/* Makes one page that the shuffle keeps back ready; false: there is none. */
+bool incode_pager_release(struct incode_pager *pager);
+
+#endif
