@@ -1,0 +1,201 @@
+#include "result.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+enum { KIND_TETRAHEDRON, KIND_STAR, KIND_COMMIT };
+
+static inline uint32_t zigzag(uint32_t difference) {
+    return (difference << 1) ^ (0u - (difference >> 31));
+}
+
+static inline uint32_t unzigzag(uint32_t value) {
+    return (value >> 1) ^ (0u - (value & 1));
+}
+
+/* Length of a value in bytes, less one. */
+static inline uint32_t length_of(uint32_t value) {
+    return (31u - (uint32_t)__builtin_clz(value | 1)) >> 3;
+}
+
+/* Writes all four bytes; the next value overwrites those not counted.  Hence
+ * the slack at the end of a buffer. */
+static inline uint8_t *put(uint8_t *at, uint32_t value, uint32_t length) {
+    memcpy(at, &value, 4);
+    return at + length + 1;
+}
+
+void node_result_begin(struct node_result_writer *writer, uint8_t *buffer,
+                       size_t size_max) {
+    writer->buffer = buffer;
+    writer->size = 0;
+    writer->size_max = size_max;
+    writer->vertex = 0;
+}
+
+static void put_single(struct node_result_writer *writer, uint32_t kind,
+                       uint32_t difference) {
+    uint32_t value = zigzag(difference);
+    uint32_t length = length_of(value);
+    uint8_t *at = writer->buffer + writer->size;
+    *at = (uint8_t)(kind | length << 2);
+    writer->size = (size_t)(put(at + 1, value, length) - writer->buffer);
+}
+
+size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
+                        const uint32_t (*apexes)[3], size_t count) {
+    size_t room = writer->size_max - writer->size;
+    if (room < NODE_RESULT_STAR_MAX + NODE_RESULT_TETRAHEDRON_MAX ||
+        count == 0) {
+        return 0;
+    }
+    room = (room - NODE_RESULT_STAR_MAX) / NODE_RESULT_TETRAHEDRON_MAX;
+    if (count > room) {
+        count = room;
+    }
+    put_single(writer, KIND_STAR, vertex - writer->vertex);
+    writer->vertex = vertex;
+    uint8_t *at = writer->buffer + writer->size;
+    for (size_t i = 0; i < count; i++) {
+        uint32_t a = zigzag(apexes[i][0] - vertex);
+        uint32_t b = zigzag(apexes[i][1] - vertex);
+        uint32_t c = zigzag(apexes[i][2] - vertex);
+        uint32_t la = length_of(a), lb = length_of(b), lc = length_of(c);
+        *at = (uint8_t)(KIND_TETRAHEDRON | la << 2 | lb << 4 | lc << 6);
+        at = put(put(put(at + 1, a, la), b, lb), c, lc);
+    }
+    writer->size = (size_t)(at - writer->buffer);
+    return count;
+}
+
+int node_result_commit(struct node_result_writer *writer, uint32_t brick) {
+    if (writer->size_max - writer->size < NODE_RESULT_COMMIT_MAX) {
+        return 0;
+    }
+    put_single(writer, KIND_COMMIT, brick - writer->vertex / 64);
+    return 1;
+}
+
+void node_result_open(struct node_result_reader *reader, const uint8_t *data,
+                      size_t size, uint32_t vertices) {
+    reader->next = data;
+    reader->end = data + size;
+    reader->vertex = 0;
+    reader->vertices = vertices;
+    reader->brick = 0;
+    reader->in_star = 0;
+}
+
+static inline uint32_t get(const uint8_t *at, uint32_t length) {
+    static const uint32_t mask[4] = {0xff, 0xffff, 0xffffff, 0xffffffff};
+    uint32_t value;
+    memcpy(&value, at, 4);
+    return unzigzag(value & mask[length]);
+}
+
+/* A tetrahedron whose head is at `at`, four readable bytes beyond each value.
+ * Returns the address of the next record. */
+static inline const uint8_t *get_row(const uint8_t *at, uint32_t vertex,
+                                     uint32_t row[4]) {
+    uint32_t head = *at++;
+    uint32_t la = head >> 2 & 3, lb = head >> 4 & 3, lc = head >> 6;
+    row[0] = vertex;
+    row[1] = vertex + get(at, la);
+    row[2] = vertex + get(at + la + 1, lb);
+    row[3] = vertex + get(at + la + lb + 2, lc);
+    return at + la + lb + lc + 3;
+}
+
+static inline bool row_in_range(const uint32_t row[4], uint32_t vertices) {
+    return (row[1] < vertices) & (row[2] < vertices) & (row[3] < vertices);
+}
+
+/* Size of the record with this head, or 0 where no record has such a head. */
+static size_t record_size(uint32_t head) {
+    size_t first = 2 + (head >> 2 & 3);
+    if ((head & 3) == KIND_TETRAHEDRON) {
+        return first + 2 + (head >> 4 & 3) + (head >> 6);
+    }
+    return (head & 3) <= KIND_COMMIT && head >> 4 == 0 ? first : 0;
+}
+
+/* One record near the end of the batch, by way of a padded copy.  Returns its
+ * size, 0 for garbage; *rows_read becomes 1 for a tetrahedron. */
+static size_t read_slowly(struct node_result_reader *reader, uint32_t row[4],
+                          size_t *rows_read, int *committed) {
+    uint8_t copy[NODE_RESULT_TETRAHEDRON_MAX + 4] = {0};
+    size_t left = (size_t)(reader->end - reader->next);
+    size_t size = record_size(*reader->next);
+    if (size == 0 || size > left) {
+        return 0;
+    }
+    memcpy(copy, reader->next, size);
+    uint32_t kind = copy[0] & 3;
+    if (kind == KIND_TETRAHEDRON) {
+        if (!reader->in_star) {
+            return 0;
+        }
+        (void)get_row(copy, reader->vertex, row);
+        *rows_read = 1;
+        return row_in_range(row, reader->vertices) ? size : 0;
+    }
+    uint32_t difference = get(copy + 1, copy[0] >> 2 & 3);
+    if (kind == KIND_STAR) {
+        reader->vertex += difference;
+        reader->in_star = 1;
+        return reader->vertex < reader->vertices ? size : 0;
+    }
+    reader->brick = reader->vertex / 64 + difference;
+    *committed = 1;
+    return reader->brick <= (reader->vertices - 1) / 64 ? size : 0;
+}
+
+/* Tetrahedra one after another while none can reach past the end. */
+static size_t read_fast(struct node_result_reader *reader, uint32_t (*rows)[4],
+                        size_t rows_max, bool *good) {
+    const uint8_t *at = reader->next;
+    const uint8_t *safe = reader->end - (NODE_RESULT_TETRAHEDRON_MAX + 3);
+    size_t count = 0;
+    while (count < rows_max && at < safe && (*at & 3) == KIND_TETRAHEDRON) {
+        at = get_row(at, reader->vertex, rows[count]);
+        *good &= row_in_range(rows[count], reader->vertices);
+        count++;
+    }
+    reader->next = at;
+    return count;
+}
+
+enum node_result_event node_result_read(struct node_result_reader *reader,
+                                        uint32_t (*rows)[4], size_t rows_max,
+                                        size_t *count) {
+    *count = 0;
+    while (reader->next != reader->end) {
+        size_t rows_read = 0;
+        int committed = 0;
+        bool good = true;
+        if (*count == rows_max) {
+            return NODE_RESULT_ROWS;
+        }
+        if (reader->in_star &&
+            reader->end - reader->next > NODE_RESULT_TETRAHEDRON_MAX + 3) {
+            *count +=
+                read_fast(reader, rows + *count, rows_max - *count, &good);
+            if (!good) {
+                return NODE_RESULT_GARBAGE;
+            }
+            if (*count == rows_max) {
+                continue;
+            }
+        }
+        size_t size = read_slowly(reader, rows[*count], &rows_read, &committed);
+        if (size == 0) {
+            return NODE_RESULT_GARBAGE;
+        }
+        reader->next += size;
+        *count += rows_read;
+        if (committed) {
+            return NODE_RESULT_COMMIT;
+        }
+    }
+    return NODE_RESULT_END;
+}

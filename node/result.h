@@ -1,0 +1,71 @@
+/* Tetrahedra as bytes: how finished stars and committed bricks travel from a
+ * node to the host.
+ *
+ * A batch is a row of records.  The first byte of a record is its head: bits
+ * 0-1 the kind (0 tetrahedron, 1 star, 2 commit), then two bits for each value
+ * that follows, its length in bytes less one; unused length bits are 0.  Values
+ * are little-endian zigzag differences: a star's vertex from the vertex before
+ * it in the batch (0 at its start), a tetrahedron's three apexes from the
+ * star's vertex, a committed brick from the brick of that vertex.
+ *
+ * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
+ * read whatever its bytes are, without reading past its end.
+ *
+ *     node_result_begin(&writer, buffer, sizeof buffer);
+ *     written = node_result_star(&writer, vertex, apexes, count);
+ *     while (node_result_read(&reader, rows, 64, &n) == NODE_RESULT_ROWS) ...
+ */
+#ifndef NODE_RESULT_H
+#define NODE_RESULT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum {
+    NODE_RESULT_TETRAHEDRON_MAX = 13, /* bytes of a record, at most */
+    NODE_RESULT_STAR_MAX = 5,
+    NODE_RESULT_COMMIT_MAX = 5,
+    NODE_RESULT_SLACK = 4 /* bytes of a writer's buffer beyond its use */
+};
+
+struct node_result_writer {
+    uint8_t *buffer;
+    size_t size, size_max; /* bytes written; most that may be written */
+    uint32_t vertex;
+};
+
+/* buffer: size_max + NODE_RESULT_SLACK bytes. */
+void node_result_begin(struct node_result_writer *writer, uint8_t *buffer,
+                       size_t size_max);
+
+/* Writes as many of the star's tetrahedra (vertex, apexes[i]) as are sure to
+ * fit; returns how many. */
+size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
+                        const uint32_t (*apexes)[3], size_t count);
+
+/* Returns 1, or 0 where it might not fit. */
+int node_result_commit(struct node_result_writer *writer, uint32_t brick);
+
+struct node_result_reader {
+    const uint8_t *next, *end;
+    uint32_t vertex, vertices; /* vertex numbers must be below `vertices` */
+    uint32_t brick;            /* after NODE_RESULT_COMMIT */
+    int in_star;
+};
+
+enum node_result_event {
+    NODE_RESULT_ROWS,   /* `*count` rows, perhaps 0; read on */
+    NODE_RESULT_COMMIT, /* `*count` rows, and then reader->brick committed */
+    NODE_RESULT_END,    /* `*count` rows, the last */
+    NODE_RESULT_GARBAGE /* not such a batch; reading is over */
+};
+
+void node_result_open(struct node_result_reader *reader, const uint8_t *data,
+                      size_t size, uint32_t vertices);
+
+/* Reads up to rows_max tetrahedra as rows of four vertex numbers. */
+enum node_result_event node_result_read(struct node_result_reader *reader,
+                                        uint32_t (*rows)[4], size_t rows_max,
+                                        size_t *count);
+
+#endif
