@@ -1,0 +1,24 @@
+/* Large arrays straight from the kernel: zeroed, on huge pages where there are
+ * any, grown without a copy, given back at once.
+ *
+ * Memory: what is touched, rounded up to 4 KiB.  Work: the kernel's.
+ *
+ *     double *x = host_map(24 * n);
+ *     x = host_remap(x, 24 * n, 48 * n);
+ *     host_unmap(x, 48 * n);
+ */
+#ifndef HOST_MEMORY_H
+#define HOST_MEMORY_H
+
+#include <stddef.h>
+
+/* NULL where there is no memory; 0 bytes are taken as 1. */
+void *host_map(size_t bytes);
+
+/* Like realloc: on NULL the old array still stands. */
+void *host_remap(void *old, size_t old_bytes, size_t bytes);
+
+/* NULL is allowed. */
+void host_unmap(void *array, size_t bytes);
+
+#endif
