@@ -72,4 +72,13 @@ void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
 /* Level of a page, or tree->levels for the uniform grid's pages. */
 uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page);
 
+/* Cell of coordinate p along one side [lo, hi] of the uniform grid:
+ * floor((p - lo) / (hi - lo) * cells), clamped to [0, cells).  It never falls
+ * as p grows, and no finite input overflows it. */
+uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p);
+
+/* Cell of a point: (iz * cells[1] + iy) * cells[0] + ix. */
+uint32_t incode_cell_of(const double lo[3], const double hi[3],
+                        const uint32_t cells[3], const double p[3]);
+
 #endif

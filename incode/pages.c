@@ -1,0 +1,53 @@
+#include "pages.h"
+
+static uint32_t divide_up(uint64_t n, uint32_t by) {
+    return (uint32_t)((n + by - 1) / by);
+}
+
+void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
+                      uint32_t cells) {
+    *tree = (struct incode_tree){.bricks = bricks};
+    uint32_t level = 0, base = 0, count = bricks;
+    while (level < 2 || tree->count[level - 1] > 1) {
+        tree->base[level] = base;
+        tree->count[level] = count;
+        base += count;
+        count = divide_up(count, INCODE_FANOUT);
+        level++;
+    }
+    tree->levels = level;
+    tree->base[level] = base;
+    tree->cells_base = tree->list_base = tree->pages = base;
+    if (cells != 0) {
+        tree->list_base =
+            base + divide_up((uint64_t)cells + 1, INCODE_PAGE_WORDS);
+        uint64_t vertices = (uint64_t)bricks * INCODE_BRICK_POINTS;
+        tree->pages = tree->list_base + divide_up(vertices, INCODE_PAGE_WORDS);
+    }
+}
+
+uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page) {
+    uint32_t level = 0;
+    while (level < tree->levels && page >= tree->base[level + 1]) {
+        level++;
+    }
+    return level;
+}
+
+uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p) {
+    /* Halves first: hi - lo of two finite numbers may overflow. */
+    double side = 0.5 * hi - 0.5 * lo;
+    double t = (0.5 * p - 0.5 * lo) / side * (double)cells;
+    if (!(t > 0)) { /* below the box, or a side of no length: NaN */
+        return 0;
+    }
+    return t < (double)cells ? (uint32_t)t : cells - 1;
+}
+
+uint32_t incode_cell_of(const double lo[3], const double hi[3],
+                        const uint32_t cells[3], const double p[3]) {
+    uint32_t ix = incode_cell_along(lo[0], hi[0], cells[0], p[0]);
+    uint32_t iy = incode_cell_along(lo[1], hi[1], cells[1], p[1]);
+    uint32_t iz = incode_cell_along(lo[2], hi[2], cells[2], p[2]);
+    return (iz * cells[1] + iy) * cells[0] + ix;
+}
