@@ -1,0 +1,143 @@
+#include "predicates.h"
+
+#include <float.h>
+
+#include "exact.h"
+
+/* Static filters of Devillers and Pion: the sign of the rounded determinant is
+ * right where it exceeds these times the largest differences, as long as no
+ * product leaves the range of doubles. */
+static const double orient3d_bound = 5.1107127829973299e-15;
+static const double in_sphere_bound = 1.2466136531027298e-13;
+
+static double magnitude(double a) {
+    return __builtin_fabs(a);
+}
+
+static double larger(double a, double b) {
+    return a > b ? a : b;
+}
+
+static double largest3(double a, double b, double c) {
+    return larger(magnitude(a), larger(magnitude(b), magnitude(c)));
+}
+
+int incode_orient3d(struct incode_tally *tally, const double a[3],
+                    const double b[3], const double c[3], const double d[3]) {
+    double bx = b[0] - a[0], by = b[1] - a[1], bz = b[2] - a[2];
+    double cx = c[0] - a[0], cy = c[1] - a[1], cz = c[2] - a[2];
+    double dx = d[0] - a[0], dy = d[1] - a[1], dz = d[2] - a[2];
+    double mx = largest3(bx, cx, dx), my = largest3(by, cy, dy);
+    double mz = largest3(bz, cz, dz);
+    double det = (bx * cy - by * cx) * dz + (by * cz - bz * cy) * dx +
+                 (bz * cx - bx * cz) * dy;
+    double least = mx < my ? mx : my, most = larger(mx, larger(my, mz));
+    least = least < mz ? least : mz;
+    if (least > 1e-97 && most < 1e102) {
+        double bound = orient3d_bound * mx * my * mz;
+        if (det > bound)
+            return 1;
+        if (det < -bound)
+            return -1;
+    }
+    tally->exact_orient3d++;
+    const double *p[4] = {a, b, c, d};
+    return incode_exact_orient3d(p);
+}
+
+int incode_lexicographic(const double a[3], const double b[3]) {
+    for (int k = 0; k < 3; k++) {
+        if (a[k] != b[k])
+            return a[k] < b[k] ? -1 : 1;
+    }
+    return 0;
+}
+
+/* Cospherical points: the answer of the symbolic perturbation, in which the
+ * lexicographically largest point is lifted most.  p[4] is the query. */
+static int in_sphere_tie(struct incode_tally *tally, const double *const p[5]) {
+    int first = 0, second = -1;
+    for (int i = 1; i < 5; i++) {
+        if (incode_lexicographic(p[i], p[first]) > 0) {
+            second = first;
+            first = i;
+        } else if (second < 0 || incode_lexicographic(p[i], p[second]) > 0) {
+            second = i;
+        }
+    }
+    for (int step = 0; step < 2; step++) {
+        int m = step == 0 ? first : second;
+        if (m == 4)
+            return -1;
+        const double *q[4] = {p[0], p[1], p[2], p[3]};
+        q[m] = p[4];
+        int o = incode_orient3d(tally, q[0], q[1], q[2], q[3]);
+        if (o != 0)
+            return o;
+    }
+    /* Unreachable where the points are distinct and p0..p3 span space. */
+    return -1;
+}
+
+static int in_sphere_exact(struct incode_tally *tally,
+                           const double *const p[5]) {
+    tally->exact_in_sphere++;
+    int sign = incode_exact_in_sphere(p);
+    return sign != 0 ? sign : in_sphere_tie(tally, p);
+}
+
+int incode_in_sphere(struct incode_tally *tally, const double a[3],
+                     const double b[3], const double c[3], const double d[3],
+                     const double e[3]) {
+    double ax = a[0] - e[0], ay = a[1] - e[1], az = a[2] - e[2];
+    double bx = b[0] - e[0], by = b[1] - e[1], bz = b[2] - e[2];
+    double cx = c[0] - e[0], cy = c[1] - e[1], cz = c[2] - e[2];
+    double dx = d[0] - e[0], dy = d[1] - e[1], dz = d[2] - e[2];
+    double mx = larger(largest3(ax, bx, cx), magnitude(dx));
+    double my = larger(largest3(ay, by, cy), magnitude(dy));
+    double mz = larger(largest3(az, bz, cz), magnitude(dz));
+    double ab = ax * by - bx * ay, ac = ax * cy - cx * ay;
+    double ad = ax * dy - dx * ay, bc = bx * cy - cx * by;
+    double bd = bx * dy - dx * by, cd = cx * dy - dx * cy;
+    double abc = ab * cz - ac * bz + bc * az;
+    double abd = ab * dz - ad * bz + bd * az;
+    double acd = ac * dz - ad * cz + cd * az;
+    double bcd = bc * dz - bd * cz + cd * bz;
+    double aw = ax * ax + ay * ay + az * az, bw = bx * bx + by * by + bz * bz;
+    double cw = cx * cx + cy * cy + cz * cz, dw = dx * dx + dy * dy + dz * dz;
+    double det = aw * bcd - bw * acd + (cw * abd - dw * abc);
+    double least = mx < my ? mx : my, most = larger(mx, larger(my, mz));
+    least = least < mz ? least : mz;
+    if (least > 1e-58 && most < 1e61) {
+        double bound = in_sphere_bound * mx * my * mz * (most * most);
+        if (det > bound)
+            return 1;
+        if (det < -bound)
+            return -1;
+    }
+    const double *p[5] = {a, b, c, d, e};
+    return in_sphere_exact(tally, p);
+}
+
+int incode_compare_distance(const double p[3], const double a[3],
+                            const double b[3]) {
+    const double *q[3] = {p, a, b};
+    return incode_exact_compare_distance(q);
+}
+
+bool incode_collinear(const double a[3], const double b[3], const double c[3]) {
+    const double *q[3] = {a, b, c};
+    return incode_exact_collinear(q);
+}
+
+const char *incode_arithmetic_fault(void) {
+    volatile double one = 1.0, tiny = 0x1p-53, odd = 0x1.0000002p0;
+    volatile double square = -0x1.0000004p0, least = DBL_MIN, half = 0.5;
+    volatile double sum = one + tiny, contracted = odd * odd + square;
+    if (sum != one || contracted != 0.0)
+        return "arithmetic is not plain IEEE double";
+    volatile double denormal = least * half;
+    if (denormal == 0.0 || denormal + denormal != least)
+        return "denormals are flushed to zero";
+    return 0;
+}
