@@ -1,0 +1,176 @@
+# Builds, runs and tests incode.  `make help` lists what there is.
+#
+# Variables: BUILD (where everything made goes), CC, ARCH (-march=), OPT,
+# SAN (sanitizers, as in SAN=address,undefined; their own BUILD, please).
+
+BUILD  ?= build
+ARCH   ?= native
+SAN    ?=
+OPT    ?= $(if $(SAN),-O1,-O3)
+PREFIX ?= /usr/local
+OUT    ?= out
+POINTS ?=
+FUZZ_SECONDS ?= 60
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+MUSL_CC ?= musl-gcc
+# Sanitizers need the C library that they were made for, and no limit of memory.
+NODE_CC = $(if $(SAN),$(CC),$(MUSL_CC))
+
+WARNINGS = -Wall -Wextra -Wconversion -Wshadow
+# One rounding an operation, whatever the compiler: the results depend on it.
+FLOATING = -ffp-contract=off -fno-math-errno -fno-trapping-math
+SANITIZE = $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all \
+	-fno-omit-frame-pointer -DINCODE_SANITIZED)
+CFLAGS  ?= -g
+MACHINE  = -march=$(ARCH)
+BASE     = -std=c11 $(WARNINGS) $(OPT) $(MACHINE) $(FLOATING) $(SANITIZE) \
+	$(CFLAGS)
+HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
+HOST_LIBS = -lnettle -lz -lm
+
+# The rooms.  What stands in incode/, transport/ and node/ is freestanding;
+# drivers, boards and the host have a system beneath them.
+freestanding := $(wildcard incode/*.c transport/*.c node/*.c)
+drivers      := $(wildcard transport/drivers/*.c)
+board        := $(wildcard boards/linux/*.c)
+host         := $(wildcard host/*.c)
+unit         := $(wildcard tests/unit/test_*.c)
+fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
+
+obj          := $(BUILD)/obj
+core_objects := $(freestanding:%.c=$(obj)/%.o)
+host_objects := $(filter-out $(obj)/host/main.o,$(host:%.c=$(obj)/%.o)) \
+	$(drivers:%.c=$(obj)/%.o)
+node_objects := $(board:%.c=$(BUILD)/node/%.o) \
+	$(drivers:%.c=$(BUILD)/node/%.o)
+unit_tests   := $(unit:tests/unit/%.c=$(BUILD)/tests/%)
+fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: all unit run test test-full bench firmware fuzz fuzzers lint install \
+	clean help deps deps-run deps-test deps-bench deps-full FORCE
+
+all: $(BUILD)/incode $(BUILD)/incode-node
+
+$(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
+	$(CC) $(HOSTED) $^ $(HOST_LIBS) -o $@
+
+# Static, so that a node's data memory is what the node itself declares.
+$(BUILD)/incode-node: $(node_objects) $(BUILD)/libcore.a
+	$(NODE_CC) $(BASE) $(if $(SAN),,-static) $^ -o $@
+
+$(BUILD)/libcore.a: $(core_objects)
+$(BUILD)/libhost.a: $(host_objects)
+$(BUILD)/%.a:
+	@rm -f $@
+	$(AR) rcs $@ $^
+
+# Objects depend on the flags that they were compiled with.
+$(BUILD)/flags: FORCE
+	@mkdir -p $(@D)
+	@echo '$(CC) $(NODE_CC) $(HOSTED)' | cmp -s - $@ || \
+		echo '$(CC) $(NODE_CC) $(HOSTED)' > $@
+
+$(obj)/incode/%.o: incode/%.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(CC) $(BASE) -MMD -MP -c $< -o $@
+$(obj)/node/%.o: node/%.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(CC) $(BASE) -MMD -MP -c $< -o $@
+$(obj)/transport/drivers/%.o: transport/drivers/%.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(CC) $(HOSTED) -MMD -MP -c $< -o $@
+$(obj)/transport/%.o: transport/%.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(CC) $(BASE) -MMD -MP -c $< -o $@
+$(obj)/%.o: %.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(CC) $(HOSTED) -MMD -MP -c $< -o $@
+$(BUILD)/node/%.o: %.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(NODE_CC) $(BASE) -D_GNU_SOURCE= -MMD -MP -c $< -o $@
+
+unit: $(unit_tests)
+$(BUILD)/tests/%: $(obj)/tests/unit/%.o $(BUILD)/libhost.a $(BUILD)/libcore.a
+	@mkdir -p $(@D)
+	$(CC) $(HOSTED) $^ $(HOST_LIBS) -lcmocka -lgmp -o $@
+
+fuzzers: $(fuzzers)
+$(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
+		$(BUILD)/libcore.a
+	@mkdir -p $(@D)
+	$(CC) $(HOSTED) -fsanitize=fuzzer $^ $(HOST_LIBS) -o $@
+
+-include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
+
+# --- what users call -------------------------------------------------------
+
+run: deps-run
+	@$(MAKE) --no-print-directory all
+	@BUILD='$(BUILD)' OUT='$(OUT)' sh host/main_job.sh '$(POINTS)'
+
+test: deps-test
+	@BUILD='$(BUILD)' MAKE='$(MAKE)' bash tests/run
+
+test-full: deps-full
+	@BUILD='$(BUILD)' MAKE='$(MAKE)' bash tests/run --full
+
+bench: deps-bench
+	@$(MAKE) --no-print-directory all
+	@BUILD='$(BUILD)' MAKE='$(MAKE)' bash tests/bench/run
+
+# The rooms that bare boards will share, compiled for their processors.
+firmware: deps-test
+	@BUILD='$(BUILD)' bash tests/firmware
+
+fuzz: deps-test
+	@BUILD='$(BUILD)' MAKE='$(MAKE)' FUZZ_SECONDS='$(FUZZ_SECONDS)' \
+		bash tests/fuzz/run
+
+lint: deps-test
+	@BUILD='$(BUILD)' bash tests/lint
+
+install: all
+	install -d '$(DESTDIR)$(PREFIX)/bin'
+	install $(BUILD)/incode $(BUILD)/incode-node '$(DESTDIR)$(PREFIX)/bin'
+
+clean:
+	rm -rf '$(BUILD)'
+
+help:
+	@echo 'make run [POINTS=FILE]   the main job: set up, build, triangulate'
+	@echo '                         on 8 nodes, verify, write out/, report'
+	@echo 'make test                set up, build, pass all tests (20 minutes)'
+	@echo 'make                     build/incode and build/incode-node'
+	@echo 'make deps                install missing Debian packages'
+	@echo 'make test-full           every combination, large sets, a clean'
+	@echo '                         chroot (hours)'
+	@echo 'make bench               ratios against CGAL and between sets'
+	@echo 'make firmware            compile the freestanding rooms for'
+	@echo '                         Cortex-M3 and M7, print their sizes'
+	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
+	@echo 'make lint                formatters, analysers, warnings as errors'
+	@echo 'make install PREFIX=DIR  copy the two programs to DIR/bin'
+	@echo 'make clean               remove the build'
+	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
+
+# --- packages --------------------------------------------------------------
+
+run_packages   = gcc libc6-dev make musl-tools zlib1g-dev nettle-dev
+test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
+	clang-tidy cppcheck valgrind gcc-arm-none-eabi libnewlib-arm-none-eabi
+bench_packages = $(run_packages) g++ libcgal-dev
+full_packages  = $(test_packages) $(bench_packages) debootstrap
+
+deps: deps-test
+deps-run:
+	@sh tests/deps $(run_packages)
+deps-test:
+	@sh tests/deps $(test_packages)
+deps-bench:
+	@sh tests/deps $(bench_packages)
+deps-full:
+	@sh tests/deps $(full_packages)
