@@ -1,0 +1,65 @@
+#define _GNU_SOURCE /* sched_getaffinity */
+#include "parallel.h"
+
+#include <sched.h>
+
+enum { THREADS_MAX = 16 };
+
+unsigned host_threads(void) {
+    cpu_set_t set;
+    if (sched_getaffinity(0, sizeof set, &set) != 0) {
+        return 1;
+    }
+    int count = CPU_COUNT(&set);
+    return count < 1 ? 1 : count > THREADS_MAX ? THREADS_MAX : (unsigned)count;
+}
+
+static void *trampoline(void *argument) {
+    struct host_fork *fork = argument;
+    fork->function(fork->argument);
+    return NULL;
+}
+
+void host_fork_start(struct host_fork *fork, void (*function)(void *),
+                     void *argument) {
+    fork->function = function;
+    fork->argument = argument;
+    fork->running = pthread_create(&fork->thread, NULL, trampoline, fork) == 0;
+    if (!fork->running) {
+        function(argument);
+    }
+}
+
+void host_fork_join(struct host_fork *fork) {
+    if (fork->running) {
+        (void)pthread_join(fork->thread, NULL);
+        fork->running = false;
+    }
+}
+
+struct part {
+    void (*function)(void *, unsigned);
+    void *context;
+    unsigned number;
+};
+
+static void run_part(void *argument) {
+    struct part *part = argument;
+    part->function(part->context, part->number);
+}
+
+void host_fork_all(unsigned parts, void (*function)(void *, unsigned),
+                   void *context) {
+    struct host_fork fork[THREADS_MAX];
+    struct part part[THREADS_MAX];
+    for (unsigned i = 0; i + 1 < parts; i++) {
+        part[i] = (struct part){function, context, i};
+        host_fork_start(&fork[i], run_part, &part[i]);
+    }
+    if (parts > 0) {
+        function(context, parts - 1);
+    }
+    for (unsigned i = 0; i + 1 < parts; i++) {
+        host_fork_join(&fork[i]);
+    }
+}
