@@ -28,6 +28,9 @@ MACHINE  = -march=$(ARCH)
 BASE     = -std=c11 $(WARNINGS) $(OPT) $(MACHINE) $(FLOATING) $(SANITIZE) \
 	$(CFLAGS)
 HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
+# V=1 shows every command.
+Q = $(if $(V),,@)
+say = $(if $(V),:,@printf '  %-4s %s\n')
 HOST_LIBS = -lnettle -lz -lm
 
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
@@ -50,23 +53,25 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all unit run test test-full bench firmware fuzz fuzzers lint install \
+.PHONY: all unit points bare run test test-full bench firmware fuzz fuzzers lint install \
 	clean help deps deps-run deps-test deps-bench deps-full FORCE
 
 all: $(BUILD)/incode $(BUILD)/incode-node
 
 $(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
-	$(CC) $(HOSTED) $^ $(HOST_LIBS) -o $@
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) -o $@
 
 # Static, so that a node's data memory is what the node itself declares.
 $(BUILD)/incode-node: $(node_objects) $(BUILD)/libcore.a
-	$(NODE_CC) $(BASE) $(if $(SAN),,-static) $^ -o $@
+	$(say) LINK $@
+	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $^ -o $@
 
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
 $(BUILD)/%.a:
 	@rm -f $@
-	$(AR) rcs $@ $^
+	@$(AR) rcs $@ $^
 
 # Objects depend on the flags that they were compiled with.
 $(BUILD)/flags: FORCE
@@ -76,35 +81,67 @@ $(BUILD)/flags: FORCE
 
 $(obj)/incode/%.o: incode/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(CC) $(BASE) -MMD -MP -c $< -o $@
+	$(say) CC $<
+	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
 $(obj)/node/%.o: node/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(CC) $(BASE) -MMD -MP -c $< -o $@
+	$(say) CC $<
+	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
 $(obj)/transport/drivers/%.o: transport/drivers/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(CC) $(HOSTED) -MMD -MP -c $< -o $@
+	$(say) CC $<
+	$(Q)$(CC) $(HOSTED) -MMD -MP -c $< -o $@
 $(obj)/transport/%.o: transport/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(CC) $(BASE) -MMD -MP -c $< -o $@
+	$(say) CC $<
+	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
 $(obj)/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(CC) $(HOSTED) -MMD -MP -c $< -o $@
+	$(say) CC $<
+	$(Q)$(CC) $(HOSTED) -MMD -MP -c $< -o $@
 $(BUILD)/node/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(NODE_CC) $(BASE) -D_GNU_SOURCE= -MMD -MP -c $< -o $@
+	$(say) CC $<
+	$(Q)$(NODE_CC) $(BASE) -D_GNU_SOURCE= -MMD -MP -c $< -o $@
 
 unit: $(unit_tests)
 $(BUILD)/tests/%: $(obj)/tests/unit/%.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
-	$(CC) $(HOSTED) $^ $(HOST_LIBS) -lcmocka -lgmp -o $@
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) -lcmocka -lgmp -o $@
 
 fuzzers: $(fuzzers)
 $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 		$(BUILD)/libcore.a
 	@mkdir -p $(@D)
-	$(CC) $(HOSTED) -fsanitize=fuzzer $^ $(HOST_LIBS) -o $@
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) -fsanitize=fuzzer $^ $(HOST_LIBS) -o $@
 
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
+
+# The tool that the system tests change point sets with.
+points: $(BUILD)/tests/points
+$(BUILD)/tests/points: $(obj)/tests/system/points.o
+	@mkdir -p $(@D)
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
+
+# The freestanding rooms for bare processors, as archives.
+bare      = -std=c11 $(WARNINGS) -Werror -Os -ffreestanding -ffp-contract=off \
+	-fno-math-errno -ffunction-sections -fdata-sections
+cortex_m3 = -mcpu=cortex-m3 -mthumb -mfloat-abi=soft
+cortex_m7 = -mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16
+bare_m3  := $(freestanding:%.c=$(BUILD)/cortex-m3/%.o)
+bare_m7  := $(freestanding:%.c=$(BUILD)/cortex-m7/%.o)
+bare: $(bare_m3) $(bare_m7)
+$(BUILD)/cortex-m3/%.o: %.c
+	@mkdir -p $(@D)
+	$(say) CC $<
+	$(Q)arm-none-eabi-gcc $(cortex_m3) $(bare) -MMD -MP -c $< -o $@
+$(BUILD)/cortex-m7/%.o: %.c
+	@mkdir -p $(@D)
+	$(say) CC $<
+	$(Q)arm-none-eabi-gcc $(cortex_m7) $(bare) -MMD -MP -c $< -o $@
 
 # --- what users call -------------------------------------------------------
 
@@ -124,6 +161,7 @@ bench: deps-bench
 
 # The rooms that bare boards will share, compiled for their processors.
 firmware: deps-test
+	@$(MAKE) --no-print-directory bare
 	@BUILD='$(BUILD)' bash tests/firmware
 
 fuzz: deps-test
@@ -161,8 +199,9 @@ help:
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev nettle-dev
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
-	clang-tidy cppcheck valgrind gcc-arm-none-eabi libnewlib-arm-none-eabi
-bench_packages = $(run_packages) g++ libcgal-dev
+	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq \
+	gcc-arm-none-eabi libnewlib-arm-none-eabi
+bench_packages = $(run_packages) g++ libcgal-dev jq
 full_packages  = $(test_packages) $(bench_packages) debootstrap
 
 deps: deps-test
