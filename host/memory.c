@@ -1,4 +1,3 @@
-#define _GNU_SOURCE /* mremap */
 #include "memory.h"
 
 #include <sys/mman.h>
