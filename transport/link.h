@@ -1,0 +1,165 @@
+/* A reliable link over any pipe of bytes: messages arrive once, whole and in
+ * order, or the link says that the peer is another one than before.  The pipe
+ * may lose, change, insert and repeat bytes, stall and break.  PROTOCOL.md has
+ * frame layout, handshake and timers.
+ *
+ * Memory: link_bytes() bytes that the caller gives: struct link, `window`
+ * slots of `frame_payload` bytes each way, one message less one slot so that a
+ * message of several frames lies in one piece, and two staging buffers of
+ * `staging` encoded frames.  Credits are the receiver's free slots, so nothing
+ * is ever received that has no place.  Work: link_poll handles at most `window`
+ * frames each way, and calls the pipe at most twice `window` times.
+ *
+ *     link_init(&link, memory, bytes, &config);
+ *     link_poll(&link, now_us);
+ *     while (link_read(&link, &message)) { use; link_release(&link); }
+ */
+#ifndef TRANSPORT_LINK_H
+#define TRANSPORT_LINK_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum {
+    LINK_WINDOW_MAX = 64,        /* frames a direction */
+    LINK_FRAME_PAYLOAD_MIN = 32, /* bytes */
+    LINK_FRAME_PAYLOAD_MAX = 1616,
+    LINK_MESSAGE_MAX = 1616,
+    LINK_PIPE_CLOSED = -1,
+    LINK_AGAIN = -1
+};
+
+/* The bytes beneath a link.  Both functions return at once: the number of bytes
+ * taken or got, 0 .. size (0: no room, or no byte, for the present), or
+ * LINK_PIPE_CLOSED while the other end is gone.  A pipe may work again after
+ * LINK_PIPE_CLOSED: the link then shakes hands and goes on where it stood.
+ * Sizes are below 2^30. */
+struct link_pipe {
+    void *context;
+    int (*send)(void *context, const uint8_t *bytes, size_t size);
+    int (*receive)(void *context, uint8_t *bytes, size_t size);
+};
+
+enum link_state {
+    LINK_DOWN,    /* the pipe is closed */
+    LINK_OPENING, /* shaking hands */
+    LINK_UP,
+    LINK_SILENT,  /* up, but nothing was heard for silence_us */
+    LINK_CLOSING, /* link_close: waits for what is on its way */
+    LINK_CLOSED,  /* both ends have said so, or the deadline is over */
+    LINK_REFUSED  /* the peer does not fit: link_peer says who and why */
+};
+
+enum link_refusal {
+    LINK_FITS,
+    LINK_WRONG_VERSION,
+    LINK_WRONG_WIRE, /* another node, or another of its ports */
+    LINK_WRONG_SIZES /* its window does not hold a message, or ours its */
+};
+
+/* Who is at the other end, by its own account. */
+struct link_peer {
+    uint32_t epoch; /* 0: not heard of yet */
+    uint16_t node;
+    uint8_t port;
+    uint8_t version;
+    uint16_t window, frame_payload, message_max;
+    enum link_refusal refusal;
+};
+
+struct link_statistics {
+    uint64_t bytes_sent, bytes_received;       /* on the pipe */
+    uint64_t frames_sent, frames_received;     /* good ones, of every kind */
+    uint64_t messages_sent, messages_received; /* queued; read */
+    uint64_t payload_sent, payload_received;   /* bytes of those messages */
+    uint64_t retransmitted;                    /* data frames sent again */
+    uint64_t timeouts;    /* retransmission timer ran out */
+    uint64_t acks_sent;   /* frames that carry nothing else */
+    uint64_t probes_sent; /* asked for credits that may have been lost */
+    uint64_t hellos_sent;
+    uint64_t bad_header;       /* frames with a false header check */
+    uint64_t bad_crc;          /* with a false CRC-32 */
+    uint64_t bad_code;         /* with a false length or COBS code */
+    uint64_t resynchronised;   /* runs of bytes too long for a frame, skipped */
+    uint64_t stale;            /* frames of another session */
+    uint64_t duplicates;       /* data frames that were here already */
+    uint64_t overruns;         /* data frames beyond the credits */
+    uint64_t sessions;         /* peers accepted: 1 after the first handshake */
+    uint64_t resumed;          /* handshakes that went on with a session */
+    uint64_t messages_dropped; /* queued for a peer that restarted */
+    uint64_t pipe_closed;      /* times the pipe broke */
+    uint64_t starved;          /* polls with frames to send and no credit */
+    uint64_t stalled;          /* polls in which the pipe did not take all */
+    uint32_t send_high_water;  /* slots */
+    uint32_t receive_high_water;                         /* slots */
+    uint32_t rtt_us, rtt_min_us, rtt_max_us, timeout_us; /* smoothed; extremes;
+                                                   retransmission timer now */
+};
+
+/* Zero means the default for all but pipe, epoch and window. */
+struct link_config {
+    struct link_pipe pipe;
+    uint32_t epoch; /* of this start, never repeated, never 0 */
+    uint16_t node;  /* who this end is, which port of it, */
+    uint8_t port;
+    uint8_t peer_port; /* and who must be at the other */
+    uint16_t peer_node;
+    uint16_t window;        /* frames a direction, 1 .. LINK_WINDOW_MAX */
+    uint16_t message_max;   /* bytes; default LINK_MESSAGE_MAX */
+    uint16_t frame_payload; /* bytes; default: a message a frame */
+    uint16_t staging;       /* frames; default min(window, 8) */
+    uint32_t timeout_min_us, timeout_max_us; /* retransmission;
+                                                20 ms and 1 s */
+    uint32_t ack_delay_us;                   /* of acknowledgements; 1 ms */
+    uint32_t hello_us;                       /* between greetings; 50 ms */
+    uint32_t keep_alive_us; /* a frame at least so often; 500 ms */
+    uint32_t silence_us;    /* then the peer counts as silent; 3 s */
+};
+
+struct link_message {
+    const uint8_t *data;
+    size_t size;
+};
+
+/* Bytes that link_init needs for this config; 0: the config is not sound. */
+size_t link_bytes(const struct link_config *config);
+
+struct link;
+
+/* A link lives at the start of its
+ * memory, which is aligned to 8 bytes and holds link_bytes(). NULL: no. */
+struct link *link_init(void *memory, size_t bytes,
+                       const struct link_config *config);
+
+/* Moves bytes and frames. Returns the number of frames handled, in and out. */
+int link_poll(struct link *link, uint64_t now_us);
+
+/* Queues a message made of two parts: 0, or LINK_AGAIN while there is no room.
+ * Messages may be queued before the peer was heard. */
+int link_write(struct link *link, const void *head, size_t head_size,
+               const void *data, size_t size);
+
+/* Messages of `size` bytes that link_write would take now. */
+unsigned link_room(const struct link *link, size_t size);
+
+/* The oldest message, valid until link_release; false: none. */
+bool link_read(struct link *link, struct link_message *message);
+void link_release(struct link *link);
+
+/* Says farewell once all is acknowledged; after deadline_us, or when the peer
+ * says farewell too, the state is LINK_CLOSED. */
+void link_close(struct link *link, uint64_t deadline_us);
+
+/* True when the peer has acknowledged all that was written. */
+bool link_idle(const struct link *link);
+
+enum link_state link_state(const struct link *link);
+const struct link_statistics *link_statistics(const struct link *link);
+const struct link_peer *link_peer(const struct link *link);
+
+/* Microseconds until link_poll must be called again even if no byte comes and
+ * nothing is written; 0: at once. */
+uint64_t link_next_due_us(const struct link *link, uint64_t now_us);
+
+#endif
