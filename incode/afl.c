@@ -36,6 +36,7 @@ void incode_afl_clear(struct incode_afl *afl)
     }
     for (uint32_t i = 0; i < afl->touched_capacity; i++) {
         afl->touched_heads[i] = INCODE_AFL_NIL;
+        afl->touched[i].brick = INCODE_NONE;
         afl->touched[i].next =
             i + 1 < afl->touched_capacity ? i + 1 : INCODE_AFL_NIL;
     }

@@ -23,7 +23,7 @@ struct incode_touched {
     uint64_t waiting; /* a task waits for a page on its behalf */
     uint64_t hub;     /* open faces at it go to its neighbours' lists */
     uint32_t brick;
-    uint32_t faces;   /* in the lists of its vertices */
+    uint32_t faces; /* in the lists of its vertices */
     uint32_t next;
     uint32_t spare;
 };
@@ -45,6 +45,11 @@ struct incode_afl {
 
 #define INCODE_AFL_NIL UINT32_MAX
 
+static inline bool incode_touched_used(const struct incode_touched *entry)
+{
+    return entry->brick != UINT32_MAX;
+}
+
 /* capacity, bricks: powers of two. */
 size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks);
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
@@ -53,8 +58,7 @@ void incode_afl_clear(struct incode_afl *afl);
 
 /* The entry of a brick, made where there is none; asserts that there is room
  * (the caller keeps enough free). */
-struct incode_touched *incode_afl_touch(struct incode_afl *afl,
-                                        uint32_t brick);
+struct incode_touched *incode_afl_touch(struct incode_afl *afl, uint32_t brick);
 /* The entry of a brick, or NULL. */
 struct incode_touched *incode_afl_find(const struct incode_afl *afl,
                                        uint32_t brick);

@@ -6,7 +6,6 @@
 #ifndef INCODE_CHECK_H
 #define INCODE_CHECK_H
 
-#define INCODE_ASSERT(condition)                                               \
-    ((condition) ? (void)0 : __builtin_trap())
+#define INCODE_ASSERT(condition) ((condition) ? (void)0 : __builtin_trap())
 
 #endif

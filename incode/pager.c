@@ -37,8 +37,8 @@ void incode_pager_init(struct incode_pager *pager, void *memory,
 
 static uint16_t *head_of(const struct incode_pager *pager, uint32_t page)
 {
-    return &pager->heads[(page * UINT32_C(2654435761) >> 12) &
-                         pager->hash_mask];
+    return &pager
+                ->heads[(page * UINT32_C(2654435761) >> 12) & pager->hash_mask];
 }
 
 static uint16_t find(const struct incode_pager *pager, uint32_t page)
@@ -91,8 +91,7 @@ static uint16_t take_frame(struct incode_pager *pager)
         return pager->free++;
     }
     uint16_t i = pager->oldest;
-    while (i != INCODE_NO_FRAME &&
-           pager->frames[i].state != INCODE_FRAME_READY)
+    while (i != INCODE_NO_FRAME && pager->frames[i].state != INCODE_FRAME_READY)
         i = pager->frames[i].newer;
     if (i == INCODE_NO_FRAME)
         return i;
@@ -138,14 +137,12 @@ struct incode_frame *incode_pager_get(struct incode_pager *pager, uint32_t page)
 bool incode_pager_loading(const struct incode_pager *pager, uint32_t page)
 {
     uint16_t i = find(pager, page);
-    return i != INCODE_NO_FRAME &&
-           pager->frames[i].state != INCODE_FRAME_READY;
+    return i != INCODE_NO_FRAME && pager->frames[i].state != INCODE_FRAME_READY;
 }
 
 static void leaf_boxes(struct incode_frame *f)
 {
-    const double *axis[3] = {f->page.brick.x, f->page.brick.y,
-                             f->page.brick.z};
+    const double *axis[3] = {f->page.brick.x, f->page.brick.y, f->page.brick.z};
     for (int d = 0; d < 3; d++) {
         for (int leaf = 0; leaf < INCODE_BRICK_LEAVES; leaf++) {
             int first = leaf * INCODE_LEAF_POINTS;

@@ -29,11 +29,11 @@ struct incode_frame {
     alignas(64) union incode_page page;
     alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES];
     alignas(64) double leaf_hi[3][INCODE_BRICK_LEAVES];
-    uint32_t number;      /* the page */
+    uint32_t number;       /* the page */
     uint16_t newer, older; /* the ring of use */
-    uint16_t chain;       /* next frame of the same hash */
+    uint16_t chain;        /* next frame of the same hash */
     uint8_t state;
-    uint8_t count;        /* points of a brick */
+    uint8_t count; /* points of a brick */
 };
 
 struct incode_pager {
@@ -41,7 +41,7 @@ struct incode_pager {
     uint16_t *heads; /* hash of page numbers to frames */
     uint32_t frame_count, hash_mask;
     uint32_t loading, loading_max, held;
-    uint32_t bricks;           /* pages below this are bricks */
+    uint32_t bricks; /* pages below this are bricks */
     uint16_t newest, oldest, free;
     uint64_t shuffle; /* state of the test's shuffle; 0: none */
     bool (*request)(void *context, uint32_t page);

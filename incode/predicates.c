@@ -3,6 +3,7 @@
 #include <float.h>
 
 #include "exact.h"
+#include "fixed.h"
 
 /* Static filters of Devillers and Pion: the sign of the rounded determinant is
  * right where it exceeds these times the largest differences, as long as no
@@ -42,6 +43,9 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     }
     tally->exact_orient3d++;
     const double *p[4] = {a, b, c, d};
+    int64_t n[3][3];
+    if (incode_fixed_differences(n, p + 1, 3, a))
+        return incode_fixed_orient3d((const int64_t(*)[3])n);
     return incode_exact_orient3d(p);
 }
 
@@ -82,7 +86,10 @@ static int in_sphere_tie(struct incode_tally *tally, const double *const p[5]) {
 static int in_sphere_exact(struct incode_tally *tally,
                            const double *const p[5]) {
     tally->exact_in_sphere++;
-    int sign = incode_exact_in_sphere(p);
+    int64_t n[4][3];
+    int sign = incode_fixed_differences(n, p, 4, p[4])
+                   ? incode_fixed_in_sphere((const int64_t(*)[3])n)
+                   : incode_exact_in_sphere(p);
     return sign != 0 ? sign : in_sphere_tie(tally, p);
 }
 

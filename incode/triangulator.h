@@ -25,12 +25,12 @@ enum incode_face_rule { INCODE_FACE_OWN, INCODE_FACE_PAPER };
 /* What every node of a run is told once. */
 struct incode_setup {
     uint32_t bricks;
-    uint8_t index;          /* enum incode_index */
-    uint8_t face_rule;      /* enum incode_face_rule */
+    uint8_t index;     /* enum incode_index */
+    uint8_t face_rule; /* enum incode_face_rule */
     uint16_t reserved;
-    uint64_t shuffle_seed;  /* 0: pages are ready as they arrive */
-    double lo[3], hi[3];    /* box of all points, tight */
-    uint32_t cells[3];      /* index `grid`: cells in x, y, z; else 0 */
+    uint64_t shuffle_seed; /* 0: pages are ready as they arrive */
+    double lo[3], hi[3];   /* box of all points, tight */
+    uint32_t cells[3];     /* index `grid`: cells in x, y, z; else 0 */
     uint32_t reserved2;
 };
 
@@ -68,8 +68,7 @@ struct incode_ports {
     void (*commit)(void *context, uint32_t brick);
     /* Spilled toggles, to be kept in order with their brick (= v[0] / 64);
      * v[1] = INCODE_NONE: vertex v[0] was reached.  False: no room now. */
-    bool (*spill)(void *context, const struct incode_face *faces,
-                  size_t count);
+    bool (*spill)(void *context, const struct incode_face *faces, size_t count);
     /* Asks for a brick's spilled toggles; they come by
      * incode_triangulator_unspill, the last call with `last` set. */
     bool (*unspill)(void *context, uint32_t brick);
@@ -83,7 +82,7 @@ struct incode_map {
 
 struct incode_statistics {
     uint64_t tetrahedra_built, tetrahedra_kept, make_tetra_calls, hull_facets;
-    uint64_t candidates;        /* points whose distance was evaluated */
+    uint64_t candidates; /* points whose distance was evaluated */
     uint64_t wide_searches, seeds, vertices, vertices_waited;
     uint64_t page_requests, page_faults, page_evictions;
     uint64_t afl_max, afl_spilled;

@@ -1,0 +1,299 @@
+#include "fixed.h"
+
+#include <string.h>
+
+_Static_assert((-1 >> 1) == -1, "shifts of negative numbers keep the sign");
+
+/* ---- from doubles to integers ---- */
+
+static double power_of_two(int32_t e)
+{
+    uint64_t bits = (uint64_t)(e + 1023) << 52;
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* Two factors, since 2^k itself may leave the range of doubles. */
+struct scale {
+    double up1, up2, down1, down2;
+};
+
+static struct scale scale_of(int32_t k)
+{
+    int32_t half = k / 2, rest = k - half;
+    struct scale s = {power_of_two(half), power_of_two(rest),
+                      power_of_two(-half), power_of_two(-rest)};
+    return s;
+}
+
+/* out += v * 2^k; false where one of these is no integer. */
+static bool add_scaled(int64_t out[12], const double v[12],
+                       const struct scale *s)
+{
+    int bad = 0;
+    for (int i = 0; i < 12; i++) {
+        int64_t n = (int64_t)(v[i] * s->up1 * s->up2);
+        bad |= (double)n * s->down1 * s->down2 != v[i];
+        out[i] += n;
+    }
+    return bad == 0;
+}
+
+bool incode_fixed_differences(int64_t d[][3], const double *const p[],
+                              int count, const double origin[3])
+{
+    double head[12] = {0}, tail[12] = {0}, most = 0;
+    int inexact = 0;
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < 3; k++) {
+            /* Knuth's two-sum: p - o = x + y without error. */
+            double a = p[i][k], b = origin[k], x = a - b;
+            double bv = a - x, av = x + bv;
+            double y = (a - av) + (bv - b);
+            double m = __builtin_fabs(x);
+            most = m > most ? m : most;
+            inexact |= y != 0;
+            head[3 * i + k] = x;
+            tail[3 * i + k] = y;
+        }
+    }
+    uint64_t bits;
+    memcpy(&bits, &most, sizeof bits);
+    int32_t e = (int32_t)(bits >> 52);
+    if (e > 2044)
+        return false; /* near overflow, where the two-sum could fail */
+    /* most < 2^(e-1022), denormals (e = 0) too, so most * 2^k < 2^61. */
+    struct scale s = scale_of(1083 - (e == 0 ? 1 : e));
+    int64_t n[12] = {0};
+    if (!add_scaled(n, head, &s) || (inexact != 0 && !add_scaled(n, tail, &s)))
+        return false;
+    memcpy(d, n, (size_t)count * sizeof d[0]);
+    return true;
+}
+
+/* ---- 32-bit words ---- */
+
+/* Numbers in two's complement, least word first.  r = a * b in na + nb. */
+static void product(uint32_t *r, const uint32_t *a, int na, const uint32_t *b,
+                    int nb)
+{
+    memset(r, 0, (size_t)(na + nb) * sizeof r[0]);
+    for (int i = 0; i < na; i++) {
+        uint64_t carry = 0;
+        for (int j = 0; j < nb; j++) {
+            carry += (uint64_t)a[i] * b[j] + r[i + j];
+            r[i + j] = (uint32_t)carry;
+            carry >>= 32;
+        }
+        r[i + nb] = (uint32_t)carry;
+    }
+    /* A negative factor was taken as 2^(32 words) too large. */
+    uint32_t a_mask = 0u - (a[na - 1] >> 31), b_mask = 0u - (b[nb - 1] >> 31);
+    uint64_t borrow = 0;
+    for (int j = 0; j < nb; j++) {
+        borrow = (uint64_t)r[na + j] - (b[j] & a_mask) - borrow;
+        r[na + j] = (uint32_t)borrow;
+        borrow = borrow >> 63;
+    }
+    borrow = 0;
+    for (int i = 0; i < na; i++) {
+        borrow = (uint64_t)r[nb + i] - (a[i] & b_mask) - borrow;
+        r[nb + i] = (uint32_t)borrow;
+        borrow = borrow >> 63;
+    }
+}
+
+/* r += a or r -= a. */
+static void accumulate(uint32_t *r, const uint32_t *a, int n, bool subtract)
+{
+    uint32_t mask = subtract ? UINT32_MAX : 0;
+    uint64_t carry = subtract;
+    for (int i = 0; i < n; i++) {
+        carry += (uint64_t)r[i] + (a[i] ^ mask);
+        r[i] = (uint32_t)carry;
+        carry >>= 32;
+    }
+}
+
+static int words_sign(const uint32_t *a, int n)
+{
+    uint32_t any = 0;
+    for (int i = 0; i < n; i++)
+        any |= a[i];
+    return a[n - 1] >> 31 != 0 ? -1 : any != 0;
+}
+
+typedef uint32_t words2[2]; /* a difference, below 2^61 */
+typedef uint32_t words4[4]; /* a 2 x 2 minor or a squared distance, 2^124 */
+typedef uint32_t words6[6]; /* a 3 x 3 minor, 2^186 */
+
+static void words_of(words2 r, int64_t a)
+{
+    r[0] = (uint32_t)(uint64_t)a;
+    r[1] = (uint32_t)((uint64_t)a >> 32);
+}
+
+static void minor3_portable(words6 r, const int64_t a[3], const int64_t b[3],
+                            const int64_t c[3])
+{
+    words2 p, q;
+    words4 t, minor;
+    words6 term;
+    memset(r, 0, sizeof(words6));
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        words_of(p, b[u]);
+        words_of(q, c[v]);
+        product(minor, p, 2, q, 2);
+        words_of(p, c[u]);
+        words_of(q, b[v]);
+        product(t, p, 2, q, 2);
+        accumulate(minor, t, 4, true);
+        words_of(p, a[k]);
+        product(term, minor, 4, p, 2);
+        accumulate(r, term, 6, false);
+    }
+}
+
+int incode_fixed_orient3d_portable(const int64_t d[3][3])
+{
+    words6 det;
+    minor3_portable(det, d[0], d[1], d[2]);
+    return words_sign(det, 6);
+}
+
+int incode_fixed_in_sphere_portable(const int64_t d[4][3])
+{
+    static const uint8_t rest[4][3] = {
+        {1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
+    uint32_t det[10] = {0};
+    for (int i = 0; i < 4; i++) {
+        words4 lift = {0}, square;
+        words6 minor;
+        uint32_t term[10];
+        for (int k = 0; k < 3; k++) {
+            words2 w;
+            words_of(w, d[i][k]);
+            product(square, w, 2, w, 2);
+            accumulate(lift, square, 4, false);
+        }
+        minor3_portable(minor, d[rest[i][0]], d[rest[i][1]], d[rest[i][2]]);
+        product(term, lift, 4, minor, 6);
+        accumulate(det, term, 10, i % 2 != 0);
+    }
+    return words_sign(det, 10);
+}
+
+/* ---- 64-bit words ---- */
+
+#ifdef __SIZEOF_INT128__
+
+__extension__ typedef __int128 i128;
+__extension__ typedef unsigned __int128 u128;
+
+/* lo + 2^64 * hi */
+struct i192 {
+    uint64_t lo;
+    i128 hi;
+};
+
+static inline i128 times(int64_t a, int64_t b)
+{
+    return (i128)a * b;
+}
+
+static inline i128 times_unsigned(uint64_t a, int64_t b)
+{
+    u128 below = (u128)a << 64;
+    return (i128)((u128)a * (uint64_t)b - (b < 0 ? below : 0));
+}
+
+static inline struct i192 sum3(i128 m, int64_t p, i128 n, int64_t q, i128 o,
+                               int64_t r)
+{
+    /* Below 3 * 2^125 and 3 * 2^121. */
+    i128 low = times_unsigned((uint64_t)m, p) + times_unsigned((uint64_t)n, q) +
+               times_unsigned((uint64_t)o, r);
+    i128 high = times((int64_t)(m >> 64), p) + times((int64_t)(n >> 64), q) +
+                times((int64_t)(o >> 64), r);
+    struct i192 s = {(uint64_t)low, (low >> 64) + high};
+    return s;
+}
+
+static inline int sign_of(struct i192 a)
+{
+    return a.hi < 0 ? -1 : a.hi > 0 || a.lo != 0;
+}
+
+/* The minor of columns x and y. */
+static inline i128 minor2(const int64_t a[3], const int64_t b[3])
+{
+    return times(a[0], b[1]) - times(b[0], a[1]);
+}
+
+int incode_fixed_orient3d(const int64_t d[3][3])
+{
+    const int64_t *a = d[0], *b = d[1], *c = d[2];
+    return sign_of(sum3(minor2(a, b), c[2], minor2(c, a), b[2], minor2(b, c),
+                        a[2]));
+}
+
+/* Columns of 64 bits, each with room for carries. */
+struct columns {
+    i128 c[5];
+};
+
+/* s += |d|^2 m */
+static inline void add_lifted(struct columns *s, const int64_t d[3],
+                              struct i192 m)
+{
+    u128 lift = (u128)(times(d[0], d[0]) + times(d[1], d[1])) +
+                (u128)times(d[2], d[2]);
+    uint64_t l0 = (uint64_t)lift, l1 = (uint64_t)(lift >> 64);
+    uint64_t m1 = (uint64_t)m.hi;
+    int64_t m2 = (int64_t)(m.hi >> 64);
+    u128 p00 = (u128)l0 * m.lo, p01 = (u128)l0 * m1;
+    u128 p10 = (u128)l1 * m.lo, p11 = (u128)l1 * m1;
+    i128 p02 = times_unsigned(l0, m2), p12 = times((int64_t)l1, m2);
+    s->c[0] += (uint64_t)p00;
+    s->c[1] += (i128)(p00 >> 64) + (uint64_t)p01 + (uint64_t)p10;
+    s->c[2] += (i128)(p01 >> 64) + (i128)(p10 >> 64) + (uint64_t)p11 +
+               (uint64_t)p02;
+    s->c[3] += (i128)(p11 >> 64) + (p02 >> 64) + (uint64_t)p12;
+    s->c[4] += p12 >> 64;
+}
+
+int incode_fixed_in_sphere(const int64_t d[4][3])
+{
+    const int64_t *a = d[0], *b = d[1], *c = d[2], *e = d[3];
+    i128 ab = minor2(a, b), bc = minor2(b, c), ce = minor2(c, e);
+    i128 ca = minor2(c, a), ea = minor2(e, a), eb = minor2(e, b);
+    struct columns s = {{0}};
+    add_lifted(&s, a, sum3(bc, e[2], eb, c[2], ce, b[2]));
+    add_lifted(&s, b, sum3(ca, e[2], ea, -c[2], ce, -a[2]));
+    add_lifted(&s, c, sum3(ab, e[2], ea, b[2], eb, -a[2]));
+    add_lifted(&s, e, sum3(ab, -c[2], ca, -b[2], bc, -a[2]));
+    uint64_t any = 0;
+    i128 carry = 0;
+    for (int i = 0; i < 5; i++) {
+        carry += s.c[i];
+        any |= (uint64_t)carry;
+        carry >>= 64;
+    }
+    return carry < 0 ? -1 : any != 0 || carry > 0;
+}
+
+#else
+
+int incode_fixed_orient3d(const int64_t d[3][3])
+{
+    return incode_fixed_orient3d_portable(d);
+}
+
+int incode_fixed_in_sphere(const int64_t d[4][3])
+{
+    return incode_fixed_in_sphere_portable(d);
+}
+
+#endif

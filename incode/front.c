@@ -1,0 +1,200 @@
+#include <string.h>
+
+#include "check.h"
+#include "state.h"
+
+/* Which faces are pursued, in whose list they wait, and where the list goes
+ * when it does not fit.  A face belongs to its lowest own vertex that is no
+ * hub; a face without such a vertex (it has only hubs of its own, or the rule
+ * `paper` pursues it) to its lowest vertex that is no hub, or to its lowest. */
+
+static bool is_hub(const struct incode_triangulator *t, uint32_t v)
+{
+    if (t->afl.hubs == 0)
+        return false;
+    const struct incode_touched *entry =
+        incode_afl_find(&t->afl, v / INCODE_BRICK_POINTS);
+    return entry != NULL && (entry->hub >> (v % INCODE_BRICK_POINTS) & 1) != 0;
+}
+
+/* Does the triangle's box meet the region's?  A function of the face alone, so
+ * that both its tetrahedra agree. */
+static bool in_region(const struct incode_triangulator *t,
+                      const double *const p[3])
+{
+    for (int d = 0; d < 3; d++) {
+        double a = p[0][d], b = p[1][d], c = p[2][d];
+        double lo = a < b ? a : b, hi = a < b ? b : a;
+        lo = c < lo ? c : lo;
+        hi = c > hi ? c : hi;
+        if (hi < t->job.lo[d] || lo > t->job.hi[d])
+            return false;
+    }
+    return true;
+}
+
+bool incode_front_key(const struct incode_triangulator *t, uint32_t f[3],
+                      const double *const p[3])
+{
+    int best = -1, best_class = 4;
+    bool any_own = false;
+    for (int i = 0; i < 3; i++) {
+        bool own = incode_own(t, f[i]), hub = is_hub(t, f[i]);
+        int class = (own && !hub) ? 0 : !hub ? 1 : 2;
+        any_own = any_own || own;
+        if (class < best_class || (class == best_class && f[i] < f[best])) {
+            best = i;
+            best_class = class;
+        }
+    }
+    if (!any_own &&
+        (t->setup.face_rule != INCODE_FACE_PAPER || !in_region(t, p)))
+        return false;
+    uint32_t g[3] = {f[best], f[(best + 1) % 3], f[(best + 2) % 3]};
+    memcpy(f, g, sizeof g);
+    return true;
+}
+
+static void spill_one(struct incode_triangulator *t, const uint32_t f[3])
+{
+    INCODE_ASSERT(t->spill_count < INCODE_SPILL_FACES);
+    memcpy(t->spill[t->spill_count++].v, f, sizeof t->spill[0].v);
+    t->spilled_any = true;
+    t->stats.afl_spilled++;
+    if (t->spill_count == INCODE_SPILL_FACES)
+        (void)incode_front_flush(t);
+}
+
+bool incode_front_flush(struct incode_triangulator *t)
+{
+    if (t->spill_count == 0)
+        return true;
+    if (!t->ports.spill(t->ports.context, t->spill, t->spill_count))
+        return false;
+    t->spill_count = 0;
+    return true;
+}
+
+static bool is_spilled(const struct incode_triangulator *t, uint32_t brick)
+{
+    return incode_position(t, brick) >= t->spill_from;
+}
+
+void incode_front_toggle(struct incode_triangulator *t, const uint32_t f[3])
+{
+    if (is_spilled(t, f[0] / INCODE_BRICK_POINTS))
+        spill_one(t, f);
+    else
+        incode_afl_toggle(&t->afl, f[0], f[1], f[2]);
+}
+
+void incode_front_reached(struct incode_triangulator *t, uint32_t v)
+{
+    uint32_t brick = v / INCODE_BRICK_POINTS;
+    if (!incode_own_brick(t, brick))
+        return;
+    if (is_spilled(t, brick)) {
+        const uint32_t f[3] = {v, INCODE_NONE, INCODE_NONE};
+        spill_one(t, f);
+        return;
+    }
+    struct incode_touched *entry = incode_afl_touch(&t->afl, brick);
+    entry->reached |= UINT64_C(1) << (v % INCODE_BRICK_POINTS);
+}
+
+void incode_front_make_hub(struct incode_triangulator *t, uint32_t v)
+{
+    struct incode_touched *entry =
+        incode_afl_touch(&t->afl, v / INCODE_BRICK_POINTS);
+    entry->hub |= UINT64_C(1) << (v % INCODE_BRICK_POINTS);
+    t->afl.hubs++;
+}
+
+/* ---- spilling ---- */
+
+/* The position from which on bricks are to be spilled: half way between the
+ * one at work and the farthest one touched. */
+static uint32_t spill_position(const struct incode_triangulator *t)
+{
+    uint32_t farthest = t->current;
+    for (uint32_t i = 0; i < t->afl.touched_capacity; i++) {
+        const struct incode_touched *entry = &t->afl.touched[i];
+        if (!incode_touched_used(entry))
+            continue;
+        uint32_t position = incode_position(t, entry->brick);
+        if (position < t->spill_from && position > farthest)
+            farthest = position;
+    }
+    return t->current + 1 + (farthest - t->current) / 2;
+}
+
+/* Moves a brick's faces and marks out, as far as the port has room; true: all
+ * of them. */
+static bool evict_brick(struct incode_triangulator *t,
+                        const struct incode_touched *entry)
+{
+    uint32_t brick = entry->brick;
+    for (uint32_t slot = 0; slot < INCODE_BRICK_POINTS; slot++) {
+        uint32_t v = brick * INCODE_BRICK_POINTS + slot, pairs[8][2];
+        bool more = true;
+        while (more) {
+            if (t->spill_count > 0 && !incode_front_flush(t))
+                return false;
+            uint32_t n = incode_afl_take(&t->afl, v, pairs, 8, &more);
+            for (uint32_t i = 0; i < n; i++) {
+                const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
+                spill_one(t, f);
+            }
+        }
+    }
+    for (uint64_t left = entry->reached; left != 0; left &= left - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctzll(left);
+        const uint32_t f[3] = {brick * INCODE_BRICK_POINTS + slot, INCODE_NONE,
+                               INCODE_NONE};
+        spill_one(t, f);
+    }
+    incode_afl_drop(&t->afl, brick);
+    return true;
+}
+
+/* Evicts one brick beyond the threshold, or notes that none is left. */
+static void evict_next(struct incode_triangulator *t)
+{
+    while (t->spill_cursor < t->afl.touched_capacity) {
+        const struct incode_touched *entry = &t->afl.touched[t->spill_cursor];
+        if (incode_touched_used(entry) && is_spilled(t, entry->brick)) {
+            (void)evict_brick(t, entry);
+            return;
+        }
+        t->spill_cursor++;
+    }
+    t->spill_cursor = INCODE_NONE;
+}
+
+static bool has_room(const struct incode_triangulator *t)
+{
+    return t->afl.capacity - t->afl.count >= t->room_faces &&
+           t->afl.touched_capacity - t->afl.touched_count >= t->room_bricks;
+}
+
+bool incode_front_room(struct incode_triangulator *t)
+{
+    INCODE_ASSERT(t->fault == NULL);
+    if (t->spill_count > 0 && !incode_front_flush(t))
+        return false;
+    if (t->spill_cursor != INCODE_NONE) {
+        evict_next(t);
+        return false;
+    }
+    if (has_room(t))
+        return true;
+    uint32_t from = spill_position(t);
+    if (from >= t->spill_from) {
+        t->fault = "the active face list of one brick does not fit; give the "
+                   "nodes more memory";
+        return false;
+    }
+    t->spill_from = from;
+    t->spill_cursor = 0;
+    return false;
+}

@@ -1,0 +1,389 @@
+#include "query.h"
+
+#include <float.h>
+#include <string.h>
+
+#include "check.h"
+#include "simd.h"
+
+double incode_scale_for(double extent)
+{
+    uint64_t bits;
+    if (!(extent > DBL_MIN))
+        extent = DBL_MIN;
+    if (extent > DBL_MAX)
+        extent = DBL_MAX;
+    memcpy(&bits, &extent, sizeof bits);
+    uint64_t exponent = bits >> 52; /* extent >= 2^(exponent - 1023) */
+    uint64_t scaled = exponent > 2045 ? 1 : 2046 - exponent;
+    bits = scaled << 52;
+    double scale;
+    memcpy(&scale, &bits, sizeof scale);
+    return scale;
+}
+
+static void relative(double out[3], const struct incode_query *q,
+                     const double p[3])
+{
+    for (int d = 0; d < 3; d++)
+        out[d] = (p[d] - q->pv[d]) * q->scale;
+}
+
+void incode_query_face(struct incode_query *q)
+{
+    double extent = 0;
+    for (int d = 0; d < 3; d++) {
+        double eb = __builtin_fabs(q->pb[d] - q->pv[d]);
+        double ec = __builtin_fabs(q->pc[d] - q->pv[d]);
+        extent = eb > extent ? eb : extent;
+        extent = ec > extent ? ec : extent;
+    }
+    q->scale = incode_scale_for(extent);
+    relative(q->rb, q, q->pb);
+    relative(q->rc, q, q->pc);
+    incode_sphere_plane(&q->sphere, q->rb, q->rc);
+}
+
+void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
+                           uint32_t id, const double p[3])
+{
+    if (incode_orient3d(tally, q->pv, q->pb, q->pc, p) <= 0)
+        return;
+    if (q->best != INCODE_NONE &&
+        incode_in_sphere(tally, q->pv, q->pb, q->pc, q->best_p, p) < 0)
+        return;
+    q->best = id;
+    memcpy(q->best_p, p, sizeof q->best_p);
+    double r[3];
+    relative(r, q, p);
+    incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
+}
+
+/* ---- which of up to 32 boxes a question concerns ---- */
+
+struct boxes {
+    const double *lo[3], *hi[3];
+};
+
+INCODE_INLINE incode_vl meets(const struct incode_query *q,
+                              const struct boxes *boxes, unsigned i)
+{
+    incode_vl in = (incode_vl){-1, -1, -1, -1, -1, -1, -1, -1};
+    for (int d = 0; d < 3; d++) {
+        incode_vd lo = incode_vd_load(boxes->lo[d] + i);
+        incode_vd hi = incode_vd_load(boxes->hi[d] + i);
+        in &= (lo <= incode_vd_all(q->hi[d])) & (hi >= incode_vd_all(q->lo[d]));
+    }
+    return in;
+}
+
+INCODE_INLINE incode_vl not_done(const struct incode_query *q,
+                                 const struct boxes *boxes, unsigned i)
+{
+    incode_vl in = (incode_vl){-1, -1, -1, -1, -1, -1, -1, -1};
+    for (int d = 0; d < 3; d++) {
+        incode_vd lo = incode_vd_load(boxes->lo[d] + i);
+        incode_vd hi = incode_vd_load(boxes->hi[d] + i);
+        in &= (lo >= incode_vd_all(q->done_lo[d])) &
+              (hi <= incode_vd_all(q->done_hi[d]));
+    }
+    return ~in;
+}
+
+/* Not certainly on the known side of the plane, nor outside the sphere: upper
+ * bounds of both functions over the box, dimension by dimension. */
+INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
+                                      const struct boxes *boxes, unsigned i)
+{
+    const struct incode_sphere *s = &q->sphere;
+    incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
+    incode_vd value = zero, value_error = zero;
+    incode_vd det = incode_vd_all(s->det), pdet = incode_vd_all(s->pdet);
+    for (int d = 0; d < 3; d++) {
+        incode_vd v = incode_vd_all(q->pv[d]);
+        incode_vd scale = incode_vd_all(q->scale);
+        incode_vd lo = (incode_vd_load(boxes->lo[d] + i) - v) * scale;
+        incode_vd hi = (incode_vd_load(boxes->hi[d] + i) - v) * scale;
+        incode_vd far = incode_vd_max(incode_vd_abs(lo), incode_vd_abs(hi));
+        incode_vd n = incode_vd_all(s->n[d]);
+        plane += incode_vd_max(n * lo, n * hi);
+        plane_error += incode_vd_all(s->pn[d]) * far;
+        if (!s->has_apex)
+            continue;
+        incode_vd m = incode_vd_all(s->m[d]);
+        incode_vd peak = m / (det + det);
+        incode_vd top = incode_vd_max(incode_vd_min(peak, hi), lo);
+        incode_vd best =
+            incode_vd_max((m - det * lo) * lo, (m - det * hi) * hi);
+        value += incode_vd_max((m - det * top) * top, best);
+        value_error += (incode_vd_all(s->pm[d]) + pdet * far) * far;
+    }
+    incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
+    incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
+    incode_vl out = plane + (plane_error * eps + tiny) < zero;
+    if (s->has_apex)
+        out |= value + (value_error * eps + tiny) < zero;
+    return ~out;
+}
+
+INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
+                                    const struct boxes *boxes, unsigned i)
+{
+    incode_vd zero = incode_vd_all(0), square = zero;
+    for (int d = 0; d < 3; d++) {
+        incode_vd v = incode_vd_all(q->pv[d]);
+        incode_vd scale = incode_vd_all(q->scale);
+        incode_vd lo = (incode_vd_load(boxes->lo[d] + i) - v) * scale;
+        incode_vd hi = (incode_vd_load(boxes->hi[d] + i) - v) * scale;
+        incode_vd gap = incode_vd_max(incode_vd_max(lo, -hi), zero);
+        square += gap * gap;
+    }
+    return ~(square > incode_vd_all(q->limit));
+}
+
+static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
+                        unsigned count)
+{
+    uint32_t mask = 0;
+    for (unsigned i = 0; i < count; i += INCODE_VD_LANES) {
+        incode_vl in = (incode_vl){-1, -1, -1, -1, -1, -1, -1, -1};
+        if (q->boxed)
+            in &= meets(q, boxes, i);
+        if (q->done)
+            in &= not_done(q, boxes, i);
+        if (q->question == INCODE_QUERY_APEX)
+            in &= may_hold_apex(q, boxes, i);
+        else if (q->question != INCODE_QUERY_BOX)
+            in &= may_be_near(q, boxes, i);
+        mask |= incode_vd_mask(in) << i;
+    }
+    return count >= 32 ? mask : mask & ((UINT32_C(1) << count) - 1);
+}
+
+/* ---- the walk ---- */
+
+struct walk {
+    struct incode_walker *walker;
+    struct incode_query *q;
+    incode_visit *visit;
+    void *context;
+};
+
+enum { ASK_AHEAD = 8 };
+
+/* A page is missing: its next siblings will be, too, so ask for some now. */
+static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
+                                 uint32_t mask, unsigned child)
+{
+    w->q->missing = base + first + child;
+    mask &= ~((UINT32_C(2) << child) - 1);
+    for (int i = 0; i < ASK_AHEAD && mask != 0; i++) {
+        unsigned next = (unsigned)__builtin_ctz(mask);
+        mask &= mask - 1;
+        (void)incode_pager_get(w->walker->pager, base + first + next);
+    }
+    return INCODE_WALK_WAIT;
+}
+
+static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
+                                    const struct incode_frame *frame)
+{
+    struct boxes boxes;
+    for (int d = 0; d < 3; d++) {
+        boxes.lo[d] = frame->leaf_lo[d];
+        boxes.hi[d] = frame->leaf_hi[d];
+    }
+    unsigned leaves =
+        (frame->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
+    uint32_t mask = passing(w->q, &boxes, leaves);
+    if (mask != 0 && !w->visit(w->walker, w->q, frame, brick, mask, w->context))
+        return INCODE_WALK_STOP;
+    return INCODE_WALK_DONE;
+}
+
+/* Bricks below page `index` of `level`, exclusive end. */
+static uint64_t brick_end(uint32_t level, uint64_t index)
+{
+    return (index + 1) << (5 * level);
+}
+
+static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
+                                const struct incode_frame *frame)
+{
+    const struct incode_tree *tree = w->walker->tree;
+    uint32_t first = index * INCODE_FANOUT;
+    uint32_t count = tree->count[level - 1] - first;
+    if (count > INCODE_FANOUT)
+        count = INCODE_FANOUT;
+    struct boxes boxes;
+    for (int d = 0; d < 3; d++) {
+        boxes.lo[d] = frame->page.boxes.lo[d];
+        boxes.hi[d] = frame->page.boxes.hi[d];
+    }
+    uint32_t mask = passing(w->q, &boxes, count);
+    for (uint32_t left = mask; left != 0; left &= left - 1) {
+        unsigned child = (unsigned)__builtin_ctz(left);
+        uint64_t end = brick_end(level - 1, (uint64_t)first + child);
+        if (end <= w->q->cursor)
+            continue;
+        uint32_t page = tree->base[level - 1] + first + child;
+        const struct incode_frame *f = incode_pager_get(w->walker->pager, page);
+        if (f == NULL)
+            return wait_for(w, tree->base[level - 1], first, left, child);
+        enum incode_walk r = level == 1
+                                 ? visit_brick(w, first + child, f)
+                                 : descend(w, level - 1, first + child, f);
+        if (r != INCODE_WALK_DONE)
+            return r;
+        w->q->cursor = end > UINT32_MAX ? UINT32_MAX : (uint32_t)end;
+    }
+    return INCODE_WALK_DONE;
+}
+
+enum incode_walk incode_walk(struct incode_walker *walker,
+                             struct incode_query *q, incode_visit *visit,
+                             void *context)
+{
+    struct walk w = {walker, q, visit, context};
+    uint32_t top = walker->tree->levels - 1;
+    const struct incode_frame *root =
+        incode_pager_get(walker->pager, walker->tree->base[top]);
+    if (root == NULL) {
+        q->missing = walker->tree->base[top];
+        return INCODE_WALK_WAIT;
+    }
+    return descend(&w, top, 0, root);
+}
+
+/* ---- points ---- */
+
+struct lane_points {
+    incode_vd r[3]; /* relative coordinates of one leaf's points */
+};
+
+INCODE_INLINE void load_leaf(struct lane_points *p,
+                             const struct incode_query *q,
+                             const struct incode_frame *frame, unsigned slot)
+{
+    incode_vd scale = incode_vd_all(q->scale);
+    p->r[0] =
+        (incode_vd_load(frame->page.brick.x + slot) - incode_vd_all(q->pv[0])) *
+        scale;
+    p->r[1] =
+        (incode_vd_load(frame->page.brick.y + slot) - incode_vd_all(q->pv[1])) *
+        scale;
+    p->r[2] =
+        (incode_vd_load(frame->page.brick.z + slot) - incode_vd_all(q->pv[2])) *
+        scale;
+}
+
+/* Points of a leaf that are not certainly beaten, one bit each. */
+INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
+                                  const struct lane_points *p)
+{
+    const struct incode_sphere *s = &q->sphere;
+    incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
+    incode_vd value = zero, value_error = zero, square = zero;
+    for (int d = 0; d < 3; d++) {
+        incode_vd r = p->r[d], far = incode_vd_abs(r);
+        plane += incode_vd_all(s->n[d]) * r;
+        plane_error += incode_vd_all(s->pn[d]) * far;
+        square += r * r;
+        if (s->has_apex) {
+            value += incode_vd_all(s->m[d]) * r;
+            value_error += incode_vd_all(s->pm[d]) * far;
+        }
+    }
+    incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
+    incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
+    incode_vl out = plane + (plane_error * eps + tiny) < zero;
+    if (s->has_apex) {
+        value -= incode_vd_all(s->det) * square;
+        value_error += incode_vd_all(s->pdet) * square;
+        out |= value + (value_error * eps + tiny) < zero;
+    }
+    return ~incode_vd_mask(out) & 0xff;
+}
+
+static void point_of(double p[3], const struct incode_frame *frame,
+                     unsigned slot)
+{
+    p[0] = frame->page.brick.x[slot];
+    p[1] = frame->page.brick.y[slot];
+    p[2] = frame->page.brick.z[slot];
+}
+
+static void consider_near(struct incode_query *q, uint32_t id,
+                          const double p[3])
+{
+    double r[3];
+    relative(r, q, p);
+    double square = incode_dot(r, r);
+    if (square > q->limit ||
+        (q->best != INCODE_NONE &&
+         incode_compare_distance(q->pv, p, q->best_p) >= 0))
+        return;
+    q->best = id;
+    memcpy(q->best_p, p, sizeof q->best_p);
+    q->limit = square * (1 + 1e-9) + INCODE_SPHERE_TINY;
+}
+
+static void consider_circle(struct incode_query *q, uint32_t id,
+                            const double p[3])
+{
+    double r[3], n[3], e[3];
+    relative(r, q, p);
+    incode_cross(n, q->rb, r);
+    for (int d = 0; d < 3; d++)
+        e[d] = r[d] - q->rb[d];
+    double area = 4 * incode_dot(n, n);
+    double product = incode_dot(q->rb, q->rb) * incode_dot(r, r);
+    double square = product * incode_dot(e, e) / area;
+    if (!(area > 0) || !(square < q->limit / 4)) {
+        if (q->best != INCODE_NONE || incode_collinear(q->pv, q->pb, p))
+            return;
+    } else {
+        q->limit = 4 * square * (1 + 1e-6);
+    }
+    q->best = id;
+    memcpy(q->best_p, p, sizeof q->best_p);
+}
+
+static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
+                       const struct incode_frame *frame, uint32_t brick,
+                       unsigned leaf)
+{
+    unsigned first = leaf * INCODE_LEAF_POINTS;
+    unsigned count = frame->count - first;
+    uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
+    *walker->candidates += (unsigned)__builtin_popcount(lanes);
+    if (q->question == INCODE_QUERY_APEX) {
+        struct lane_points points;
+        load_leaf(&points, q, frame, first);
+        lanes &= apex_lanes(q, &points);
+    }
+    for (; lanes != 0; lanes &= lanes - 1) {
+        unsigned slot = first + (unsigned)__builtin_ctz(lanes);
+        uint32_t id = brick * INCODE_BRICK_POINTS + slot;
+        if (id == q->v || id == q->b || id == q->c || id == q->best)
+            continue;
+        double p[3];
+        point_of(p, frame, slot);
+        if (q->question == INCODE_QUERY_APEX)
+            incode_query_consider(q, walker->tally, id, p);
+        else if (q->question == INCODE_QUERY_NEAREST)
+            consider_near(q, id, p);
+        else
+            consider_circle(q, id, p);
+    }
+}
+
+bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
+                         const struct incode_frame *frame, uint32_t brick,
+                         uint32_t leaves, void *context)
+{
+    (void)context;
+    for (; leaves != 0; leaves &= leaves - 1)
+        visit_leaf(walker, q, frame, brick, (unsigned)__builtin_ctz(leaves));
+    return true;
+}

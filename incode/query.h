@@ -1,0 +1,81 @@
+/* Walks down the tree of boxes to the leaves that a question concerns, in page
+ * order, and can be suspended at a missing page and resumed there.
+ *
+ * Memory: the struct; stack for INCODE_LEVELS_MAX levels.  Work: the boxes of
+ * the pages whose own box passes the question.
+ *
+ *     incode_query_box(&q, v, lo, hi);
+ *     while ((r = incode_walk(&w, &q, visit, context)) == INCODE_WALK_WAIT)
+ *         come back when page q.missing is there;
+ */
+#ifndef INCODE_QUERY_H
+#define INCODE_QUERY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pager.h"
+#include "predicates.h"
+#include "sphere.h"
+
+enum incode_question {
+    INCODE_QUERY_BOX,     /* leaves that meet a box */
+    INCODE_QUERY_APEX,    /* the apex of a face: first in Delaunay distance */
+    INCODE_QUERY_NEAREST, /* the nearest neighbour of v */
+    INCODE_QUERY_CIRCLE   /* the smallest circle through v and b: a start for
+                             the search of a first face, approximate */
+};
+
+enum incode_walk { INCODE_WALK_DONE, INCODE_WALK_WAIT, INCODE_WALK_STOP };
+
+struct incode_query {
+    enum incode_question question;
+    bool boxed;          /* only what meets [lo, hi] */
+    bool done;           /* not what lies within [done_lo, done_hi] */
+    double lo[3], hi[3]; /* absolute coordinates */
+    double done_lo[3], done_hi[3];
+    uint32_t v, b, c;           /* vertex numbers */
+    double pv[3], pb[3], pc[3]; /* absolute coordinates */
+    double scale;               /* relative = (p - pv) * scale */
+    double rb[3], rc[3];        /* b and c, relative */
+    struct incode_sphere sphere;
+    double limit;  /* NEAREST, CIRCLE: squared, relative */
+    uint32_t best; /* vertex number, or INCODE_NONE */
+    double best_p[3];
+    uint32_t cursor;  /* bricks below this one are done */
+    uint32_t missing; /* the page a suspended walk waits for */
+};
+
+/* What a walk runs on. */
+struct incode_walker {
+    struct incode_pager *pager;
+    const struct incode_tree *tree;
+    struct incode_tally *tally;
+    uint64_t *candidates;
+};
+
+/* Called with a brick and its leaves that pass, one bit each; false stops the
+ * walk. */
+typedef bool incode_visit(struct incode_walker *walker, struct incode_query *q,
+                          const struct incode_frame *frame, uint32_t brick,
+                          uint32_t leaves, void *context);
+
+enum incode_walk incode_walk(struct incode_walker *walker,
+                             struct incode_query *q, incode_visit *visit,
+                             void *context);
+
+/* Sets the face (v, b, c) of an APEX query: plane and scale. */
+void incode_query_face(struct incode_query *q);
+
+/* A candidate for the apex: takes it if it is strictly on the unknown side and
+ * inside the sphere of the best so far.  Exact. */
+void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
+                           uint32_t id, const double p[3]);
+
+/* Visits the points of the leaves for APEX, NEAREST and CIRCLE. */
+incode_visit incode_visit_points;
+
+/* 2^k with k such that 2^k * extent is about 1; exact, never 0 or infinite. */
+double incode_scale_for(double extent);
+
+#endif

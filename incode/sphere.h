@@ -1,0 +1,65 @@
+/* The plane of a face and the sphere through it and an apex, in coordinates
+ * relative to the face's first vertex v and scaled by a power of two, with
+ * forward error bounds: permanents of the determinants times a small multiple
+ * of the unit roundoff (Higham, Accuracy and Stability, chapter 3).
+ *
+ *     plane:  n . p > 0                  p lies on the unknown side
+ *     sphere: m . p - det |p|^2 > 0      p lies inside
+ *
+ * Memory: the struct.  Work: constant.
+ *
+ *     incode_sphere_plane(&s, b, c);
+ *     incode_sphere_apex(&s, b, c, a);
+ *     if (incode_sphere_value(&s, p) < -incode_sphere_error(&s, p)) outside;
+ */
+#ifndef INCODE_SPHERE_H
+#define INCODE_SPHERE_H
+
+#include <stdbool.h>
+
+struct incode_sphere {
+    double n[3], pn[3];            /* plane, permanents */
+    double m[3], pm[3], det, pdet; /* sphere, permanents */
+    bool has_apex;
+};
+
+/* Rounding of every step from the coordinates on stays below 20 units; what
+ * underflows stays below the absolute term, for points within 2^200. */
+#define INCODE_SPHERE_EPS 3.6e-15
+#define INCODE_SPHERE_TINY 1e-250
+
+static inline void incode_cross(double out[3], const double a[3],
+                                const double b[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline double incode_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void incode_sphere_plane(struct incode_sphere *s, const double b[3],
+                         const double c[3]);
+void incode_sphere_apex(struct incode_sphere *s, const double b[3],
+                        const double c[3], const double a[3]);
+
+static inline double incode_sphere_value(const struct incode_sphere *s,
+                                         const double p[3])
+{
+    return incode_dot(s->m, p) - s->det * incode_dot(p, p);
+}
+
+static inline double incode_sphere_error(const struct incode_sphere *s,
+                                         const double p[3])
+{
+    double x = __builtin_fabs(p[0]), y = __builtin_fabs(p[1]),
+           z = __builtin_fabs(p[2]);
+    return INCODE_SPHERE_EPS * (s->pm[0] * x + s->pm[1] * y + s->pm[2] * z +
+                                s->pdet * incode_dot(p, p)) +
+           INCODE_SPHERE_TINY;
+}
+
+#endif

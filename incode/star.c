@@ -1,0 +1,374 @@
+#include <string.h>
+
+#include "check.h"
+#include "state.h"
+
+/* Closing the star of a vertex: its open faces are taken out of the active face
+ * list, each gets its tetrahedron, and the new faces toggle, those at the
+ * vertex at hand, the others in the list.  What is left when a page is missing
+ * goes back, the face under search too: its tetrahedron may be built from
+ * another side meanwhile. */
+
+static void put_back(struct incode_triangulator *t)
+{
+    struct incode_star *star = &t->star;
+    for (uint32_t i = 0; i < star->faces; i++)
+        incode_afl_toggle(&t->afl, star->v, star->face[i].b, star->face[i].c);
+    star->faces = 0;
+}
+
+static void take_faces(struct incode_triangulator *t, uint32_t limit)
+{
+    struct incode_star *star = &t->star;
+    uint32_t pairs[INCODE_STAR_FACES][2];
+    uint32_t n = incode_afl_take(&t->afl, star->v, pairs, limit, &star->more);
+    for (uint32_t i = 0; i < n; i++)
+        star->face[i] = (struct incode_star_face){
+            pairs[i][0], pairs[i][1], INCODE_GATHER_NONE, INCODE_GATHER_NONE};
+    star->faces = n;
+}
+
+static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c)
+{
+    for (uint32_t i = 0; i < star->faces; i++) {
+        if (star->face[i].b == b && star->face[i].c == c) {
+            star->face[i] = star->face[--star->faces];
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Too many open faces at one vertex: from now on they wait at its neighbours,
+ * so that the front at it stays as short as the work around it. */
+static void spread_hub(struct incode_triangulator *t)
+{
+    struct incode_star *star = &t->star;
+    struct incode_touched *entry =
+        incode_afl_touch(&t->afl, star->v / INCODE_BRICK_POINTS);
+    if ((entry->hub >> (star->v % INCODE_BRICK_POINTS) & 1) == 0)
+        incode_front_make_hub(t, star->v);
+    uint32_t n = star->faces;
+    star->faces = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t f[3] = {star->v, star->face[i].b, star->face[i].c};
+        if (!incode_front_key(t, f, NULL))
+            INCODE_ASSERT(false);
+        incode_front_toggle(t, f);
+    }
+}
+
+static void toggle_here(struct incode_triangulator *t, uint32_t b, uint32_t c,
+                        uint16_t ib, uint16_t ic)
+{
+    struct incode_star *star = &t->star;
+    if (remove_face(star, c, b))
+        return;
+    if (star->more && incode_afl_close_twin(&t->afl, star->v, b, c))
+        return;
+    star->face[star->faces++] = (struct incode_star_face){b, c, ib, ic};
+    INCODE_ASSERT(star->faces <= INCODE_STAR_FACES);
+}
+
+static void toggle_face(struct incode_triangulator *t, const uint32_t v[3],
+                        const double *const p[3], const uint16_t i[3])
+{
+    uint32_t f[3] = {v[0], v[1], v[2]};
+    if (!incode_front_key(t, f, p))
+        return;
+    if (f[0] != t->star.v) {
+        incode_front_toggle(t, f);
+        return;
+    }
+    /* i follows the same turn as f. */
+    unsigned turn = f[0] == v[0] ? 0 : f[0] == v[1] ? 1 : 2;
+    toggle_here(t, f[1], f[2], i[(turn + 1) % 3], i[(turn + 2) % 3]);
+}
+
+/* The region of the lexicographically smallest vertex keeps a tetrahedron. */
+static bool is_kept(const struct incode_triangulator *t, const uint32_t f[4],
+                    const double *const p[4])
+{
+    bool own[4], all = true;
+    for (int i = 0; i < 4; i++) {
+        own[i] = incode_own(t, f[i]);
+        all = all && own[i];
+    }
+    if (all)
+        return true;
+    int least = 0;
+    for (int i = 1; i < 4; i++)
+        if (incode_lexicographic(p[i], p[least]) < 0)
+            least = i;
+    return own[least];
+}
+
+/* Emits the tetrahedron f of positive orientation if it is the region's own,
+ * and toggles its faces; `through`: the face (f[0], f[1], f[2]) was open and is
+ * taken out already.  index: of f among the gathered. */
+static void star_build(struct incode_triangulator *t, const uint32_t f[4],
+                       const double *const p[4], const uint16_t index[4],
+                       bool through)
+{
+    struct incode_star *star = &t->star;
+    star->built++;
+    t->stats.tetrahedra_built++;
+    if (is_kept(t, f, p)) {
+        memcpy(star->apexes[star->kept++], f + 1, 3 * sizeof *f);
+        t->stats.tetrahedra_kept++;
+        INCODE_ASSERT(star->kept <= INCODE_STAR_BUILT);
+    }
+    incode_front_reached(t, f[3]);
+    /* Faces with their unknown side outward: of (v, b, c, a) these are
+     * (v, c, b) behind, (v, a, c), (v, b, a) and (b, c, a). */
+    static const uint8_t face[4][3] = {
+        {0, 3, 2}, {0, 1, 3}, {1, 2, 3}, {0, 2, 1}};
+    for (int k = 0; k < (through ? 3 : 4); k++) {
+        const uint8_t *j = face[k];
+        const uint32_t v[3] = {f[j[0]], f[j[1]], f[j[2]]};
+        const double *const q[3] = {p[j[0]], p[j[1]], p[j[2]]};
+        const uint16_t i[3] = {index[j[0]], index[j[1]], index[j[2]]};
+        toggle_face(t, v, q, i);
+    }
+}
+
+/* Hands the star's own tetrahedra to the port. */
+static void star_emit(struct incode_triangulator *t)
+{
+    struct incode_star *star = &t->star;
+    if (star->kept > 0)
+        t->ports.emit(t->ports.context, star->v,
+                      (const uint32_t(*)[3])star->apexes, star->kept);
+    star->kept = 0;
+}
+
+/* ---- gathering ---- */
+
+/* Half-width of the box to gather: the extent of the vertex's leaf, times what
+ * has lately given the wanted number of points. */
+static double first_radius(const struct incode_triangulator *t,
+                           const struct incode_frame *f, uint32_t slot)
+{
+    uint32_t leaf = slot / INCODE_LEAF_POINTS;
+    double extent = 0;
+    for (int d = 0; d < 3; d++) {
+        double e = f->leaf_hi[d][leaf] - f->leaf_lo[d][leaf];
+        extent = e > extent ? e : extent;
+    }
+    if (!(extent > 0)) {
+        for (int d = 0; d < 3; d++) {
+            double e = t->setup.hi[d] * 0x1p-10 - t->setup.lo[d] * 0x1p-10;
+            extent = e > extent ? e : extent;
+        }
+    }
+    double radius = extent * t->spread;
+    return radius < 0x1p1000 ? radius : 0x1p1000;
+}
+
+enum { GATHER_WANTED = 160, GATHER_TRIES = 64 };
+
+static void learn_spread(struct incode_triangulator *t, uint32_t points)
+{
+    if (points > GATHER_WANTED * 5 / 4)
+        t->spread *= 0.97;
+    else if (points < GATHER_WANTED * 3 / 4)
+        t->spread *= 1.03;
+    t->spread = t->spread < 0.25 ? 0.25 : t->spread > 8 ? 8 : t->spread;
+}
+
+static enum incode_outcome star_gather(struct incode_triangulator *t,
+                                       struct incode_task *task)
+{
+    uint32_t v = task->v, slot = v % INCODE_BRICK_POINTS;
+    const struct incode_frame *f =
+        incode_pager_get(&t->pager, v / INCODE_BRICK_POINTS);
+    task->page = v / INCODE_BRICK_POINTS;
+    if (f == NULL)
+        return INCODE_WAIT;
+    const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
+                         f->page.brick.z[slot]};
+    double radius = first_radius(t, f, slot);
+    for (int tries = 0;; tries++) {
+        enum incode_gathered r = incode_gather_fill(
+            &t->gather, &t->walker, v, p, radius, t->setup.lo, t->setup.hi);
+        task->page = t->gather.query.missing;
+        if (r == INCODE_GATHER_WAIT)
+            return INCODE_WAIT;
+        if (r == INCODE_GATHER_READY)
+            break;
+        if (tries == GATHER_TRIES) {
+            incode_gather_disclaim(&t->gather);
+            break;
+        }
+        radius *= 0.6;
+        t->spread *= 0.99;
+    }
+    learn_spread(t, t->gather.points);
+    return INCODE_OK;
+}
+
+/* ---- the star ---- */
+
+/* Index of vertex `id` among the gathered, fetched and appended if it is far;
+ * INCODE_AGAIN: the room for far vertices is used up. */
+static enum incode_outcome resolve(struct incode_triangulator *t, uint32_t id,
+                                   uint16_t *index, uint32_t *page)
+{
+    if (*index != INCODE_GATHER_NONE)
+        return INCODE_OK;
+    uint32_t i = incode_gather_find(&t->gather, id);
+    if (i == INCODE_GATHER_NONE) {
+        double p[3];
+        if (!incode_fetch_point(t, id, p, page))
+            return INCODE_WAIT;
+        i = incode_gather_append(&t->gather, id, p);
+        if (i == INCODE_GATHER_NONE)
+            return INCODE_AGAIN;
+    }
+    *index = (uint16_t)i;
+    return INCODE_OK;
+}
+
+static void build_at(struct incode_triangulator *t, uint16_t ib, uint16_t ic,
+                     uint16_t ia)
+{
+    const struct incode_gather *g = &t->gather;
+    const uint16_t index[4] = {INCODE_GATHER_NONE, ib, ic, ia};
+    const uint32_t f[4] = {g->vertex, g->id[ib], g->id[ic], g->id[ia]};
+    double p[4][3];
+    for (int d = 0; d < 3; d++) {
+        p[0][d] = g->p0[d];
+        p[1][d] = g->p[d][ib];
+        p[2][d] = g->p[d][ic];
+        p[3][d] = g->p[d][ia];
+    }
+    const double *const q[4] = {p[0], p[1], p[2], p[3]};
+    star_build(t, f, q, index, true);
+}
+
+/* MakeTetra for one face of the star, which has been taken out of it. */
+static enum incode_outcome pursue(struct incode_triangulator *t,
+                                  struct incode_task *task,
+                                  struct incode_star_face *face)
+{
+    enum incode_outcome r = resolve(t, face->b, &face->ib, &task->page);
+    if (r == INCODE_OK)
+        r = resolve(t, face->c, &face->ic, &task->page);
+    if (r != INCODE_OK)
+        return r;
+    uint32_t apex;
+    t->stats.make_tetra_calls++;
+    enum incode_near near =
+        incode_apex_near(t, face->ib, face->ic, &apex, &task->search);
+    if (near == INCODE_NEAR_HULL) {
+        t->stats.hull_facets++;
+        return INCODE_OK;
+    }
+    if (near == INCODE_NEAR_FOUND) {
+        build_at(t, face->ib, face->ic, (uint16_t)apex);
+        return INCODE_OK;
+    }
+    t->stats.wide_searches++;
+    task->kind = INCODE_TASK_SEARCH;
+    return INCODE_AGAIN;
+}
+
+/* The task's search is over: builds what it found if its face is still open. */
+static enum incode_outcome use_found(struct incode_triangulator *t,
+                                     struct incode_task *task)
+{
+    const struct incode_query *q = &task->search.query;
+    struct incode_star *star = &t->star;
+    uint16_t index[3] = {INCODE_GATHER_NONE, INCODE_GATHER_NONE,
+                         INCODE_GATHER_NONE};
+    if (q->best != INCODE_NONE) {
+        uint32_t i = incode_gather_find(&t->gather, q->best);
+        if (i == INCODE_GATHER_NONE)
+            i = incode_gather_append(&t->gather, q->best, q->best_p);
+        index[2] = (uint16_t)i;
+        enum incode_outcome r = resolve(t, q->b, &index[0], &task->page);
+        if (r == INCODE_OK)
+            r = resolve(t, q->c, &index[1], &task->page);
+        if (r != INCODE_OK || i == INCODE_GATHER_NONE)
+            return r != INCODE_OK ? r : INCODE_AGAIN;
+    }
+    task->kind = INCODE_TASK_GATHER;
+    bool open = remove_face(star, q->b, q->c);
+    if (!open && star->more) {
+        /* It may be among those that did not fit at hand. */
+        open = incode_afl_close_twin(&t->afl, star->v, q->c, q->b);
+    }
+    if (!open)
+        return INCODE_OK;
+    if (q->best == INCODE_NONE)
+        t->stats.hull_facets++;
+    else
+        build_at(t, index[0], index[1], index[2]);
+    return INCODE_OK;
+}
+
+/* One face: the search under way goes first, then the last one opened. */
+static enum incode_outcome advance(struct incode_triangulator *t,
+                                   struct incode_task *task)
+{
+    struct incode_star *star = &t->star;
+    if (task->kind == INCODE_TASK_SEARCH) {
+        if (incode_search_run(t, &task->search) == INCODE_WAIT) {
+            task->page = task->search.query.missing;
+            return INCODE_WAIT;
+        }
+        task->kind = INCODE_TASK_FOUND;
+    }
+    if (task->kind == INCODE_TASK_FOUND)
+        return use_found(t, task);
+    struct incode_star_face face = star->face[--star->faces];
+    enum incode_outcome r = pursue(t, task, &face);
+    if (r != INCODE_OK)
+        star->face[star->faces++] = face;
+    return r == INCODE_AGAIN && task->kind == INCODE_TASK_SEARCH ? INCODE_OK
+                                                                 : r;
+}
+
+void incode_star_first(struct incode_triangulator *t, const uint32_t f[4],
+                       const double *const p[4])
+{
+    static const uint16_t far[4] = {INCODE_GATHER_NONE, INCODE_GATHER_NONE,
+                                    INCODE_GATHER_NONE, INCODE_GATHER_NONE};
+    struct incode_star *star = &t->star;
+    star->v = f[0];
+    star->faces = star->built = star->kept = 0;
+    star->more = true;
+    for (int i = 0; i < 3; i++)
+        incode_front_reached(t, f[i]);
+    star_build(t, f, p, far, false);
+    put_back(t);
+    star_emit(t);
+}
+
+enum incode_outcome incode_star_close(struct incode_triangulator *t,
+                                      struct incode_task *task)
+{
+    struct incode_star *star = &t->star;
+    star->v = task->v;
+    star->built = star->kept = 0;
+    take_faces(t, INCODE_STAR_FACES / 2);
+    if (star->faces == 0) {
+        task->kind = INCODE_TASK_IDLE;
+        return INCODE_OK;
+    }
+    enum incode_outcome r = star_gather(t, task);
+    while (r == INCODE_OK && star->faces > 0) {
+        if (star->built >= t->built_max) {
+            r = INCODE_AGAIN;
+            break;
+        }
+        r = advance(t, task);
+        if (star->faces > INCODE_STAR_FACES - 4)
+            spread_hub(t);
+    }
+    put_back(t);
+    star_emit(t);
+    if (r == INCODE_OK && task->kind != INCODE_TASK_SEARCH)
+        task->kind = INCODE_TASK_IDLE;
+    return r;
+}
