@@ -30,7 +30,7 @@ BASE     = -std=c11 $(WARNINGS) $(OPT) $(MACHINE) $(FLOATING) $(SANITIZE) \
 HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
 # V=1 shows every command.
 Q = $(if $(V),,@)
-say = $(if $(V),:,@printf '  %-4s %s\n')
+say = @$(if $(V),:,printf '  %-4s %s\n')
 HOST_LIBS = -lnettle -lz -lm
 
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;

@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Shared by the scripts of tests/: where things are, and how a result is told.
 # Each script sources it from the top of the project.  A test ends in exactly
 # one of pass, fail and skip; each prints a line that tests/run counts.
@@ -53,3 +54,70 @@ list_sets() {
 
 # A failed run may say more than its last line; the stat of a run by its name.
 stat_of() { jq -r ".$2" "$1"; }
+
+# --- runs ----------------------------------------------------------------------
+
+# Whether a run stopped because its memory is below what its index states.
+needs_memory() { grep -q 'needs at least' "$1"; }
+
+# triangulates NAME SET FILE DIGEST [OPTION...]: the run's digest is the one
+# given, and its output the same, byte for byte, as that of SET's first run
+# here.  An index that states a need for more memory gets what it states.
+triangulates() {
+    local name=$1 set=$2 file=$3 digest=$4 out=$scratch/out.npy
+    local stats=$scratch/stats.json errors=$scratch/errors found status
+    local first=$scratch/first.$set.npy
+    shift 4
+    rm -f "$out" "$stats"
+    "$INCODE" run "$file" -q --stats "$stats" -o "$out" "$@" 2> "$errors"
+    status=$?
+    if [ $status = 2 ] && needs_memory "$errors"; then
+        local need
+        need=$(sed -n 's/.*needs at least \([0-9]*[KMG]*\).*/\1/p' "$errors")
+        "$INCODE" run "$file" -q --stats "$stats" -o "$out" "$@" \
+            --memory "$need" 2> "$errors"
+        status=$?
+    fi
+    if [ $status != 0 ]; then
+        fail "$name" "exit $status: $(last "$errors")"
+        return
+    fi
+    found=$(stat_of "$stats" digest)
+    if [ "$found" != "sha256:$digest" ]; then
+        fail "$name" "digest $found, not $digest"
+    elif [ ! -f "$first" ]; then
+        mv "$out" "$first"
+        pass "$name"
+    else
+        check "$name" "the output differs from the set's first" \
+            cmp -s "$first" "$out"
+    fi
+}
+
+# refuses NAME STATUS PATTERN COMMAND...: the command ends with that status and
+# one line on standard error, `incode: WHERE: WHAT; WHAT TO DO NEXT` as the
+# pattern has it, and leaves nothing in the directory $scratch/left.
+refuses() {
+    local name=$1 expected=$2 pattern=$3 errors=$scratch/errors status
+    shift 3
+    rm -rf "$scratch/left"
+    mkdir "$scratch/left"
+    "$@" > "$scratch/output" 2> "$errors"
+    status=$?
+    if [ $status != "$expected" ]; then
+        fail "$name" "exit $status, not $expected: $(last "$errors")"
+    elif [ "$(wc -l < "$errors")" != 1 ]; then
+        fail "$name" "$(wc -l < "$errors") lines, not one: $(last "$errors")"
+    elif ! grep -qE "^incode: ..*: ..*; " "$errors"; then
+        fail "$name" "not WHERE: WHAT; NEXT: $(last "$errors")"
+    elif ! grep -qE "$pattern" "$errors"; then
+        fail "$name" "no '$pattern' in: $(last "$errors")"
+    elif [ -n "$(ls -A "$scratch/left")" ]; then
+        fail "$name" "it left $(ls -A "$scratch/left" | tr '\n' ' ')"
+    else
+        pass "$name"
+    fi
+}
+
+# Why a set of the index cannot be used here, or nothing.
+no_set() { [ -r "$INCODE_DATA/$1" ] || echo "no $INCODE_DATA/$1"; }

@@ -1,0 +1,112 @@
+#!/usr/bin/env bash
+# The cube as processes: what memory they hold, what happens when one is
+# stopped, killed or slow to read, and that none outlives the host.
+. tests/system/lib.sh
+
+points=$scratch/points.npy
+"$INCODE" gen uniform 100000 --seed 2 -o "$points" 2> /dev/null
+"$INCODE" run "$points" -q --strategy sequential --nodes 1 \
+    -o "$scratch/first.npy" 2> "$scratch/errors"
+check 'cluster/one node' "$(last "$scratch/errors")" \
+    test -f "$scratch/first.npy"
+
+# start [OPTION...]: a run in the background; $host its process, $nodes those
+# of its nodes.
+start() {
+    rm -f "$scratch/out.npy"
+    "$INCODE" run "$points" -q --strategy spatial --nodes 8 \
+        -o "$scratch/out.npy" "$@" 2> "$scratch/errors" &
+    host=$!
+    for _ in $(seq 200); do
+        nodes=$(pgrep -P $host -x incode-node | tr '\n' ' ')
+        [ "$(echo "$nodes" | wc -w)" = 8 ] && break
+        sleep 0.01
+    done
+    read -r node _ <<< "$nodes"
+}
+
+start
+sleep 0.2
+kill -STOP "$node"
+sleep 10
+kill -CONT "$node"
+wait $host
+status=$?
+check 'cluster/a node stopped for 10 s' "exit $status: \
+$(last "$scratch/errors")" test $status = 0
+check 'cluster/the same bytes after it' 'the output differs' \
+    cmp -s "$scratch/first.npy" "$scratch/out.npy"
+
+start
+sleep 0.1
+began=$(date +%s)
+kill -KILL "$node"
+wait $host
+status=$?
+check 'cluster/a node killed: exit 4' "exit $status" test $status = 4
+check 'cluster/a node killed: it is named' "$(last "$scratch/errors")" \
+    grep -qE '^incode: node [0-7]: ' "$scratch/errors"
+check 'cluster/a node killed: within 10 s' 'it took longer' \
+    test $(($(date +%s) - began)) -le 10
+check 'cluster/a node killed: no output' 'it left one' \
+    test ! -e "$scratch/out.npy"
+
+start
+sleep 0.1
+kill -KILL $host
+wait $host 2> /dev/null
+for _ in $(seq 100); do
+    # shellcheck disable=SC2086
+    kill -0 $nodes 2> /dev/null || break
+    sleep 0.05
+done
+alive=
+for node in $nodes; do kill -0 "$node" 2> /dev/null && alive="$alive $node"; done
+check 'cluster/no node outlives the host' "alive:$alive" test -z "$alive"
+
+start
+sleep 0.1
+kill -INT $host
+wait $host
+status=$?
+check 'cluster/an interrupt leaves no output' "exit $status" \
+    test ! -e "$scratch/out.npy" -a $status != 0
+
+# The writable memory of each node, as the kernel has it.
+limit=$((4096 * 1024))
+worst=0
+if "$INCODE" --version | grep -qi sanitize; then
+    skip 'cluster/writable memory of a node' \
+        'sanitizers need more memory than a node has'
+else
+    start --memory 4M
+    for _ in 1 2 3; do
+        sleep 0.1
+        for node in $nodes; do
+            bytes=$(awk '/^[0-9a-f]+-[0-9a-f]+ / { writes = $2 ~ /w/ }
+                /^Size:/ && writes { n += $2 * 1024 } END { print n + 0 }' \
+                "/proc/$node/smaps" 2> /dev/null)
+            [ "${bytes:-0}" -gt $worst ] && worst=$bytes
+        done
+    done
+    shared=$(awk '/^[0-9a-f]+-/ && $2 ~ /w.s/' "/proc/$node/smaps" \
+        2> /dev/null)
+    wait $host
+    check 'cluster/writable memory of a node' "$worst bytes, not $limit" \
+        test "$worst" -gt $((limit / 2)) -a "$worst" -le $limit
+    check 'cluster/no shared writable mapping' "$shared" test -z "$shared"
+    check 'cluster/the same bytes' 'the output differs' \
+        cmp -s "$scratch/first.npy" "$scratch/out.npy"
+
+    found=$(nm "$BUILD/incode-node" | awk '{ print $NF }' |
+        grep -xE '(__libc_)?(m|c|re)alloc|free|sbrk|memalign' | tr '\n' ' ')
+    check 'cluster/no allocator in the node' "$found" test -z "$found"
+fi
+
+# A reader of 1 KB/s behind a pipe, for 30 s, then all of the rest.
+"$INCODE" run "$points" -q --nodes 8 -o - 2> "$scratch/errors" |
+    { for _ in $(seq 30); do head -c 1024; sleep 1; done; cat; } \
+    > "$scratch/slow.ele"
+"$INCODE" convert "$scratch/slow.ele" "$scratch/slow.npy"
+check 'cluster/a slow reader of standard output' 'the output differs' \
+    cmp -s "$scratch/first.npy" "$scratch/slow.npy"

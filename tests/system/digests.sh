@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Every real set with kd and spatial on 8 nodes, in 512 KiB and in 4 MiB: the
+# digest of the index and the same bytes.  Flat sets are refused.
+. tests/system/lib.sh
+
+while read -r set file points _ tetrahedra digest; do
+    if [ -n "$(no_set "$file")" ]; then
+        skip "digests/$set" "$(no_set "$file")"
+        continue
+    fi
+    for memory in 512K 4M; do
+        if [ "$tetrahedra" = 0 ]; then
+            refuses "digests/$set $memory" 3 'plane|line' "$INCODE" run \
+                "$INCODE_DATA/$file" -q --strategy spatial --nodes 8 \
+                --memory $memory -o "$scratch/left/out.npy"
+            continue
+        fi
+        # Every offence of a small set is looked for as well.
+        verify=$([ "$points" -lt 20000 ] && echo --verify)
+        triangulates "digests/$set $memory" "$set" "$INCODE_DATA/$file" \
+            "$digest" --strategy spatial --nodes 8 --memory $memory $verify
+    done
+    rm -f "$scratch/first.$set.npy"
+done < <(list_sets)

@@ -1,0 +1,150 @@
+#!/usr/bin/env bash
+# Wrong input, wrong usage, an output that cannot be written, a disk that
+# fills: the exit status, one line that says where and what next, no file left.
+. tests/system/lib.sh
+
+in=$scratch/in
+left=$scratch/left
+mkdir "$in"
+good=$in/good.xyz
+"$INCODE" gen uniform 300 --seed 5 -o "$good" 2> /dev/null
+
+# run FILE [OPTION...] as `refuses` wants it
+run() { "$INCODE" run "$@"; }
+wrong() { # NAME PATTERN FILE [OPTION...]
+    local name=$1 pattern=$2
+    shift 2
+    refuses "errors/$name" 3 "$pattern" run "$@" -q --nodes 2 -o "$left/o.vtu"
+}
+
+printf '0 0 0\n1 0 0\n0 x1 0\n' > "$in/text.xyz"
+printf '0 0 0\n1 0 0\n0 1 nan\n0 0 1\n' > "$in/nan.xyz"
+printf '0 0 0\n1 0 0\n0 inf 0\n0 0 1\n' > "$in/infinity.xyz"
+printf '0 0 0\n1 0 0\n0 1e999 0\n0 0 1\n' > "$in/huge.xyz"
+printf '0 0 0\n1 0\n0 1 0\n0 0 1\n' > "$in/columns.xyz"
+printf '0 0 0\n1 0 0\n1 0 0\n0 1 0\n0 1 -0\n' > "$in/three.xyz"
+printf '0 0 1\n1 0 1\n0 1 1\n3 5 1\n8 9 1\n' > "$in/plane.xyz"
+printf '0 0 0\n1 2 3\n2 4 6\n3 6 9\n-1 -2 -3\n' > "$in/line.xyz"
+: > "$in/empty.xyz"
+printf '\n  \n' > "$in/blank.xyz"
+cp "$good" "$in/points.dat"
+printf 'this is no gzip' > "$in/notgzip.xyz.gz"
+gzip -c "$good" | head -c 900 > "$in/short.xyz.gz"
+"$INCODE" convert "$good" "$in/good.npy"
+"$INCODE" convert "$good" "$in/good.ply"
+"$INCODE" convert "$good" "$in/good.vtu"
+head -c 3000 "$in/good.npy" > "$in/short.npy"
+head -c 3000 "$in/good.ply" > "$in/short.ply"
+head -c 3000 "$in/good.vtu" > "$in/short.vtu"
+
+wrong 'missing file' 'absent.xyz' "$in/absent.xyz"
+wrong 'a directory' 'in' "$in"
+wrong 'empty file' 'empty.xyz' "$in/empty.xyz"
+wrong 'file of blanks' 'blank.xyz' "$in/blank.xyz"
+wrong 'no number, with line and column' 'text.xyz:3:3' "$in/text.xyz"
+wrong 'not a number' 'nan.xyz:3.*[nN]a[nN]' "$in/nan.xyz"
+wrong 'infinity' 'infinity.xyz:3' "$in/infinity.xyz"
+wrong 'a number beyond double' 'huge.xyz:3' "$in/huge.xyz"
+wrong 'column count' 'columns.xyz:2' "$in/columns.xyz"
+wrong 'three distinct points' 'three.xyz.*(3|three|4|four)' "$in/three.xyz"
+wrong 'a plane' 'plane.xyz.*plane' "$in/plane.xyz"
+wrong 'a line' 'line.xyz.*line' "$in/line.xyz"
+wrong 'truncated .npy' 'short.npy' "$in/short.npy"
+wrong 'truncated .ply' 'short.ply' "$in/short.ply"
+wrong 'truncated .vtu' 'short.vtu' "$in/short.vtu"
+wrong 'truncated .gz' 'short.xyz.gz' "$in/short.xyz.gz"
+wrong 'no gzip' 'notgzip.xyz.gz' "$in/notgzip.xyz.gz"
+wrong 'unknown input format' 'points.dat' "$in/points.dat"
+wrong 'empty standard input' 'standard input|stdin|-' - < /dev/null
+
+refuses 'errors/output in no directory' 3 'absent' run "$good" -q --nodes 2 \
+    -o "$left/absent/o.vtu"
+refuses 'errors/output is a directory' 3 'o.vtu' \
+    bash -c "mkdir '$in/o.vtu'; '$INCODE' run '$good' -q --nodes 2 \
+        -o '$in/o.vtu'"
+refuses 'errors/standard output is full' 3 'standard output' \
+    bash -c "'$INCODE' run '$good' -q --nodes 2 -o - > /dev/full"
+refuses 'errors/statistics cannot be written' 3 'absent' run "$good" -q \
+    --nodes 2 -o "$left/o.vtu" --stats "$left/absent/s.json"
+if [ "$(id -u)" = 0 ]; then
+    skip 'errors/output in a directory without permission' \
+        'root may write anywhere'
+else
+    mkdir -m 500 "$in/locked"
+    refuses 'errors/output in a directory without permission' 3 locked \
+        run "$good" -q --nodes 2 -o "$in/locked/o.vtu"
+fi
+
+# A disk of 64 KiB; what is left on it is listed before it goes.
+full_disk() {
+    unshare ${1:+"$1"} -m bash -c "
+        mount -t tmpfs -o size=64k none '$left' || exit 99
+        '$INCODE' run '$in/many.xyz' -q --nodes 2 -o '$left/o.$2'
+        status=\$?
+        [ -z \"\$(ls -A '$left')\" ] || exit 98
+        exit \$status"
+}
+"$INCODE" gen uniform 3000 -o "$in/many.xyz" 2> /dev/null
+user=$([ "$(id -u)" = 0 ] || echo -r)
+for format in vtu ele npy vtk msh mesh; do
+    name="errors/disk fills under .$format"
+    if ! unshare ${user:+"$user"} -m mount -t tmpfs -o size=64k none "$in" \
+        2> /dev/null; then
+        skip "$name" 'no right to mount a small disk here'
+        continue
+    fi
+    refuses "$name" 3 "o.$format|space" full_disk "$user" $format
+done
+
+# --- usage -------------------------------------------------------------------
+
+usage() { # NAME PATTERN ARGUMENT...
+    local name=$1 pattern=$2
+    shift 2
+    refuses "usage/$name" 2 "$pattern" "$INCODE" "$@"
+}
+out="$left/o.npy"
+usage 'no command' 'run' 
+usage 'unknown command' 'run' frobnicate
+usage 'no points' 'POINTS' run -o "$out"
+usage 'two point files' 'good' run "$good" "$good" -o "$out"
+usage 'unknown option' 'frob' run "$good" --frob -o "$out"
+usage 'option without its value' 'nodes' run "$good" --nodes
+usage 'nodes not a power of two' '(2, 4|power)' run "$good" --nodes 3 -o "$out"
+usage 'no nodes' 'nodes' run "$good" --nodes 0 -o "$out"
+usage 'negative nodes' 'nodes' run "$good" --nodes=-2 -o "$out"
+usage 'too many nodes' 'nodes' run "$good" --nodes 1048576 -o "$out"
+usage 'nodes not a number' 'nodes' run "$good" --nodes many -o "$out"
+for strategy in linda master-slaves hybrid exchange quick; do
+    usage "strategy $strategy" 'sequential.*spatial' run "$good" \
+        --strategy $strategy -o "$out"
+done
+usage 'unknown partition' 'uniform|adaptive' run "$good" --partition odd \
+    -o "$out"
+usage 'unknown index' 'naive.*grid.*kd' run "$good" --index tree -o "$out"
+usage 'unknown face rule' 'own.*paper' run "$good" --face-rule all -o "$out"
+usage 'unknown link' 'tcp' run "$good" --link pigeon -o "$out"
+usage 'unknown board' 'linux' run "$good" --board z80 -o "$out"
+usage 'memory too small' 'memory' run "$good" --memory 1K -o "$out"
+usage 'memory no number' 'memory' run "$good" --memory lots -o "$out"
+usage 'unknown output format' 'vtu' run "$good" -o "$left/o.xls"
+usage 'unknown kind' 'uniform' gen cheese 100 -o "$left/o.xyz"
+usage 'too few to generate' '4' gen uniform 3 -o "$left/o.xyz"
+usage 'verify without tetrahedra' 'TETS' verify "$good"
+usage 'digest without a file' 'TETS' digest
+usage 'convert to nothing' 'OUT' convert "$good"
+
+# --- no error ----------------------------------------------------------------
+
+printf '0 0 0\n1 0 0\n0 1 0\n0 0 1\n-0 0 0\n0 0 1\n' > "$in/four.xyz"
+check 'more nodes than points' 'it failed' "$INCODE" run "$in/four.xyz" -q \
+    --nodes 32 --verify -o "$scratch/four.npy" --stats "$scratch/four.json"
+check 'duplicates and -0.0 are counted' "$(cat "$scratch/four.json")" \
+    test "$(jq -c '[.points, .distinct_points, .tetrahedra]' \
+    "$scratch/four.json")" = '[6,4,1]'
+for arguments in --help --version 'run --help' 'gen --help' 'verify --help' \
+    'digest --help' 'convert --help'; do
+    # shellcheck disable=SC2086
+    "$INCODE" $arguments > "$scratch/help" 2>&1
+    check "$arguments" "exit $?" test $? = 0 -a -s "$scratch/help"
+done

@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# Pairwise coverage of index, nodes, memory and the seed that shuffles which
+# page is ready when, for `sequential`; and of these, partition and face rule
+# for `spatial`.  That the rows cover every pair is checked too.
+# Sets past `naive_max` points are left out with `naive`, whose work is n^2.
+. tests/system/lib.sh
+naive_max=${NAIVE_MAX:-5000}
+grid_max=${GRID_MAX:-50000}
+
+rows='
+sequential grid 1 512K 0
+sequential grid 2 4M 1
+sequential grid 32 1M 2
+sequential grid 8 512K 0
+sequential kd 1 1M 2
+sequential kd 2 512K 2
+sequential kd 32 4M 0
+sequential kd 8 1M 1
+sequential naive 1 4M 1
+sequential naive 2 1M 0
+sequential naive 32 512K 1
+sequential naive 8 4M 2
+spatial grid 1 512K 1 uniform own
+spatial grid 2 1M 0 uniform own
+spatial grid 32 1M 0 uniform paper
+spatial grid 32 4M 2 adaptive own
+spatial grid 8 512K 1 adaptive paper
+spatial kd 1 4M 0 adaptive paper
+spatial kd 2 512K 2 adaptive paper
+spatial kd 32 1M 1 uniform paper
+spatial kd 8 1M 2 uniform own
+spatial naive 1 1M 2 adaptive paper
+spatial naive 2 4M 1 uniform paper
+spatial naive 32 512K 0 adaptive paper
+spatial naive 8 4M 0 adaptive own'
+
+missing=$(echo "$rows" | awk '
+    NF {
+        for (i = 2; i <= NF; i++) {
+            values[$1, i] = values[$1, i] \
+                (index(values[$1, i] " ", " " $i " ") ? "" : " " $i)
+            for (j = i + 1; j <= NF; j++) seen[$1, i, $i, j, $j]
+        }
+        if (NF > last[$1]) last[$1] = NF
+    }
+    END {
+        for (s in last)
+            for (i = 2; i <= last[s]; i++)
+                for (j = i + 1; j <= last[s]; j++) {
+                    n = split(values[s, i], a, " ")
+                    m = split(values[s, j], b, " ")
+                    for (k = 1; k <= n; k++)
+                        for (l = 1; l <= m; l++)
+                            if (!((s, i, a[k], j, b[l]) in seen))
+                                print s, a[k], b[l]
+                }
+    }' | tr '\n' ';')
+check "pairs/every pair of options is covered" "$missing" test -z "$missing"
+
+while read -r set file points _ tetrahedra digest; do
+    [ "$tetrahedra" = 0 ] && continue
+    if [ -n "$(no_set "$file")" ]; then
+        skip "pairs/$set" "$(no_set "$file")"
+        continue
+    fi
+    while read -r strategy index nodes memory seed partition rule; do
+        [ -n "$strategy" ] || continue
+        [ "$index" = naive ] && [ "$points" -gt "$naive_max" ] && continue
+        [ "$index" = grid ] && [ "$points" -gt "$grid_max" ] && continue
+        triangulates "pairs/$set $strategy $index $nodes $memory $seed \
+${partition:-} ${rule:-}" "$set" "$INCODE_DATA/$file" "$digest" \
+            --strategy "$strategy" --index "$index" --nodes "$nodes" \
+            --memory "$memory" --shuffle-seed "$seed" \
+            ${partition:+--partition "$partition" --face-rule "$rule"}
+    done <<< "$rows"
+    rm -f "$scratch/first.$set.npy"
+done < <(list_sets)
