@@ -88,6 +88,7 @@ static uint32_t *lowest_rows(const struct set *set) {
                    p[2] == before[2];
         lowest[rows[i]] = same ? lowest[rows[i - 1]] : rows[i];
     }
+    compared = NULL;
     free(rows);
     return lowest;
 }
