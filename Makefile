@@ -146,9 +146,17 @@ $(BUILD)/cortex-m7/%.o: %.c
 
 # --- what users call -------------------------------------------------------
 
+# The paper's Uniform set, or the user's.
+points = $(or $(POINTS),$(OUT)/uniform20k.xyz)
 run: deps-run
 	@$(MAKE) --no-print-directory all
-	@BUILD='$(BUILD)' OUT='$(OUT)' sh host/main_job.sh '$(POINTS)'
+	@mkdir -p '$(OUT)'
+ifeq ($(POINTS),)
+	$(BUILD)/incode gen uniform 20000 --seed 1 -o '$(points)'
+endif
+	@name=$$(basename '$(points)' .gz); result='$(OUT)'/$${name%.*}; \
+	set -x; $(BUILD)/incode run '$(points)' --strategy spatial --nodes 8 \
+		--verify --table --stats "$$result.json" -o "$$result.vtu"
 
 test: deps-test
 	@BUILD='$(BUILD)' bash tests/run

@@ -103,6 +103,21 @@ else
     check 'cluster/no allocator in the node' "$found" test -z "$found"
 fi
 
+# same NAME OPTION...: these options change no byte of the output.
+same() {
+    local name=$1
+    shift
+    rm -f "$scratch/out.npy"
+    "$INCODE" run "$points" -q --strategy spatial -o "$scratch/out.npy" "$@" \
+        2> "$scratch/errors"
+    check "cluster/$name" "exit $?: $(last "$scratch/errors")" \
+        cmp -s "$scratch/first.npy" "$scratch/out.npy"
+}
+same '32 nodes, one frame a link, a host that stalls' --nodes 32 --window 1 \
+    --host-stall 20
+same 'a host that reads 1 KB/s for 30 s' --nodes 8 --host-rate 1024 \
+    --host-rate-time 30
+same '64 nodes' --nodes 64
 # A reader of 1 KB/s behind a pipe, for 30 s, then all of the rest.
 "$INCODE" run "$points" -q --nodes 8 -o - 2> "$scratch/errors" |
     { for _ in $(seq 30); do head -c 1024; sleep 1; done; cat; } \

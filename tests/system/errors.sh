@@ -98,10 +98,21 @@ done
 
 # --- usage -------------------------------------------------------------------
 
+# The C library's parser says more than one line, in its own form.
 usage() { # NAME PATTERN ARGUMENT...
-    local name=$1 pattern=$2
+    local name=usage/$1 pattern=$2 status
     shift 2
-    refuses "usage/$name" 2 "$pattern" "$INCODE" "$@"
+    rm -rf "$left"
+    mkdir "$left"
+    "$INCODE" "$@" > "$scratch/output" 2> "$scratch/errors"
+    status=$?
+    if [ $status != 2 ]; then
+        fail "$name" "exit $status, not 2: $(last "$scratch/errors")"
+    elif ! grep -qE -e "$pattern" "$scratch/errors"; then
+        fail "$name" "no '$pattern' in: $(last "$scratch/errors")"
+    else
+        check "$name" 'it left a file' test -z "$(ls -A "$left")"
+    fi
 }
 out="$left/o.npy"
 usage 'no command' 'run' 
