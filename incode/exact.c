@@ -39,7 +39,8 @@ struct term {
     int32_t sign;
 };
 
-static struct part part_of(double value) {
+static struct part part_of(double value)
+{
     struct part part = {{0, 0}, 0, 0};
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
@@ -65,7 +66,8 @@ static struct part part_of(double value) {
 /* Reads the points and clears an accumulator for sums of products of `degree`
  * coordinates. */
 static void problem_init(struct problem *s, const double *const p[],
-                         int32_t points, int32_t degree) {
+                         int32_t points, int32_t degree)
+{
     int32_t least = 0, most = 0;
     bool any = false;
     for (int32_t i = 0; i < points; i++) {
@@ -90,13 +92,15 @@ static void problem_init(struct problem *s, const double *const p[],
     memset(s->limb, 0, (size_t)s->limbs * sizeof s->limb[0]);
 }
 
-static struct term term_one(int32_t sign) {
+static struct term term_one(int32_t sign)
+{
     struct term t = {{1}, 1, 0, sign};
     return t;
 }
 
 /* t * f; the caller has seen to it that f is not zero. */
-static struct term term_times(const struct term *t, const struct part *f) {
+static struct term term_times(const struct term *t, const struct part *f)
+{
     struct term r;
     int32_t n = t->limbs;
     INCODE_ASSERT(n + 2 <= TERM_LIMBS);
@@ -118,7 +122,8 @@ static struct term term_times(const struct term *t, const struct part *f) {
     return r;
 }
 
-static void problem_add(struct problem *s, const struct term *t) {
+static void problem_add(struct problem *s, const struct term *t)
+{
     int32_t at = t->e / 32, shift = t->e % 32;
     INCODE_ASSERT(at + t->limbs < s->limbs);
     uint64_t carry = 0;
@@ -132,7 +137,8 @@ static void problem_add(struct problem *s, const struct term *t) {
     s->limb[at + t->limbs] += t->sign < 0 ? -digit : digit;
 }
 
-static int problem_sign(const struct problem *s) {
+static int problem_sign(const struct problem *s)
+{
     int64_t carry = 0;
     uint32_t any = 0;
     for (int32_t i = 0; i < s->limbs; i++) {
@@ -146,7 +152,8 @@ static int problem_sign(const struct problem *s) {
 /* sign * det(i, j, k) of three points, in each monomial; hands the monomials
  * that are not zero to t[0..5] and returns their number. */
 static int32_t minor3(const struct problem *s, int32_t i, int32_t j, int32_t k,
-                      int32_t sign, struct term t[6]) {
+                      int32_t sign, struct term t[6])
+{
     static const uint8_t order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
                                         {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
     int32_t n = 0;
@@ -164,7 +171,8 @@ static int32_t minor3(const struct problem *s, int32_t i, int32_t j, int32_t k,
     return n;
 }
 
-int incode_exact_orient3d(const double *const p[4]) {
+int incode_exact_orient3d(const double *const p[4])
+{
     struct problem s;
     struct term t[6];
     problem_init(&s, p, 4, 3);
@@ -182,7 +190,8 @@ int incode_exact_orient3d(const double *const p[4]) {
 
 /* Adds sign * t * |p_i|^2. */
 static void add_lifted(struct problem *s, const struct term *t, int32_t i,
-                       int32_t sign) {
+                       int32_t sign)
+{
     for (int32_t k = 0; k < 3; k++) {
         const struct part *f = &s->p[i][k];
         if (f->sign == 0)
@@ -194,7 +203,8 @@ static void add_lifted(struct problem *s, const struct term *t, int32_t i,
     }
 }
 
-int incode_exact_in_sphere(const double *const p[5]) {
+int incode_exact_in_sphere(const double *const p[5])
+{
     struct problem s;
     struct term t[6];
     problem_init(&s, p, 5, 5);
@@ -220,7 +230,8 @@ int incode_exact_in_sphere(const double *const p[5]) {
 
 /* Adds factor * x * y, factor being 1, -1, 2 or -2. */
 static void add_product(struct problem *s, int32_t factor, const struct part *x,
-                        const struct part *y) {
+                        const struct part *y)
+{
     if (x->sign == 0 || y->sign == 0)
         return;
     struct term one = term_one(factor < 0 ? -1 : 1);
@@ -231,7 +242,8 @@ static void add_product(struct problem *s, int32_t factor, const struct part *x,
     problem_add(s, &fxy);
 }
 
-int incode_exact_compare_distance(const double *const p[3]) {
+int incode_exact_compare_distance(const double *const p[3])
+{
     struct problem s;
     problem_init(&s, p, 3, 2);
     /* |a|^2 - |b|^2 - 2 p.a + 2 p.b */
@@ -244,7 +256,8 @@ int incode_exact_compare_distance(const double *const p[3]) {
     return problem_sign(&s);
 }
 
-bool incode_exact_collinear(const double *const p[3]) {
+bool incode_exact_collinear(const double *const p[3])
+{
     struct problem s;
     for (int32_t k = 0; k < 3; k++) {
         int32_t u = (k + 1) % 3, v = (k + 2) % 3;

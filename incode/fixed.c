@@ -235,8 +235,8 @@ static inline i128 minor2(const int64_t a[3], const int64_t b[3])
 int incode_fixed_orient3d(const int64_t d[3][3])
 {
     const int64_t *a = d[0], *b = d[1], *c = d[2];
-    return sign_of(sum3(minor2(a, b), c[2], minor2(c, a), b[2], minor2(b, c),
-                        a[2]));
+    return sign_of(
+        sum3(minor2(a, b), c[2], minor2(c, a), b[2], minor2(b, c), a[2]));
 }
 
 /* Columns of 64 bits, each with room for carries. */
@@ -248,8 +248,8 @@ struct columns {
 static inline void add_lifted(struct columns *s, const int64_t d[3],
                               struct i192 m)
 {
-    u128 lift = (u128)(times(d[0], d[0]) + times(d[1], d[1])) +
-                (u128)times(d[2], d[2]);
+    u128 lift =
+        (u128)(times(d[0], d[0]) + times(d[1], d[1])) + (u128)times(d[2], d[2]);
     uint64_t l0 = (uint64_t)lift, l1 = (uint64_t)(lift >> 64);
     uint64_t m1 = (uint64_t)m.hi;
     int64_t m2 = (int64_t)(m.hi >> 64);
@@ -258,8 +258,8 @@ static inline void add_lifted(struct columns *s, const int64_t d[3],
     i128 p02 = times_unsigned(l0, m2), p12 = times((int64_t)l1, m2);
     s->c[0] += (uint64_t)p00;
     s->c[1] += (i128)(p00 >> 64) + (uint64_t)p01 + (uint64_t)p10;
-    s->c[2] += (i128)(p01 >> 64) + (i128)(p10 >> 64) + (uint64_t)p11 +
-               (uint64_t)p02;
+    s->c[2] +=
+        (i128)(p01 >> 64) + (i128)(p10 >> 64) + (uint64_t)p11 + (uint64_t)p02;
     s->c[3] += (i128)(p11 >> 64) + (p02 >> 64) + (uint64_t)p12;
     s->c[4] += p12 >> 64;
 }

@@ -202,13 +202,15 @@ int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
     return 0;
 }
 
-bool incode_pager_release(struct incode_pager *pager)
+bool incode_pager_release(struct incode_pager *pager, bool now)
 {
     if (pager->held == 0)
         return false;
     pager->shuffle ^= pager->shuffle << 13;
     pager->shuffle ^= pager->shuffle >> 7;
     pager->shuffle ^= pager->shuffle << 17;
+    if (!now && (pager->shuffle >> 60 & 3) != 0)
+        return false;
     uint32_t pick = (uint32_t)(pager->shuffle % pager->held);
     for (uint16_t i = pager->newest; i != INCODE_NO_FRAME;
          i = pager->frames[i].older) {

@@ -70,7 +70,8 @@ bool incode_pager_loading(const struct incode_pager *pager, uint32_t page);
 int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
                          const void *data, size_t bytes);
 
-/* Makes one page that the shuffle keeps back ready; false: there is none. */
-bool incode_pager_release(struct incode_pager *pager);
+/* Makes one page that the shuffle keeps back ready, by chance one call in four
+ * or, if `now`, at once; false: none was. */
+bool incode_pager_release(struct incode_pager *pager, bool now);
 
 #endif

@@ -1,11 +1,12 @@
 #include "pages.h"
 
-static uint32_t divide_up(uint64_t n, uint32_t by) {
+static uint32_t divide_up(uint64_t n, uint32_t by)
+{
     return (uint32_t)((n + by - 1) / by);
 }
 
-void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
-                      uint32_t cells) {
+void incode_tree_init(struct incode_tree *tree, uint32_t bricks, uint32_t cells)
+{
     *tree = (struct incode_tree){.bricks = bricks};
     uint32_t level = 0, base = 0, count = bricks;
     while (level < 2 || tree->count[level - 1] > 1) {
@@ -26,7 +27,8 @@ void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
     }
 }
 
-uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page) {
+uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page)
+{
     uint32_t level = 0;
     while (level < tree->levels && page >= tree->base[level + 1]) {
         level++;
@@ -34,7 +36,8 @@ uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page) {
     return level;
 }
 
-uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p) {
+uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p)
+{
     /* Halves first: hi - lo of two finite numbers may overflow. */
     double side = 0.5 * hi - 0.5 * lo;
     double t = (0.5 * p - 0.5 * lo) / side * (double)cells;
@@ -45,7 +48,8 @@ uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p) {
 }
 
 uint32_t incode_cell_of(const double lo[3], const double hi[3],
-                        const uint32_t cells[3], const double p[3]) {
+                        const uint32_t cells[3], const double p[3])
+{
     uint32_t ix = incode_cell_along(lo[0], hi[0], cells[0], p[0]);
     uint32_t iy = incode_cell_along(lo[1], hi[1], cells[1], p[1]);
     uint32_t iz = incode_cell_along(lo[2], hi[2], cells[2], p[2]);

@@ -17,13 +17,13 @@
 #include <stdint.h>
 
 enum {
-    INCODE_BRICK_POINTS = 64,   /* points a brick, at most */
-    INCODE_LEAF_POINTS = 8,     /* points a leaf box inside a brick */
+    INCODE_BRICK_POINTS = 64, /* points a brick, at most */
+    INCODE_LEAF_POINTS = 8,   /* points a leaf box inside a brick */
     INCODE_BRICK_LEAVES = 8,
-    INCODE_FANOUT = 32,         /* children a box page, at most */
+    INCODE_FANOUT = 32, /* children a box page, at most */
     INCODE_PAGE_BYTES = 1536,
-    INCODE_LEVELS_MAX = 8,      /* bricks, then up to 7 levels of boxes */
-    INCODE_PAGE_WORDS = 384     /* uint32 a page of the uniform grid's lists */
+    INCODE_LEVELS_MAX = 8,  /* bricks, then up to 7 levels of boxes */
+    INCODE_PAGE_WORDS = 384 /* uint32 a page of the uniform grid's lists */
 };
 
 #define INCODE_NONE UINT32_MAX

@@ -11,20 +11,24 @@
 static const double orient3d_bound = 5.1107127829973299e-15;
 static const double in_sphere_bound = 1.2466136531027298e-13;
 
-static double magnitude(double a) {
+static double magnitude(double a)
+{
     return __builtin_fabs(a);
 }
 
-static double larger(double a, double b) {
+static double larger(double a, double b)
+{
     return a > b ? a : b;
 }
 
-static double largest3(double a, double b, double c) {
+static double largest3(double a, double b, double c)
+{
     return larger(magnitude(a), larger(magnitude(b), magnitude(c)));
 }
 
 int incode_orient3d(struct incode_tally *tally, const double a[3],
-                    const double b[3], const double c[3], const double d[3]) {
+                    const double b[3], const double c[3], const double d[3])
+{
     double bx = b[0] - a[0], by = b[1] - a[1], bz = b[2] - a[2];
     double cx = c[0] - a[0], cy = c[1] - a[1], cz = c[2] - a[2];
     double dx = d[0] - a[0], dy = d[1] - a[1], dz = d[2] - a[2];
@@ -49,7 +53,8 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     return incode_exact_orient3d(p);
 }
 
-int incode_lexicographic(const double a[3], const double b[3]) {
+int incode_lexicographic(const double a[3], const double b[3])
+{
     for (int k = 0; k < 3; k++) {
         if (a[k] != b[k])
             return a[k] < b[k] ? -1 : 1;
@@ -59,7 +64,8 @@ int incode_lexicographic(const double a[3], const double b[3]) {
 
 /* Cospherical points: the answer of the symbolic perturbation, in which the
  * lexicographically largest point is lifted most.  p[4] is the query. */
-static int in_sphere_tie(struct incode_tally *tally, const double *const p[5]) {
+static int in_sphere_tie(struct incode_tally *tally, const double *const p[5])
+{
     int first = 0, second = -1;
     for (int i = 1; i < 5; i++) {
         if (incode_lexicographic(p[i], p[first]) > 0) {
@@ -83,8 +89,8 @@ static int in_sphere_tie(struct incode_tally *tally, const double *const p[5]) {
     return -1;
 }
 
-static int in_sphere_exact(struct incode_tally *tally,
-                           const double *const p[5]) {
+static int in_sphere_exact(struct incode_tally *tally, const double *const p[5])
+{
     tally->exact_in_sphere++;
     int64_t n[4][3];
     int sign = incode_fixed_differences(n, p, 4, p[4])
@@ -95,7 +101,8 @@ static int in_sphere_exact(struct incode_tally *tally,
 
 int incode_in_sphere(struct incode_tally *tally, const double a[3],
                      const double b[3], const double c[3], const double d[3],
-                     const double e[3]) {
+                     const double e[3])
+{
     double ax = a[0] - e[0], ay = a[1] - e[1], az = a[2] - e[2];
     double bx = b[0] - e[0], by = b[1] - e[1], bz = b[2] - e[2];
     double cx = c[0] - e[0], cy = c[1] - e[1], cz = c[2] - e[2];
@@ -127,17 +134,20 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
 }
 
 int incode_compare_distance(const double p[3], const double a[3],
-                            const double b[3]) {
+                            const double b[3])
+{
     const double *q[3] = {p, a, b};
     return incode_exact_compare_distance(q);
 }
 
-bool incode_collinear(const double a[3], const double b[3], const double c[3]) {
+bool incode_collinear(const double a[3], const double b[3], const double c[3])
+{
     const double *q[3] = {a, b, c};
     return incode_exact_collinear(q);
 }
 
-const char *incode_arithmetic_fault(void) {
+const char *incode_arithmetic_fault(void)
+{
     volatile double one = 1.0, tiny = 0x1p-53, odd = 0x1.0000002p0;
     volatile double square = -0x1.0000004p0, least = DBL_MIN, half = 0.5;
     volatile double sum = one + tiny, contracted = odd * odd + square;

@@ -201,7 +201,9 @@ static enum incode_step run(struct incode_triangulator *t,
         entry->waiting |= bit_of(v);
         if (task->born == 0)
             task->born = ++t->clock;
-        return INCODE_WORKED;
+        /* Without credit for its page the task can only be tried again. */
+        return incode_pager_loading(&t->pager, task->page) ? INCODE_WORKED
+                                                           : INCODE_WAITING;
     }
     entry->waiting &= ~bit_of(v);
     if (r == INCODE_OK)
@@ -482,12 +484,12 @@ enum incode_step incode_triangulator_step(struct incode_triangulator *t)
         return INCODE_BROKEN;
     if (t->finished)
         return INCODE_FINISHED;
-    bool released =
-        (t->pager.shuffle & 3) == 0 && incode_pager_release(&t->pager);
+    bool released = incode_pager_release(&t->pager, false);
     enum incode_step r = step(t);
     if (t->fault != NULL)
         return INCODE_BROKEN;
-    if (r == INCODE_WAITING && (released || incode_pager_release(&t->pager)))
+    if (r == INCODE_WAITING &&
+        (released || incode_pager_release(&t->pager, true)))
         return INCODE_WORKED;
     return r;
 }
