@@ -32,7 +32,7 @@ HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
 # V=1 shows every command.
 Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
-HOST_LIBS = -lnettle -lz -lm
+HOST_LIBS = -ljansson -lnettle -lz -lm
 
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
 # drivers, boards and the host have a system beneath them.
@@ -127,6 +127,13 @@ $(BUILD)/tests/points: $(obj)/tests/system/points.o
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
 
+# CGAL, for comparison in `make bench` alone.  -frounding-math: its filters
+# are wrong without it.
+$(BUILD)/tests/cgal: tests/bench/cgal.cpp
+	@mkdir -p $(@D)
+	$(say) CXX $<
+	$(Q)$(CXX) -std=c++17 -O3 -march=$(ARCH) -frounding-math $< -lgmp -o $@
+
 # The freestanding rooms for bare processors, as archives.
 bare      = -std=c11 $(WARNINGS) -Werror -Os -ffreestanding -ffp-contract=off \
 	-fno-math-errno -ffunction-sections -fdata-sections
@@ -206,7 +213,8 @@ help:
 
 # --- packages --------------------------------------------------------------
 
-run_packages   = gcc libc6-dev make musl-tools zlib1g-dev nettle-dev
+run_packages   = gcc libc6-dev make musl-tools zlib1g-dev nettle-dev \
+	libjansson-dev
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi

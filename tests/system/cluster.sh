@@ -75,7 +75,8 @@ check 'cluster/an interrupt leaves no output' "exit $status" \
 # The writable memory of each node, as the kernel has it.
 limit=$((4096 * 1024))
 worst=0
-if "$INCODE" --version | grep -qi sanitize; then
+"$INCODE" run "$points" -q --nodes 2 --stats "$scratch/stats.json"
+if [ "$(stat_of "$scratch/stats.json" memory_limited)" != true ]; then
     skip 'cluster/writable memory of a node' \
         'sanitizers need more memory than a node has'
 else

@@ -1,8 +1,9 @@
-/* Changes point sets for the system tests: exact scaling, mirroring, shuffling
+/* Changes point sets for tests: exact scaling, mirroring, rotation, shuffling
  * and the way back from a shuffled set's tetrahedra to the original's rows.
  *
  *     points scale 500 < a.xyz > b.xyz          every coordinate times 2^500
  *     points mirror < a.xyz > b.xyz                               x becomes -x
+ *     points rotate 0 < a.xyz > b.xyz      out of the axes, and so out of ties
  *     points shuffle 7 < a.xyz > b.xyz
  *     points unshuffle 7 a.xyz < b.ele > a.ele   rows of a for rows of b
  */
@@ -64,6 +65,16 @@ static uint32_t *permutation(uint32_t count, uint64_t seed)
         from[j] = swap;
     }
     return from;
+}
+
+/* By the angles of cosines 3/5 and 5/13, about z and then about x. */
+static void rotate(double p[3])
+{
+    double x = (3.0 * p[0] - 4.0 * p[1]) / 5.0;
+    double y = (4.0 * p[0] + 3.0 * p[1]) / 5.0;
+    p[0] = x;
+    p[1] = (5.0 * y - 12.0 * p[2]) / 13.0;
+    p[2] = (12.0 * y + 5.0 * p[2]) / 13.0;
 }
 
 static const struct set *compared;
@@ -139,6 +150,9 @@ int main(int argc, char **argv)
         }
         if (strcmp(verb, "mirror") == 0) {
             p[0] = -p[0];
+        }
+        if (strcmp(verb, "rotate") == 0) {
+            rotate(p);
         }
         print_point(p);
     }
