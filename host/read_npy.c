@@ -1,0 +1,190 @@
+/* NumPy's .npy: (n,3) points of any kind of number, (m,4) tetrahedra of whole
+ * numbers. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "readers.h"
+
+struct npy {
+    enum host_number type;
+    bool big, fortran;
+    uint64_t rows, columns;
+    size_t start; /* of the numbers */
+};
+
+static enum host_number type_of(char kind, int bytes)
+{
+    static const struct {
+        char kind;
+        int bytes;
+        enum host_number type;
+    } kinds[] = {{'f', 8, HOST_F64}, {'f', 4, HOST_F32}, {'i', 8, HOST_I64},
+                 {'i', 4, HOST_I32}, {'i', 2, HOST_I16}, {'i', 1, HOST_I8},
+                 {'u', 8, HOST_U64}, {'u', 4, HOST_U32}, {'u', 2, HOST_U16},
+                 {'u', 1, HOST_U8}};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        if (kinds[i].kind == kind && kinds[i].bytes == bytes) {
+            return kinds[i].type;
+        }
+    }
+    return HOST_NO_NUMBER;
+}
+
+/* Just past `key` and its colon, or NULL. */
+static const char *value_of(const char *header, const char *key)
+{
+    const char *at = strstr(header, key);
+    if (at == NULL) {
+        return NULL;
+    }
+    at += strlen(key);
+    return *at == '\0' ? NULL : at + 1 + strspn(at + 1, ": ");
+}
+
+static bool parse_dictionary(const char *header, struct npy *npy)
+{
+    const char *descr = value_of(header, "'descr'");
+    const char *order = value_of(header, "'fortran_order'");
+    const char *shape = value_of(header, "'shape'");
+    if (descr == NULL || order == NULL || shape == NULL || *descr != '\'' ||
+        *shape != '(') {
+        return false;
+    }
+    npy->big = descr[1] == '>';
+    if (descr[1] == '\0' || descr[2] == '\0') {
+        return false;
+    }
+    npy->type = type_of(descr[2], atoi(descr + 3));
+    npy->fortran = *order == 'T';
+    char *end;
+    npy->rows = strtoull(shape + 1, &end, 10);
+    if (end == shape + 1 || *end != ',') {
+        return false;
+    }
+    shape = end + 1;
+    npy->columns = strtoull(shape, &end, 10);
+    return end != shape && strspn(end, ", ") < 4 &&
+           end[strspn(end, ", ")] == ')';
+}
+
+static int parse_header(const struct host_source *source, struct npy *npy,
+                        struct host_error *error)
+{
+    const uint8_t *data = source->data;
+    if (source->bytes < 12 || memcmp(data, "\x93NUMPY", 6) != 0) {
+        return host_source_fail(source, error,
+                                "this is no NumPy file; write it with "
+                                "numpy.save");
+    }
+    size_t prefix = data[6] == 1 ? 10 : 12;
+    size_t length = (size_t)host_whole_at(
+        data + 8, data[6] == 1 ? HOST_U16 : HOST_U32, false);
+    char header[1024];
+    if (length >= sizeof header || source->bytes - prefix < length) {
+        return host_source_fail(source, error,
+                                "the header is damaged; write the file again "
+                                "with numpy.save");
+    }
+    memcpy(header, data + prefix, length);
+    header[length] = '\0';
+    npy->start = prefix + length;
+    if (!parse_dictionary(header, npy)) {
+        return host_source_fail(source, error,
+                                "the array has not two dimensions; save one "
+                                "of shape (n, 3)");
+    }
+    if (npy->type == HOST_NO_NUMBER) {
+        return host_source_fail(source, error,
+                                "this kind of number is not read; save "
+                                "float64, float32 or integers");
+    }
+    return 0;
+}
+
+static int check_size(const struct host_source *source, const struct npy *npy,
+                      struct host_error *error)
+{
+    size_t row = host_number_bytes(npy->type) * (size_t)npy->columns;
+    size_t have = source->bytes - npy->start;
+    if (npy->rows > have / row || npy->rows * row != have) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %zu bytes of numbers where %llu rows of %zu are "
+                         "due; the file is cut short or damaged, get it whole",
+                         source->path, have, (unsigned long long)npy->rows,
+                         row);
+    }
+    return 0;
+}
+
+static int read_points(const struct host_source *source, const struct npy *npy,
+                       struct host_points *points, struct host_error *error)
+{
+    if (npy->columns != 3) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %llu columns where x, y and z are due; save an "
+                         "array of shape (n, 3)",
+                         source->path, (unsigned long long)npy->columns);
+    }
+    if (check_size(source, npy, error) != 0) {
+        return error->code;
+    }
+    const uint8_t *data = source->data + npy->start;
+    size_t bytes = host_number_bytes(npy->type);
+    if (!npy->fortran) {
+        return host_append_numbers(points, data, npy->rows, 3 * bytes,
+                                   npy->type, npy->big, error);
+    }
+    for (uint64_t i = 0; i < npy->rows; i++) {
+        double xyz[3];
+        for (uint64_t d = 0; d < 3; d++) {
+            xyz[d] = host_number_at(data + (d * npy->rows + i) * bytes,
+                                    npy->type, npy->big);
+        }
+        if (host_points_append(points, xyz, 1, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+static int read_tetrahedra(const struct host_source *source,
+                           const struct npy *npy, struct host_tetrahedra *tets,
+                           struct host_error *error)
+{
+    if (npy->columns != 4) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %llu columns where 4 vertices are due; save an "
+                         "array of shape (m, 4)",
+                         source->path, (unsigned long long)npy->columns);
+    }
+    if (check_size(source, npy, error) != 0) {
+        return error->code;
+    }
+    const uint8_t *data = source->data + npy->start;
+    size_t bytes = host_number_bytes(npy->type);
+    for (uint64_t i = 0; i < npy->rows; i++) {
+        uint64_t v[4];
+        for (uint64_t k = 0; k < 4; k++) {
+            uint64_t at = npy->fortran ? k * npy->rows + i : 4 * i + k;
+            v[k] = host_whole_at(data + at * bytes, npy->type, npy->big);
+        }
+        if (host_append_tetrahedron(tets, v, source, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+int host_read_npy(const struct host_source *source, struct host_mesh *mesh,
+                  struct host_error *error)
+{
+    struct npy npy = {.type = HOST_NO_NUMBER};
+    if (parse_header(source, &npy, error) != 0) {
+        return error->code;
+    }
+    if (mesh->tets != NULL) {
+        return read_tetrahedra(source, &npy, mesh->tets, error);
+    }
+    return read_points(source, &npy, mesh->points, error);
+}

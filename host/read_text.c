@@ -1,0 +1,133 @@
+/* Points as text: .xyz .txt .csv, TetGen's .node, .off. */
+#include <string.h>
+
+#include "readers.h"
+#include "scan.h"
+
+/* Whether the first line of a .csv names the columns: none of them begins like
+ * a number. */
+static bool names_columns(struct host_scan s)
+{
+    while (host_scan_more(&s)) {
+        char word[64];
+        host_scan_word(&s, word, sizeof word);
+        if (strchr("+-.0123456789", word[0]) != NULL) {
+            return false;
+        }
+    }
+    return true;
+}
+
+int host_read_xyz(const struct host_source *source, struct host_mesh *mesh,
+                  struct host_error *error)
+{
+    struct host_scan s =
+        host_scan_start(source->path, source->data, source->bytes);
+    if (host_is_csv(source->path) && host_scan_skip_blank_lines(&s) &&
+        names_columns(s)) {
+        host_scan_next_line(&s);
+    }
+    while (host_scan_skip_blank_lines(&s)) {
+        double xyz[3];
+        for (int d = 0; d < 3; d++) {
+            if (d > 0 && !host_scan_more(&s)) {
+                return host_scan_fail(&s, s.at, error,
+                                      d == 1 ? "1 column where x, y and z are "
+                                               "due; complete the line"
+                                             : "2 columns where x, y and z "
+                                               "are due; complete the line");
+            }
+            if (host_scan_double(&s, &xyz[d], error) != 0) {
+                return error->code;
+            }
+        }
+        if (host_scan_more(&s)) {
+            return host_scan_fail(&s, s.at, error,
+                                  "more than 3 columns; leave only x, y and "
+                                  "z");
+        }
+        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+int host_read_node(const struct host_source *source, struct host_mesh *mesh,
+                   struct host_error *error)
+{
+    struct host_scan s =
+        host_scan_start(source->path, source->data, source->bytes);
+    uint64_t count, dimensions, base = 0;
+    if (host_scan_unsigned(&s, UINT32_MAX - 1, &count, error) != 0 ||
+        host_scan_unsigned(&s, UINT32_MAX, &dimensions, error) != 0) {
+        return error->code;
+    }
+    if (dimensions != 3) {
+        return host_scan_fail(&s, s.at, error,
+                              "the points have not 3 dimensions; give a .node "
+                              "of 3");
+    }
+    host_scan_next_line(&s);
+    for (uint64_t i = 0; i < count; i++) {
+        uint64_t number;
+        if (host_scan_unsigned(&s, UINT32_MAX, &number, error) != 0) {
+            return error->code;
+        }
+        base = i == 0 ? number : base;
+        if (number != base + i || base > 1) {
+            return host_scan_fail(&s, s.at, error,
+                                  "points are not numbered from 0 or 1 on "
+                                  "without gaps; renumber them");
+        }
+        double xyz[3];
+        for (int d = 0; d < 3; d++) {
+            if (host_scan_double(&s, &xyz[d], error) != 0) {
+                return error->code;
+            }
+        }
+        host_scan_next_line(&s); /* attributes and boundary marker */
+        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+            return error->code;
+        }
+    }
+    mesh->points->base = (uint32_t)base;
+    return 0;
+}
+
+int host_read_off(const struct host_source *source, struct host_mesh *mesh,
+                  struct host_error *error)
+{
+    struct host_scan s =
+        host_scan_start(source->path, source->data, source->bytes);
+    if (!host_scan_skip_blank_lines(&s) ||
+        !(host_scan_take(&s, "OFF") || host_scan_take(&s, "COFF") ||
+          host_scan_take(&s, "NOFF") || host_scan_take(&s, "CNOFF"))) {
+        return host_scan_fail(&s, s.at, error,
+                              "the first word is not OFF; give a text file in "
+                              "that format");
+    }
+    if (host_scan_take(&s, "BINARY")) {
+        return host_scan_fail(&s, s.at, error,
+                              "binary OFF is not read; convert it to text");
+    }
+    uint64_t count, faces;
+    if (host_scan_unsigned(&s, UINT32_MAX - 1, &count, error) != 0 ||
+        host_scan_unsigned(&s, UINT64_MAX / 16, &faces, error) != 0) {
+        return error->code;
+    }
+    host_scan_next_line(&s);
+    for (uint64_t i = 0; i < count; i++) {
+        double xyz[3];
+        if (host_scan_double_anywhere(&s, &xyz[0], error) != 0 ||
+            host_scan_double(&s, &xyz[1], error) != 0 ||
+            host_scan_double(&s, &xyz[2], error) != 0) {
+            return error->code;
+        }
+        host_scan_next_line(&s); /* normals and colours */
+        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}

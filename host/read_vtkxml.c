@@ -1,0 +1,341 @@
+/* VTK's XML files .vtu, .vtp, .vts: points and tetrahedra of every piece, as
+ * text, base64 or appended, plain or packed by zlib. */
+#include <expat.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "readers.h"
+#include "scan.h"
+#include "stream.h"
+#include "vtk_array.h"
+
+enum want { POINTS, CONNECTIVITY, OFFSETS, TYPES, WANTS };
+
+/* A DataArray of the piece at hand. */
+struct array {
+    bool there, text;
+    enum host_number type;
+    struct vtk_array bytes; /* of numbers, or of text */
+    uint64_t lines_before;  /* of the file, before the text */
+};
+
+struct xml {
+    const struct host_source *source;
+    struct host_mesh *mesh;
+    struct host_error *error;
+    XML_Parser parser;
+    struct vtk_coding coding;
+    const uint8_t *appended; /* just past its underscore, or NULL */
+    size_t appended_bytes;
+    bool appended_base64;
+    bool in_points, in_cells, in_piece, any_piece;
+    uint64_t piece_points, piece_cells;
+    uint64_t points_before; /* in earlier pieces */
+    enum want reading;      /* WANTS: none */
+    bool reading_base64;    /* format="binary" */
+    char *text;             /* of the array at hand */
+    size_t text_bytes, text_capacity;
+    struct array array[WANTS];
+};
+
+static void fail(struct xml *x, const char *what)
+{
+    if (x->error->code == 0) {
+        host_fail(x->error, HOST_INPUT, "%s:%llu: %s", x->source->path,
+                  (unsigned long long)XML_GetCurrentLineNumber(x->parser),
+                  what);
+    }
+}
+
+static const char *attribute(const char **attributes, const char *name)
+{
+    for (; *attributes != NULL; attributes += 2) {
+        if (strcmp(attributes[0], name) == 0) {
+            return attributes[1];
+        }
+    }
+    return "";
+}
+
+static void start_file(struct xml *x, const char **attributes)
+{
+    const char *compressor = attribute(attributes, "compressor");
+    x->coding.big =
+        strcmp(attribute(attributes, "byte_order"), "BigEndian") == 0;
+    x->coding.wide_header =
+        strcmp(attribute(attributes, "header_type"), "UInt64") == 0;
+    x->coding.compressed = strcmp(compressor, "vtkZLibDataCompressor") == 0;
+    if (*compressor != '\0' && !x->coding.compressed) {
+        fail(x, "a compressor other than vtkZLibDataCompressor; write the "
+                "file with zlib");
+    }
+}
+
+static void unpack(struct xml *x, enum want want, bool base64,
+                   const uint8_t *from, size_t bytes)
+{
+    struct vtk_coding coding = x->coding;
+    coding.base64 = base64;
+    if (x->error->code == 0) {
+        vtk_array_unpack(&x->array[want].bytes, x->source, &coding, from, bytes,
+                         x->error);
+    }
+}
+
+static void start_array(struct xml *x, const char **attributes)
+{
+    static const char *const names[] = {"", "connectivity", "offsets", "types"};
+    const char *name = attribute(attributes, "Name");
+    const char *format = attribute(attributes, "format");
+    enum want want = WANTS;
+    if (x->in_points) {
+        want = POINTS;
+    }
+    for (int i = CONNECTIVITY; i <= TYPES && x->in_cells; i++) {
+        want = strcmp(name, names[i]) == 0 ? (enum want)i : want;
+    }
+    if (want == WANTS || (want == POINTS && x->mesh->points == NULL) ||
+        (want != POINTS && x->mesh->tets == NULL)) {
+        return;
+    }
+    struct array *a = &x->array[want];
+    a->type = host_number_named(attribute(attributes, "type"));
+    a->text = strcmp(format, "ascii") == 0 || *format == '\0';
+    if (a->there || a->type == HOST_NO_NUMBER) {
+        fail(x, "an array is there twice or of unknown type; correct it");
+        return;
+    }
+    a->there = true;
+    if (strcmp(format, "appended") != 0) {
+        x->reading = want;
+        x->reading_base64 = !a->text;
+        x->text_bytes = 0;
+        return;
+    }
+    uint64_t offset = strtoull(attribute(attributes, "offset"), NULL, 10);
+    if (x->appended == NULL || offset >= x->appended_bytes) {
+        fail(x, "an array lies outside the appended data; the file is cut "
+                "short, get it whole");
+        return;
+    }
+    unpack(x, want, x->appended_base64, x->appended + offset,
+           x->appended_bytes - (size_t)offset);
+}
+
+static void XMLCALL start_element(void *context, const char *name,
+                                  const char **attributes)
+{
+    struct xml *x = context;
+    if (strcmp(name, "VTKFile") == 0) {
+        start_file(x, attributes);
+    } else if (strcmp(name, "Piece") == 0) {
+        x->any_piece = x->in_piece = true;
+        x->piece_points =
+            strtoull(attribute(attributes, "NumberOfPoints"), NULL, 10);
+        x->piece_cells =
+            strtoull(attribute(attributes, "NumberOfCells"), NULL, 10);
+    } else if (strcmp(name, "Points") == 0) {
+        x->in_points = true;
+    } else if (strcmp(name, "Cells") == 0) {
+        x->in_cells = true;
+    } else if (strcmp(name, "DataArray") == 0) {
+        start_array(x, attributes);
+    }
+}
+
+static void XMLCALL characters(void *context, const char *text, int length)
+{
+    struct xml *x = context;
+    size_t n = (size_t)length;
+    if (x->reading == WANTS || x->error->code != 0) {
+        return;
+    }
+    if (x->text_bytes == 0) {
+        x->array[x->reading].lines_before =
+            XML_GetCurrentLineNumber(x->parser) - 1;
+    }
+    if (x->text_capacity - x->text_bytes < n) {
+        size_t capacity = x->text_capacity * 2 + n + 4096;
+        char *grown = realloc(x->text, capacity);
+        if (grown == NULL) {
+            host_fail_memory(x->error, "an array");
+            return;
+        }
+        x->text = grown;
+        x->text_capacity = capacity;
+    }
+    memcpy(x->text + x->text_bytes, text, n);
+    x->text_bytes += n;
+}
+
+static void end_array(struct xml *x)
+{
+    struct array *a = &x->array[x->reading];
+    if (x->reading_base64) {
+        unpack(x, x->reading, true, (const uint8_t *)x->text, x->text_bytes);
+    } else { /* the text itself changes hands; it is freed with the piece */
+        a->bytes.data = (uint8_t *)x->text;
+        a->bytes.bytes = x->text_bytes;
+        x->text = NULL;
+        x->text_capacity = 0;
+    }
+    x->reading = WANTS;
+}
+
+static struct host_stream stream_of(struct xml *x, enum want want)
+{
+    static const char blank[] = " ";
+    struct array *a = &x->array[want];
+    const void *data = a->bytes.data != NULL ? (void *)a->bytes.data : blank;
+    struct host_stream s = {.source = x->source,
+                            .text = a->text,
+                            .big = x->coding.big,
+                            .type = a->type,
+                            .at = data,
+                            .end = (const uint8_t *)data + a->bytes.bytes};
+    s.scan = host_scan_start(x->source->path, data, a->bytes.bytes);
+    s.scan.lines_before = a->lines_before;
+    return s;
+}
+
+static void piece_points(struct xml *x)
+{
+    struct array *a = &x->array[POINTS];
+    if (x->mesh->points == NULL || (!a->there && x->piece_points == 0)) {
+        return;
+    }
+    uint64_t rows = x->piece_points;
+    struct host_stream s = stream_of(x, POINTS);
+    if (!a->there) {
+        fail(x, "a piece has no Points; give them");
+        return;
+    }
+    if (!a->text) {
+        uint64_t have = a->bytes.bytes / (3 * host_number_bytes(a->type));
+        rows = rows == 0 ? have : rows; /* a structured grid states extents */
+    } else if (rows == 0) {
+        while (x->error->code == 0 && host_scan_skip_blank_lines(&s.scan)) {
+            host_stream_points(&s, 1, x->mesh->points, x->error);
+        }
+    }
+    if (x->error->code == 0) {
+        host_stream_points(&s, rows, x->mesh->points, x->error);
+    }
+}
+
+static void end_piece(struct xml *x)
+{
+    uint64_t first = x->points_before;
+    x->in_piece = false;
+    x->points_before += x->piece_points;
+    if (x->error->code == 0) {
+        piece_points(x);
+    }
+    if (x->error->code == 0 && x->mesh->tets != NULL && x->piece_cells > 0) {
+        struct host_stream c = stream_of(x, CONNECTIVITY);
+        struct host_stream o = stream_of(x, OFFSETS);
+        struct host_stream t = stream_of(x, TYPES);
+        if (!x->array[CONNECTIVITY].there || !x->array[OFFSETS].there ||
+            !x->array[TYPES].there) {
+            fail(x, "a piece has not all of connectivity, offsets and types; "
+                    "give an unstructured grid");
+        } else {
+            host_stream_cells(&c, &o, &t, x->piece_cells, first, x->mesh->tets,
+                              x->error);
+        }
+    }
+    for (int i = 0; i < WANTS; i++) {
+        if (x->array[i].text) {
+            free(x->array[i].bytes.data);
+        } else {
+            vtk_array_free(&x->array[i].bytes);
+        }
+        x->array[i] = (struct array){0};
+    }
+}
+
+static void XMLCALL end_element(void *context, const char *name)
+{
+    struct xml *x = context;
+    if (strcmp(name, "DataArray") == 0 && x->reading != WANTS) {
+        end_array(x);
+    } else if (strcmp(name, "Points") == 0) {
+        x->in_points = false;
+    } else if (strcmp(name, "Cells") == 0) {
+        x->in_cells = false;
+    } else if (strcmp(name, "Piece") == 0) {
+        end_piece(x);
+    }
+}
+
+/* Finds the appended data, which need not be XML, and returns how many bytes
+ * come before it. */
+static size_t find_appended(struct xml *x)
+{
+    const char *begin = (const char *)x->source->data;
+    size_t bytes = x->source->bytes;
+    const char *tag = memmem(begin, bytes, "<AppendedData", 13);
+    if (tag == NULL) {
+        return bytes;
+    }
+    size_t rest = bytes - (size_t)(tag - begin);
+    const char *close = memchr(tag, '>', rest);
+    const char *mark =
+        close == NULL ? NULL : memchr(close, '_', rest - (size_t)(close - tag));
+    if (mark != NULL) {
+        x->appended = (const uint8_t *)mark + 1;
+        x->appended_bytes = bytes - (size_t)(mark + 1 - begin);
+        x->appended_base64 =
+            memmem(tag, (size_t)(close - tag), "raw", 3) == NULL;
+    }
+    return (size_t)(tag - begin);
+}
+
+static void parse(struct xml *x, size_t bytes)
+{
+    const char *at = (const char *)x->source->data;
+    XML_SetUserData(x->parser, x);
+    XML_SetElementHandler(x->parser, start_element, end_element);
+    XML_SetCharacterDataHandler(x->parser, characters);
+    while (bytes > 0 && x->error->code == 0) {
+        size_t n = bytes > (size_t)1 << 20 ? (size_t)1 << 20 : bytes;
+        if (XML_Parse(x->parser, at, (int)n, whole && n == bytes) !=
+            XML_STATUS_OK) {
+            char text[160];
+            (void)snprintf(text, sizeof text, "%s; correct the XML",
+                           XML_ErrorString(XML_GetErrorCode(x->parser)));
+            fail(x, text);
+        }
+        at += n;
+        bytes -= n;
+    }
+    if (x->error->code == 0 && !x->any_piece) {
+        fail(x, "there is no Piece; the file is cut short or no VTK file of "
+                "points");
+    }
+    if (x->error->code == 0 && x->in_piece) {
+        fail(x, "the file ends within a piece; it is cut short, get it whole");
+    }
+}
+
+int host_read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
+                     struct host_error *error)
+{
+    struct xml x = {.source = source,
+                    .mesh = mesh,
+                    .error = error,
+                    .parser = XML_ParserCreate(NULL),
+                    .reading = WANTS};
+    if (x.parser == NULL) {
+        return host_fail_memory(error, "the XML parser");
+    }
+    size_t bytes = find_appended(&x);
+    parse(&x, bytes);
+    x.piece_points = x.piece_cells = 0;
+    end_piece(&x); /* frees what an error left behind */
+    XML_ParserFree(x.parser);
+    free(x.text);
+    return error->code;
+}
