@@ -31,6 +31,7 @@ enum node_message_type {
     NODE_PAGE,      /* uint32 page, then its bytes; also from a holder */
     NODE_CREDIT,    /* uint32: NODE_RESULT messages allowed since the setup */
     NODE_UNSPILL,   /* struct node_spill_header, then faces */
+    NODE_REPORT,    /* nothing: asks a holder for NODE_FINISHED */
     NODE_STOP,      /* nothing: the run is over */
     /* To the host. */
     NODE_READY = 32,      /* struct node_ready_message */

@@ -1,0 +1,50 @@
+/* All that a node asks of the place where it runs.  A new board fills this
+ * struct, calls node_start once and node_step for ever, and touches no other
+ * room.
+ *
+ * Memory: the arena is the whole of a node's tables; `fixed` states what the
+ * board holds besides (.data, .bss, stack).  Work: every function returns at
+ * once, but for idle, which sleeps until its time is over or a byte comes.
+ *
+ *     node = node_start(&board, &why);
+ *     while (node_step(node) != NODE_STOPPED) { }
+ *     board.reset(board.context, 0);
+ */
+#ifndef NODE_BOARD_H
+#define NODE_BOARD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "../transport/cube.h"
+
+/* Who the node is: straps, in the language of boards. */
+struct node_identity {
+    uint16_t self;     /* 0 .. 2^dimension - 1 */
+    uint8_t dimension; /* of the cube */
+    uint8_t window;    /* frames a link and direction; 0: what suits memory */
+    uint32_t epoch;    /* of this start, never repeated */
+};
+
+struct node_board {
+    void *context;
+    struct node_identity identity;
+    /* Sends and receives bytes on link i: 0 .. dimension - 1 to the neighbours;
+     * node 0 has its host at link `dimension`. */
+    struct link_pipe pipes[CUBE_LINKS_MAX];
+    /* Microseconds since any fixed time, never going back. */
+    uint64_t (*now_us)(void *context);
+    /* Processor time that this node has used. */
+    uint64_t (*busy_us)(void *context);
+    /* Sleeps until bytes can be received, or sent where a link had no room,
+     * but no longer than wait_us. */
+    void (*idle)(void *context, uint64_t wait_us);
+    /* The node's end: a fresh start, or where there is a system, an exit with
+     * this status. */
+    void (*reset)(void *context, int status);
+    void *arena; /* aligned to 64 bytes */
+    size_t arena_bytes;
+    size_t fixed_bytes; /* data memory outside the arena, stack included */
+};
+
+#endif

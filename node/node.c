@@ -1,0 +1,306 @@
+#include "node.h"
+
+#include <string.h>
+
+#include "../incode/check.h"
+#include "holder.h"
+#include "worker.h"
+
+enum { IDLE_MAX_US = 1000000, FAREWELL_US = 50000 };
+
+struct node {
+    const struct node_board *board;
+    struct cube *cube;
+    uint8_t *role_memory;
+    size_t role_bytes, cube_bytes;
+    bool set_up, stopping;
+    enum node_role role;
+    struct node_worker worker;
+    struct node_holder holder;
+    uint32_t job_epoch;
+    bool owes_ready, owes_report;
+    const char *fault;
+    bool fault_sent;
+    uint64_t now_us, stop_us;
+};
+
+/* Frames a window, where the strap leaves it open: an eighth of a small
+ * memory at most goes to windows. */
+static uint16_t window_for(size_t bytes)
+{
+    return bytes >= 2u << 20 ? 8 : bytes >= 1u << 20 ? 4 : 2;
+}
+
+static size_t up64(size_t bytes)
+{
+    return (bytes + 63) / 64 * 64;
+}
+
+struct node *node_start(const struct node_board *board, const char **why)
+{
+    uint8_t *memory = board->arena;
+    size_t own = up64(sizeof(struct node));
+    struct cube_config config;
+    memset(&config, 0, sizeof config);
+    config.self = board->identity.self;
+    config.dimension = board->identity.dimension;
+    config.window = board->identity.window;
+    if (config.window == 0) {
+        config.window = window_for(board->arena_bytes + board->fixed_bytes);
+    }
+    config.epoch = board->identity.epoch;
+    memcpy(config.pipes, board->pipes, sizeof config.pipes);
+    *why = incode_arithmetic_fault();
+    if (*why != NULL) {
+        return NULL;
+    }
+    size_t cube = up64(cube_arena_bytes(&config));
+    if (board->arena_bytes < own + cube) {
+        *why = "the memory does not hold the links' windows";
+        return NULL;
+    }
+    struct node *node = board->arena;
+    memset(node, 0, sizeof *node);
+    node->board = board;
+    node->cube_bytes = cube;
+    node->role_memory = memory + own + cube;
+    node->role_bytes = board->arena_bytes - own - cube;
+    node->cube = cube_init(memory + own, cube, &config);
+    if (node->cube == NULL) {
+        *why = "the cube's description is not sound";
+        return NULL;
+    }
+    return node;
+}
+
+static void take_setup(struct node *n, const struct cube_message *message)
+{
+    struct node_setup_message setup;
+    const char *why = NULL;
+    int status;
+    if (message->size != sizeof setup) {
+        n->fault = "host and node are of different versions";
+        return;
+    }
+    memcpy(&setup, message->data, sizeof setup);
+    if (setup.protocol != NODE_PROTOCOL) {
+        n->fault = "host and node are of different versions";
+        return;
+    }
+    uint16_t self = n->board->identity.self;
+    n->role = self >= 1 && self <= setup.holders ? NODE_HOLDS : NODE_WORKS;
+    if (n->role == NODE_HOLDS) {
+        status = node_holder_start(&n->holder, n->role_memory, n->role_bytes,
+                                   n->cube, &setup, &why);
+    } else {
+        status = node_worker_start(&n->worker, n->role_memory, n->role_bytes,
+                                   n->cube, &setup, &why);
+    }
+    if (status != 0) {
+        n->fault = why;
+        return;
+    }
+    n->set_up = true;
+    n->owes_ready = true;
+}
+
+static void take_job(struct node *n, const struct cube_message *message)
+{
+    struct node_job_message job;
+    if (n->fault != NULL) {
+        return;
+    }
+    if (!n->set_up || n->role != NODE_WORKS || message->size != sizeof job) {
+        n->fault = "a job before its setup";
+        return;
+    }
+    memcpy(&job, message->data, sizeof job);
+    n->job_epoch = job.epoch;
+    node_worker_job(&n->worker, &job, n->now_us);
+}
+
+static void take_message(struct node *n, const struct cube_message *message)
+{
+    switch (message->type) {
+    case NODE_SETUP:
+        take_setup(n, message);
+        break;
+    case NODE_JOB:
+        take_job(n, message);
+        break;
+    case NODE_REPORT:
+        n->owes_report = true;
+        break;
+    case NODE_STOP:
+        n->stopping = true;
+        n->stop_us = n->now_us;
+        break;
+    default:
+        if (n->set_up && n->role == NODE_HOLDS) {
+            node_holder_message(&n->holder, message);
+        } else if (n->set_up) {
+            node_worker_message(&n->worker, message);
+        }
+    }
+}
+
+static void fill_map(const struct node *n, struct node_map *map)
+{
+    memset(map, 0, sizeof *map);
+    map->fixed = (uint32_t)n->board->fixed_bytes;
+    map->arena = (uint32_t)n->board->arena_bytes;
+    map->memory = map->fixed + map->arena;
+    map->cube = (uint32_t)n->cube_bytes;
+    map->node = (uint32_t)up64(sizeof *n);
+    if (n->role == NODE_HOLDS) {
+        map->frame_count = n->holder.frame_count;
+        map->frames = (uint32_t)n->role_bytes;
+        return;
+    }
+    const struct incode_map *t =
+        incode_triangulator_map(n->worker.triangulator);
+    map->outbox = n->worker.outbox_bytes;
+    map->control = (uint32_t)t->control;
+    map->frames = (uint32_t)t->frames;
+    map->frame_count = (uint32_t)t->frame_count;
+    map->afl = (uint32_t)t->afl;
+    map->afl_faces = (uint32_t)t->afl_faces;
+    map->bricks = (uint32_t)t->bricks;
+    map->brick_entries = (uint32_t)t->brick_entries;
+    map->gather = (uint32_t)t->gather;
+    map->tasks = (uint32_t)t->tasks;
+}
+
+static bool send_ready(struct node *n)
+{
+    struct node_ready_message ready;
+    memset(&ready, 0, sizeof ready);
+    ready.protocol = NODE_PROTOCOL;
+    ready.role = (uint32_t)n->role;
+    fill_map(n, &ready.map);
+    return cube_write(n->cube, CUBE_HOST, NODE_READY, &ready, sizeof ready) ==
+           0;
+}
+
+static void link_totals(const struct node *n,
+                        struct node_finished_message *finished)
+{
+    unsigned links =
+        n->board->identity.dimension + (n->board->identity.self == 0 ? 1u : 0u);
+    for (unsigned d = 0; d < links; d++) {
+        const struct link_statistics *s = cube_link_statistics(n->cube, d);
+        finished->retransmitted += s->retransmitted;
+    }
+}
+
+/* The statistics, where there is room for them on the link. */
+static bool send_finished(struct node *n)
+{
+    struct node_finished_message finished;
+    size_t used = n->board->fixed_bytes + up64(sizeof *n) + n->cube_bytes;
+    if (cube_room(n->cube, CUBE_HOST) == 0) {
+        return false;
+    }
+    memset(&finished, 0, sizeof finished);
+    finished.busy_us = n->board->busy_us(n->board->context);
+    link_totals(n, &finished);
+    if (n->role == NODE_HOLDS) {
+        finished.pages_held = n->holder.hits;
+        finished.pages_forwarded = n->holder.misses;
+        finished.bytes_in = n->holder.bytes_in;
+        finished.bytes_out = n->holder.bytes_out;
+        used += n->holder.frames_used * sizeof n->holder.frames[0];
+    } else {
+        node_worker_finish(&n->worker, &finished, n->now_us);
+        used += n->worker.outbox_bytes +
+                (size_t)finished.statistics.memory_high_water;
+    }
+    finished.memory_high_water = used;
+    INCODE_ASSERT(cube_write(n->cube, CUBE_HOST, NODE_FINISHED, &finished,
+                             sizeof finished) == 0);
+    return true;
+}
+
+/* Tells the host what is wrong, once.  The node goes on to pass messages of
+ * others, so that the host hears of them too. */
+static void send_fault(struct node *n)
+{
+    size_t size = 0;
+    while (size < NODE_FAULT_TEXT_MAX && n->fault[size] != '\0') {
+        size++;
+    }
+    n->fault_sent =
+        cube_write(n->cube, CUBE_HOST, NODE_FAULT, n->fault, size) == 0;
+}
+
+static unsigned serve_role(struct node *n)
+{
+    unsigned moved = 0;
+    if (n->role == NODE_HOLDS) {
+        moved += node_holder_send(&n->holder);
+        n->fault = n->holder.fault;
+        if (n->owes_report && send_finished(n)) {
+            n->owes_report = false;
+            moved++;
+        }
+        return moved;
+    }
+    moved += node_worker_work(&n->worker);
+    moved += node_worker_send(&n->worker);
+    n->fault = n->worker.fault;
+    if (n->fault == NULL && node_worker_done(&n->worker)) {
+        moved += send_finished(n);
+    }
+    return moved;
+}
+
+/* The farewell must have been passed on to other nodes, and theirs read. */
+static bool may_stop(const struct node *n)
+{
+    return n->stopping && n->now_us - n->stop_us > FAREWELL_US;
+}
+
+enum node_event node_step(struct node *node)
+{
+    struct cube_message message;
+    node->now_us = node->board->now_us(node->board->context);
+    unsigned moved = (unsigned)cube_poll(node->cube, node->now_us);
+    while (cube_read(node->cube, &message)) {
+        take_message(node, &message);
+        cube_release(node->cube);
+        moved++;
+    }
+    if (node->fault != NULL) {
+        if (!node->fault_sent) {
+            send_fault(node);
+        }
+    } else if (node->set_up && node->owes_ready) {
+        node->owes_ready = !send_ready(node);
+    } else if (node->set_up) {
+        moved += serve_role(node);
+    }
+    if (may_stop(node)) {
+        return NODE_STOPPED;
+    }
+    return moved > 0 ? NODE_BUSY : NODE_IDLE;
+}
+
+uint64_t node_wait_us(const struct node *node)
+{
+    uint64_t due = cube_next_due_us(node->cube, node->now_us);
+    if (node->stopping && due > FAREWELL_US) {
+        due = FAREWELL_US;
+    }
+    return due < IDLE_MAX_US ? due : IDLE_MAX_US;
+}
+
+void node_run(struct node *node)
+{
+    const struct node_board *board = node->board;
+    enum node_event event;
+    while ((event = node_step(node)) != NODE_STOPPED) {
+        if (event == NODE_IDLE) {
+            board->idle(board->context, node_wait_us(node));
+        }
+    }
+}

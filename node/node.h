@@ -1,0 +1,38 @@
+/* The node program: divides its arena between the cube's windows and its role
+ * (worker or holder of pages), and moves messages between them.  Nothing here
+ * waits; the board sleeps when a step had nothing to do.
+ *
+ * Memory: the board's arena, filled as struct node_map of message.h states.
+ * Work: a step handles the frames that links hold, then at most NODE_STEPS
+ * steps of the triangulator.
+ *
+ *     node = node_start(&board, &why);
+ *     while ((event = node_step(node)) != NODE_STOPPED)
+ *         if (event == NODE_IDLE) board.idle(context, node_wait_us(node));
+ */
+#ifndef NODE_NODE_H
+#define NODE_NODE_H
+
+#include "board.h"
+#include "message.h"
+
+enum node_event {
+    NODE_BUSY,   /* call again at once */
+    NODE_IDLE,   /* call again when bytes come or node_wait_us is over */
+    NODE_STOPPED /* the host has ended the run */
+};
+
+struct node; /* opaque: lives at the start of the arena */
+
+/* NULL where the arena does not suffice or the arithmetic is unsound: *why. */
+struct node *node_start(const struct node_board *board, const char **why);
+
+enum node_event node_step(struct node *node);
+
+/* Microseconds until node_step must be called even if no byte comes. */
+uint64_t node_wait_us(const struct node *node);
+
+/* Steps and sleeps until the host ends the run. */
+void node_run(struct node *node);
+
+#endif
