@@ -16,7 +16,8 @@ enum { BATCH = 1592, STARS = 4000, APEXES = 40 };
 
 static uint64_t state = 88172645463325252u;
 
-static uint32_t draw(void) {
+static uint32_t draw(void)
+{
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
@@ -24,7 +25,8 @@ static uint32_t draw(void) {
 }
 
 /* A vertex near `v` or anywhere below `vertices`. */
-static uint32_t draw_near(uint32_t v, uint32_t vertices) {
+static uint32_t draw_near(uint32_t v, uint32_t vertices)
+{
     uint32_t bits = draw() % 33;
     uint32_t step = bits == 0 ? 0 : draw() >> (32 - bits);
     return (uint32_t)(((uint64_t)v + step) % vertices);
@@ -44,7 +46,8 @@ struct seen {
 /* Reads a batch and compares it with what was written. */
 static void compare(const struct expected *e, struct seen *seen,
                     const uint8_t *data, size_t size, uint32_t vertices,
-                    size_t rows_max) {
+                    size_t rows_max)
+{
     /* A copy without slack, so that a sanitizer sees reads past the end. */
     uint8_t *copy = malloc(size + 1);
     struct node_result_reader reader;
@@ -69,7 +72,8 @@ static void compare(const struct expected *e, struct seen *seen,
     free(copy);
 }
 
-static void round_trip(uint32_t vertices, size_t rows_max) {
+static void round_trip(uint32_t vertices, size_t rows_max)
+{
     static struct expected e;
     static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
     struct node_result_writer writer;
@@ -110,7 +114,8 @@ static void round_trip(uint32_t vertices, size_t rows_max) {
     assert_int_equal(seen.bricks, e.bricks_count);
 }
 
-static void test_round_trip(void **unused) {
+static void test_round_trip(void **unused)
+{
     (void)unused;
     static const uint32_t sizes[] = {1,       64,         1000,
                                      1 << 20, UINT32_MAX, 0x80000001u};
@@ -122,7 +127,8 @@ static void test_round_trip(void **unused) {
 }
 
 /* Any bytes: an end, and only vertices in range. */
-static void test_garbage(void **unused) {
+static void test_garbage(void **unused)
+{
     (void)unused;
     for (size_t round = 0; round < 100000; round++) {
         size_t size = draw() % 100;
@@ -156,7 +162,8 @@ static void test_garbage(void **unused) {
 }
 
 /* A batch cut short is garbage or a shorter batch, never other tetrahedra. */
-static void test_truncated(void **unused) {
+static void test_truncated(void **unused)
+{
     (void)unused;
     uint8_t buffer[200 + NODE_RESULT_SLACK];
     struct node_result_writer writer;
@@ -183,14 +190,16 @@ static void test_truncated(void **unused) {
     }
 }
 
-static double seconds(void) {
+static double seconds(void)
+{
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 /* The stated speed, with room for a slow or instrumented machine. */
-static void test_speed(void **unused) {
+static void test_speed(void **unused)
+{
     (void)unused;
     static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
     static uint32_t apexes[1024][7][3];
@@ -239,7 +248,8 @@ static void test_speed(void **unused) {
     assert_true(1e9 * reading / (double)total < 200.0);
 }
 
-int main(void) {
+int main(void)
+{
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_garbage),

@@ -1,0 +1,390 @@
+#include "arguments.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    KEY_STRATEGY = 256,
+    KEY_PARTITION,
+    KEY_INDEX,
+    KEY_NODES,
+    KEY_FACE_RULE,
+    KEY_LINK,
+    KEY_BOARD,
+    KEY_CUBE,
+    KEY_MEMORY,
+    KEY_CLUSTER,
+    KEY_FACES_PER_JOB,
+    KEY_JOBS_PER_WORKER,
+    KEY_STATS,
+    KEY_VERIFY,
+    KEY_NO_PROGRESS,
+    KEY_TABLE,
+    KEY_WINDOW,
+    KEY_SHUFFLE_SEED,
+    KEY_HOST_STALL,
+    KEY_HOST_RATE,
+    KEY_HOST_RATE_TIME,
+    KEY_SEED,
+    KEY_NODE_PROGRAM
+};
+
+static const struct argp_option options_of_run[] = {
+    {NULL, 0, NULL, 0, "What to compute, and where:", 1},
+    {"output", 'o', "FILE", 0,
+     "Write the tetrahedra to FILE, by its extension: .ele (with .node, "
+     ".neigh and .face beside it), .vtu, .vtk, .msh, .mesh, .npy; - is .ele "
+     "on standard output. May be given several times",
+     1},
+    {"strategy", KEY_STRATEGY, "NAME", 0,
+     "sequential (one node computes, others hold pages), spatial (a region a "
+     "node), or auto, the default",
+     1},
+    {"partition", KEY_PARTITION, "NAME", 0,
+     "Regions of equal counts (adaptive, the default) or equal cells "
+     "(uniform)",
+     1},
+    {"index", KEY_INDEX, "NAME", 0,
+     "How a node searches: naive (all points), grid (the paper's uniform "
+     "grid) or kd, the default",
+     1},
+    {"face-rule", KEY_FACE_RULE, "NAME", 0,
+     "Faces pursued by a region: those with a vertex of its own (own, the "
+     "default) or at least partly inside it (paper)",
+     1},
+    {"nodes", KEY_NODES, "N", 0,
+     "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
+    {"memory", KEY_MEMORY, "BYTES", 0,
+     "Data memory of a node, stack included: 512K .. 1G. Default: 4M", 1},
+    {"link", KEY_LINK, "NAME", 0, "Wires between nodes: tcp", 1},
+    {"board", KEY_BOARD, "NAME", 0, "What a node runs on: linux", 1},
+    {"cube", KEY_CUBE, "FILE", 0, "Real nodes: not in this version", 1},
+    {NULL, 0, NULL, 0, "What to report:", 2},
+    {"verify", KEY_VERIFY, NULL, 0,
+     "Check the result exactly before reporting success", 2},
+    {"stats", KEY_STATS, "FILE", 0, "Write statistics as JSON; - is stdout", 2},
+    {"table", KEY_TABLE, NULL, 0,
+     "Run on one node too, and print the columns of the paper's Table 2", 2},
+    {"quiet", 'q', NULL, 0, "Print nothing but errors", 2},
+    {"no-progress", KEY_NO_PROGRESS, NULL, 0,
+     "No line of progress on a terminal", 2},
+    {NULL, 0, NULL, 0, "Testing:", 3},
+    {"window", KEY_WINDOW, "FRAMES", 0,
+     "Frames a link and direction, 1 .. 64. Default: by memory", 3},
+    {"shuffle-seed", KEY_SHUFFLE_SEED, "N", 0,
+     "Make arriving pages ready in a random order", 3},
+    {"host-stall", KEY_HOST_STALL, "MS", 0,
+     "The host sleeps up to MS milliseconds at random", 3},
+    {"host-rate", KEY_HOST_RATE, "BYTES", 0, "The host reads BYTES a second ..",
+     3},
+    {"host-rate-time", KEY_HOST_RATE_TIME, "S", 0,
+     ".. for its first S seconds. Default: 30", 3},
+    {"seed", KEY_SEED, "N", 0, "Seed of --host-stall", 3},
+    {"node-program", KEY_NODE_PROGRAM, "FILE", 0,
+     "Start FILE for a node instead of incode-node", 3},
+    {"cluster", KEY_CLUSTER, "N", OPTION_HIDDEN, NULL, 3},
+    {"faces-per-job", KEY_FACES_PER_JOB, "N", OPTION_HIDDEN, NULL, 3},
+    {"jobs-per-worker", KEY_JOBS_PER_WORKER, "N", OPTION_HIDDEN, NULL, 3},
+    {0}};
+
+struct parse {
+    struct host_run_options *options;
+    struct host_error *error;
+};
+
+int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
+                      uint64_t *number)
+{
+    char *end;
+    errno = 0;
+    if (*text < '0' || *text > '9') {
+        return -1;
+    }
+    unsigned long long value = strtoull(text, &end, 10);
+    if (errno != 0 || *end != '\0' || value < lo || value > hi) {
+        return -1;
+    }
+    *number = value;
+    return 0;
+}
+
+int host_parse_bytes(const char *text, uint64_t *bytes)
+{
+    char *end;
+    errno = 0;
+    if (*text < '0' || *text > '9') {
+        return -1;
+    }
+    unsigned long long value = strtoull(text, &end, 10);
+    unsigned shift = 0;
+    if (*end != '\0') {
+        static const char units[] = "KMG";
+        const char *unit = strchr(units, *end >= 'a' ? *end - 32 : *end);
+        if (unit == NULL) {
+            return -1;
+        }
+        shift = 10 * (unsigned)(unit - units + 1);
+        end += strcmp(end + 1, "iB") == 0 ? 3 : 1;
+    }
+    if (errno != 0 || *end != '\0' || value > UINT64_MAX >> 20 >> shift) {
+        return -1;
+    }
+    *bytes = (uint64_t)value << shift;
+    return 0;
+}
+
+/* Index of `value` in names (a NULL-terminated list), or -1 with the error:
+ * what is allowed, and what other versions have. */
+static int choose(struct parse *p, const char *option, const char *value,
+                  const char *const names[], const char *later)
+{
+    char allowed[128] = "";
+    for (int i = 0; names[i] != NULL; i++) {
+        if (strcmp(value, names[i]) == 0) {
+            return i;
+        }
+        strcat(strcat(allowed, i == 0 ? "" : ", "), names[i]);
+    }
+    /* `later` is a list with a comma before and after each name. */
+    char wanted[64] = ",";
+    strncat(wanted, value, sizeof wanted - 3);
+    strcat(wanted, ",");
+    host_fail(p->error, HOST_USAGE, "--%s %s: %s; allowed: %s", option, value,
+              later != NULL && strstr(later, wanted) != NULL
+                  ? "not in this version"
+                  : "no such name",
+              allowed);
+    return -1;
+}
+
+static int number(struct parse *p, const char *option, const char *value,
+                  uint64_t lo, uint64_t hi, uint64_t *result)
+{
+    if (host_parse_number(value, lo, hi, result) != 0) {
+        return host_fail(p->error, HOST_USAGE,
+                         "--%s %s: not a number that is allowed; give %llu to "
+                         "%llu",
+                         option, value, (unsigned long long)lo,
+                         (unsigned long long)hi);
+    }
+    return 0;
+}
+
+static void parse_nodes(struct parse *p, const char *value)
+{
+    uint64_t n = 0;
+    if (host_parse_number(value, 1, HOST_NODES_MAX, &n) != 0 ||
+        (n & (n - 1)) != 0) {
+        host_fail(p->error, HOST_USAGE,
+                  "--nodes %s: not a number of nodes of a cube; allowed: 1, "
+                  "2, 4, 8, 16, 32, 64",
+                  value);
+    }
+    p->options->nodes = (unsigned)n;
+}
+
+static void parse_memory(struct parse *p, const char *value)
+{
+    uint64_t *bytes = &p->options->memory;
+    if (host_parse_bytes(value, bytes) != 0 || *bytes < HOST_MEMORY_MIN ||
+        *bytes > UINT64_C(1) << 30) {
+        host_fail(p->error, HOST_USAGE,
+                  "--memory %s: not a size of memory that is allowed; give "
+                  "256K to 1G",
+                  value);
+    }
+    *bytes = *bytes / 4096 * 4096;
+}
+
+static void parse_output(struct parse *p, const char *value)
+{
+    if (p->options->outputs == HOST_OUTPUTS_MAX) {
+        host_fail(p->error, HOST_USAGE,
+                  "-o %s: more than %d outputs; use "
+                  "incode convert for the others",
+                  value, HOST_OUTPUTS_MAX);
+        return;
+    }
+    p->options->output[p->options->outputs++] = value;
+}
+
+static bool parse_names(int key, const char *value, struct parse *p)
+{
+    static const char *const strategies[] = {"sequential", "spatial", "auto",
+                                             NULL};
+    static const char *const partitions[] = {"adaptive", "uniform", NULL};
+    static const char *const indexes[] = {"naive", "grid", "kd", NULL};
+    static const char *const rules[] = {"own", "paper", NULL};
+    static const char *const links[] = {"tcp", NULL};
+    static const char *const boards[] = {"linux", NULL};
+    struct host_run_options *o = p->options;
+    switch (key) {
+    case KEY_STRATEGY:
+        o->strategy =
+            (enum host_strategy)choose(p, "strategy", value, strategies,
+                                       ",master-slaves,linda,hybrid,exchange,");
+        return true;
+    case KEY_PARTITION:
+        o->partition = (enum host_partition)choose(p, "partition", value,
+                                                   partitions, NULL);
+        return true;
+    case KEY_INDEX:
+        o->index = (enum incode_index)choose(p, "index", value, indexes, NULL);
+        return true;
+    case KEY_FACE_RULE:
+        o->face_rule =
+            (enum incode_face_rule)choose(p, "face-rule", value, rules, NULL);
+        return true;
+    case KEY_LINK:
+        (void)choose(p, "link", value, links, ",serial,mpi,");
+        return true;
+    case KEY_BOARD:
+        (void)choose(p, "board", value, boards, ",mps2-an500,mps2-an385,");
+        return true;
+    default:
+        return false;
+    }
+}
+
+static bool parse_testing(int key, const char *value, struct parse *p)
+{
+    struct host_run_options *o = p->options;
+    uint64_t n = 0;
+    switch (key) {
+    case KEY_WINDOW:
+        (void)number(p, "window", value, 1, LINK_WINDOW_MAX, &n);
+        o->window = (unsigned)n;
+        return true;
+    case KEY_SHUFFLE_SEED:
+        (void)number(p, "shuffle-seed", value, 0, UINT64_MAX, &o->shuffle_seed);
+        return true;
+    case KEY_HOST_STALL:
+        (void)number(p, "host-stall", value, 0, 60000, &n);
+        o->hindrance.stall_us_max = 1000 * n;
+        return true;
+    case KEY_HOST_RATE:
+        (void)number(p, "host-rate", value, 1, 1000000000,
+                     &o->hindrance.bytes_a_second);
+        return true;
+    case KEY_HOST_RATE_TIME:
+        (void)number(p, "host-rate-time", value, 0, 86400, &n);
+        o->hindrance.slow_us = 1000000 * n;
+        return true;
+    case KEY_SEED:
+        (void)number(p, "seed", value, 0, UINT64_MAX, &o->hindrance.seed);
+        return true;
+    case KEY_NODE_PROGRAM:
+        o->node_program = value;
+        return true;
+    default:
+        return false;
+    }
+}
+
+static error_t parse_report(int key, char *value, struct argp_state *state,
+                            struct host_run_options *o)
+{
+    switch (key) {
+    case KEY_VERIFY:
+        o->verify = true;
+        return 0;
+    case KEY_STATS:
+        o->stats = value;
+        return 0;
+    case KEY_TABLE:
+        o->table = true;
+        return 0;
+    case 'q':
+        o->quiet = true;
+        return 0;
+    case KEY_NO_PROGRESS:
+        o->progress = false;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (o->input != NULL) {
+            argp_error(state, "%s: more than one file of points; give one",
+                       value);
+        }
+        o->input = value;
+        return 0;
+    case ARGP_KEY_END:
+        if (o->input == NULL) {
+            argp_error(state, "no file of points; give one, or - for "
+                              "standard input");
+        }
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static error_t parse_option(int key, char *value, struct argp_state *state)
+{
+    struct parse *p = state->input;
+    if (parse_names(key, value, p) || parse_testing(key, value, p)) {
+        return 0;
+    }
+    switch (key) {
+    case 'o':
+        parse_output(p, value);
+        return 0;
+    case KEY_NODES:
+        parse_nodes(p, value);
+        return 0;
+    case KEY_MEMORY:
+        parse_memory(p, value);
+        return 0;
+    case KEY_CUBE:
+        host_fail(p->error, HOST_USAGE,
+                  "--cube %s: not in this version; leave it out, and the "
+                  "nodes are started on this machine",
+                  value);
+        return 0;
+    case KEY_CLUSTER:
+    case KEY_FACES_PER_JOB:
+    case KEY_JOBS_PER_WORKER:
+        host_fail(p->error, HOST_USAGE,
+                  "--cluster, --faces-per-job, --jobs-per-worker: belong to "
+                  "strategies that are not in this version; allowed "
+                  "strategies: sequential, spatial, auto");
+        return 0;
+    default:
+        return parse_report(key, value, state, p->options);
+    }
+}
+
+int host_arguments_run(int argc, char **argv, struct host_run_options *options,
+                       struct host_error *error)
+{
+    static const struct argp argp = {
+        options_of_run,
+        parse_option,
+        "POINTS",
+        "Triangulates POINTS on a cube of nodes that it starts on this "
+        "machine, and writes each output by its extension.\v"
+        "POINTS: .xyz .txt .csv .node .ply .off .npy (n,3) .vtk .vtu .vtp "
+        ".vts, PLOT3D .x .p3d .bin; .gz of any of them; - is .xyz from "
+        "standard input.\n\n"
+        "Examples:\n"
+        "  incode run bunny.ply -o bunny.vtu\n"
+        "  incode run points.xyz --nodes 8 --verify --stats run.json\n"
+        "  incode run - -o - < points.xyz > tetrahedra.ele\n\n"
+        "Exit status: 0 done, 1 the program failed, 2 wrong usage, 3 wrong "
+        "input, 4 cube, link or node failure, 5 a verification failed.",
+        NULL,
+        NULL,
+        NULL};
+    struct parse parse = {options, error};
+    host_run_defaults(options);
+    if (argp_parse(&argp, argc, argv, 0, NULL, &parse) != 0) {
+        return host_fail(error, HOST_USAGE,
+                         "incode run: wrong usage; see incode run --help");
+    }
+    if (options->hindrance.bytes_a_second != 0 &&
+        options->hindrance.slow_us == 0) {
+        options->hindrance.slow_us = 30000000;
+    }
+    return error->code;
+}

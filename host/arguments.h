@@ -1,0 +1,25 @@
+/* The arguments of `incode run`, and of what shares them.
+ *
+ * Memory: none.  Work: none to speak of.
+ *
+ *     host_arguments_run(argc, argv, &options, &error);
+ */
+#ifndef HOST_ARGUMENTS_H
+#define HOST_ARGUMENTS_H
+
+#include "run.h"
+
+/* argv[0] is the name for messages ("incode run").  Wrong usage: HOST_USAGE;
+ * where the C library's parser found it, it has printed why, and ends the
+ * program with that status itself. */
+int host_arguments_run(int argc, char **argv, struct host_run_options *options,
+                       struct host_error *error);
+
+/* A count of bytes with an optional K, M or G: 4M.  0, or -1. */
+int host_parse_bytes(const char *text, uint64_t *bytes);
+
+/* A number from lo to hi.  0, or -1. */
+int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
+                      uint64_t *number);
+
+#endif

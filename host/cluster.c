@@ -1,0 +1,302 @@
+#include "cluster.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/random.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "../transport/cube.h"
+#include "../transport/drivers/tcp.h"
+
+/* Sanitizers map memory by the terabyte: no limit then. */
+#ifdef INCODE_SANITIZED
+#define LIMITED false
+#else
+#define LIMITED true
+#endif
+
+extern char **environ;
+
+/* Both ends of every wire: end[node][link]. */
+struct wires {
+    int end[HOST_NODES_MAX][CUBE_LINKS_MAX];
+};
+
+static void close_wires(struct wires *wires)
+{
+    for (unsigned i = 0; i < HOST_NODES_MAX; i++) {
+        for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
+            if (wires->end[i][d] >= 0) {
+                close(wires->end[i][d]);
+                wires->end[i][d] = -1;
+            }
+        }
+    }
+}
+
+static int make_wires(struct host_cluster *c, struct wires *wires,
+                      struct host_error *error)
+{
+    int pair[2];
+    memset(wires, -1, sizeof *wires);
+    for (unsigned i = 0; i < c->nodes; i++) {
+        for (unsigned d = 0; d < c->dimension; d++) {
+            unsigned other = i ^ 1u << d;
+            if (other < i) {
+                continue;
+            }
+            if (tcp_pair(pair) != 0) {
+                return host_fail(error, HOST_CUBE,
+                                 "wire between nodes %u and %u: %s; are "
+                                 "loopback connections and %u open files "
+                                 "allowed?",
+                                 i, other, strerror(errno),
+                                 c->nodes * (c->dimension + 1) + 16);
+            }
+            wires->end[i][d] = pair[0];
+            wires->end[other][d] = pair[1];
+        }
+    }
+    if (tcp_pair(pair) != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "wire between host and node 0: %s; are loopback "
+                         "connections allowed?",
+                         strerror(errno));
+    }
+    c->wire = pair[0];
+    wires->end[0][c->dimension] = pair[1];
+    return 0;
+}
+
+/* incode-node beside this executable, or where `make install` puts it. */
+static int find_program(const char *given, char *path, size_t size,
+                        struct host_error *error)
+{
+    ssize_t length;
+    char *slash;
+    if (given != NULL) {
+        snprintf(path, size, "%s", given);
+    } else {
+        length = readlink("/proc/self/exe", path, size - 16);
+        if (length <= 0) {
+            return host_fail(error, HOST_BROKEN,
+                             "/proc/self/exe: %s; is /proc mounted?",
+                             strerror(errno));
+        }
+        path[length] = '\0';
+        slash = strrchr(path, '/');
+        strcpy(slash == NULL ? path : slash + 1, "incode-node");
+    }
+    if (access(path, X_OK) != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "%s: %s; the node program belongs beside incode, "
+                         "run make",
+                         path, strerror(errno));
+    }
+    return 0;
+}
+
+static void set_limit(int resource, uint64_t bytes, int report)
+{
+    struct rlimit limit = {bytes, bytes};
+    if (setrlimit((__rlimit_resource_t)resource, &limit) != 0) {
+        int reason = errno;
+        (void)!write(report, &reason, sizeof reason);
+        _exit(127);
+    }
+}
+
+/* In the child: becomes the node.  A failure's errno goes to `report`. */
+static void become_node(const struct host_cluster *c,
+                        const struct host_cluster_options *options,
+                        const char *path, unsigned node,
+                        const struct wires *wires, int report)
+{
+    char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
+    char *no_environment[] = {NULL};
+    size_t at = 0;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    for (unsigned d = 0; d < c->dimension + (node == 0 ? 1u : 0u); d++) {
+        int fd = wires->end[node][d];
+        fcntl(fd, F_SETFD, 0);
+        at += (size_t)snprintf(links + at, sizeof links - at, "%s%d",
+                               d == 0 ? "" : ",", fd);
+    }
+    int null = open("/dev/null", O_RDWR);
+    dup2(null, STDIN_FILENO);
+    dup2(null, STDOUT_FILENO);
+    snprintf(text[0], sizeof text[0], "%u", node);
+    snprintf(text[1], sizeof text[1], "%u", c->dimension);
+    snprintf(text[2], sizeof text[2], "%llu",
+             (unsigned long long)options->memory);
+    snprintf(text[3], sizeof text[3], "%d", (int)HOST_STACK_BYTES);
+    snprintf(text[4], sizeof text[4], "%u", options->window);
+    snprintf(text[5], sizeof text[5], "%lu", (unsigned long)c->epoch);
+    char *argv[] = {(char[]){"incode-node"},
+                    (char[]){"--node"},
+                    text[0],
+                    (char[]){"--dimension"},
+                    text[1],
+                    (char[]){"--memory"},
+                    text[2],
+                    (char[]){"--stack"},
+                    text[3],
+                    (char[]){"--window"},
+                    text[4],
+                    (char[]){"--epoch"},
+                    text[5],
+                    (char[]){"--links"},
+                    links,
+                    NULL};
+    set_limit(RLIMIT_CORE, 0, report);
+    if (c->limited) {
+        set_limit(RLIMIT_STACK, HOST_STACK_BYTES, report);
+        set_limit(RLIMIT_DATA, options->memory - HOST_STACK_BYTES, report);
+    }
+    execve(path, argv, c->limited ? no_environment : environ);
+    int reason = errno;
+    (void)!write(report, &reason, sizeof reason);
+    _exit(127);
+}
+
+static int start_node(struct host_cluster *c,
+                      const struct host_cluster_options *options,
+                      const char *path, unsigned node,
+                      const struct wires *wires, struct host_error *error)
+{
+    int report[2], reason = 0;
+    if (pipe2(report, O_CLOEXEC) != 0) {
+        return host_fail(error, HOST_BROKEN, "node %u: %s; close some files",
+                         node, strerror(errno));
+    }
+    pid_t pid = fork();
+    if (pid == 0) {
+        become_node(c, options, path, node, wires, report[1]);
+    }
+    close(report[1]);
+    if (pid < 0) {
+        close(report[0]);
+        return host_fail(error, HOST_CUBE,
+                         "node %u: %s; ask for fewer with --nodes", node,
+                         strerror(errno));
+    }
+    c->process[node].pid = pid;
+    c->process[node].ended = false;
+    ssize_t got = read(report[0], &reason, sizeof reason);
+    close(report[0]);
+    if (got == (ssize_t)sizeof reason) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u: %s: %s; run make to build it anew", node,
+                         path, strerror(reason));
+    }
+    return 0;
+}
+
+int host_cluster_start(struct host_cluster *cluster,
+                       const struct host_cluster_options *options,
+                       struct host_error *error)
+{
+    char path[4096];
+    struct wires wires;
+    memset(cluster, 0, sizeof *cluster);
+    cluster->wire = -1;
+    cluster->nodes = options->nodes;
+    cluster->limited = LIMITED;
+    for (unsigned i = 0; i < HOST_NODES_MAX; i++) {
+        cluster->process[i].ended = true;
+    }
+    while (1u << cluster->dimension < options->nodes) {
+        cluster->dimension++;
+    }
+    if (getrandom(&cluster->epoch, sizeof cluster->epoch, 0) < 0 ||
+        cluster->epoch == 0) {
+        cluster->epoch = 1;
+    }
+    if (find_program(options->program, path, sizeof path, error) != 0) {
+        return error->code;
+    }
+    int status = make_wires(cluster, &wires, error);
+    for (unsigned i = 0; status == 0 && i < cluster->nodes; i++) {
+        status = start_node(cluster, options, path, i, &wires, error);
+    }
+    close_wires(&wires);
+    if (status != 0) {
+        host_cluster_stop(cluster);
+    }
+    return status;
+}
+
+static void reap(struct host_process *process, int flags)
+{
+    int status;
+    if (!process->ended &&
+        waitpid(process->pid, &status, flags) == process->pid) {
+        process->ended = true;
+        process->status = status;
+    }
+}
+
+/* A node that ends before it is told to has failed. */
+static int describe(unsigned node, const struct host_process *process,
+                    struct host_error *error)
+{
+    int status = process->status;
+    if (WIFSIGNALED(status)) {
+        int number = WTERMSIG(status);
+        return host_fail(error, HOST_CUBE,
+                         "node %u: ended by signal %d (%s)%s; run again, and "
+                         "look for what stopped it",
+                         node, number, strsignal(number),
+                         number == SIGILL    ? ", an invariant failed"
+                         : number == SIGSEGV ? ", perhaps out of its memory"
+                                             : "");
+    }
+    return host_fail(error, HOST_CUBE,
+                     "node %u: ended with status %d; see what it printed, and "
+                     "run again",
+                     node, WEXITSTATUS(status));
+}
+
+int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
+{
+    for (unsigned i = 0; i < cluster->nodes; i++) {
+        reap(&cluster->process[i], WNOHANG);
+        if (cluster->process[i].ended) {
+            return describe(i, &cluster->process[i], error);
+        }
+    }
+    return 0;
+}
+
+bool host_cluster_ended(struct host_cluster *cluster)
+{
+    bool ended = true;
+    for (unsigned i = 0; i < cluster->nodes; i++) {
+        reap(&cluster->process[i], WNOHANG);
+        ended &= cluster->process[i].ended;
+    }
+    return ended;
+}
+
+void host_cluster_stop(struct host_cluster *cluster)
+{
+    for (unsigned i = 0; i < cluster->nodes; i++) {
+        if (!cluster->process[i].ended) {
+            kill(cluster->process[i].pid, SIGKILL);
+        }
+    }
+    for (unsigned i = 0; i < cluster->nodes; i++) {
+        reap(&cluster->process[i], 0);
+    }
+    if (cluster->wire >= 0) {
+        close(cluster->wire);
+        cluster->wire = -1;
+    }
+}

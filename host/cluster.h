@@ -1,0 +1,62 @@
+/* The nodes that the host starts on this machine: processes of incode-node,
+ * each with the wires of a hypercube and no others, its data memory limited by
+ * the kernel, all gone when the host goes.
+ *
+ * Memory: 24 bytes a node; two sockets a wire until the nodes have them.  Work:
+ * a fork and an exec a node.
+ *
+ *     host_cluster_start(&cluster, &options, &error);
+ *     ... use cluster.wire, the host's end of the wire to node 0 ...
+ *     if (host_cluster_check(&cluster, &error) != 0) a node has died;
+ *     host_cluster_stop(&cluster);
+ */
+#ifndef HOST_CLUSTER_H
+#define HOST_CLUSTER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <sys/types.h>
+
+#include "error.h"
+
+enum {
+    HOST_NODES_MAX = 64,          /* on one machine */
+    HOST_MEMORY_MIN = 256 * 1024, /* bytes a node */
+    HOST_STACK_BYTES = 64 * 1024  /* of a node's memory */
+};
+
+struct host_cluster_options {
+    unsigned nodes;      /* a power of two, at most HOST_NODES_MAX */
+    uint64_t memory;     /* bytes of data memory a node, stack included */
+    unsigned window;     /* frames a link and direction; 0: node's choice */
+    const char *program; /* NULL: incode-node beside this executable */
+};
+
+struct host_process {
+    pid_t pid;
+    bool ended;
+    int status; /* as waitpid gives it, once ended */
+};
+
+struct host_cluster {
+    unsigned nodes, dimension;
+    uint32_t epoch;
+    int wire;     /* a connected socket to node 0, non-blocking; -1: none */
+    bool limited; /* the kernel holds the nodes to their memory */
+    struct host_process process[HOST_NODES_MAX];
+};
+
+int host_cluster_start(struct host_cluster *cluster,
+                       const struct host_cluster_options *options,
+                       struct host_error *error);
+
+/* 0 while every node lives; else HOST_CUBE, naming the node. */
+int host_cluster_check(struct host_cluster *cluster, struct host_error *error);
+
+/* Whether every node has ended, however it did. */
+bool host_cluster_ended(struct host_cluster *cluster);
+
+/* Ends what still runs and waits for it.  Also after a failed start. */
+void host_cluster_stop(struct host_cluster *cluster);
+
+#endif

@@ -1,0 +1,292 @@
+/* The host program.  Nothing here but its commands and their arguments. */
+#include <argp.h>
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../incode/predicates.h"
+#include "arguments.h"
+#include "convert.h"
+#include "gen.h"
+#include "report.h"
+#include "run.h"
+#include "tetrahedra.h"
+#include "verify.h"
+
+const char *argp_program_version = "incode 0.1.0";
+
+enum { ARGUMENTS_MAX = 4 };
+
+/* What the small commands take: arguments, and a few options. */
+struct simple {
+    const char *argument[ARGUMENTS_MAX];
+    unsigned count, least, most;
+    const char *output;
+    uint64_t seed;
+    unsigned nodes;
+    struct host_error *error;
+};
+
+static error_t parse_simple(int key, char *value, struct argp_state *state)
+{
+    struct simple *s = state->input;
+    uint64_t n = 0;
+    switch (key) {
+    case 'o':
+        s->output = value;
+        return 0;
+    case 's':
+        if (host_parse_number(value, 0, UINT64_MAX, &s->seed) != 0) {
+            argp_error(state, "--seed %s: not a number; give 0 or more", value);
+        }
+        return 0;
+    case 'n':
+        if (host_parse_number(value, 1, HOST_NODES_MAX, &n) != 0 ||
+            (n & (n - 1)) != 0) {
+            argp_error(state,
+                       "--nodes %s: not a number of nodes of a cube; "
+                       "allowed: 1, 2, 4, 8, 16, 32, 64",
+                       value);
+        }
+        s->nodes = (unsigned)n;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (s->count == s->most) {
+            argp_error(state, "%s: one argument too many; see --help", value);
+        }
+        s->argument[s->count++] = value;
+        return 0;
+    case ARGP_KEY_END:
+        if (s->count < s->least) {
+            argp_error(state, "too few arguments; see --help");
+        }
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static void parse(int argc, char **argv, const struct argp_option *options,
+                  const char *arguments, const char *about, unsigned count,
+                  struct simple *simple)
+{
+    const struct argp argp = {options, parse_simple, arguments, about,
+                              NULL,    NULL,         NULL};
+    simple->least = count;
+    simple->most = count;
+    (void)argp_parse(&argp, argc, argv, 0, NULL, simple);
+}
+
+static int command_run(int argc, char **argv, struct host_error *error)
+{
+    static struct host_run_result result;
+    struct host_run_options options;
+    if (host_arguments_run(argc, argv, &options, error) != 0) {
+        return error->code;
+    }
+    return host_run(&options, &result, error);
+}
+
+static int command_gen(int argc, char **argv, struct host_error *error)
+{
+    static const struct argp_option options[] = {
+        {"seed", 's', "S", 0, "Another seed makes other points. Default: 1", 0},
+        {"output", 'o', "FILE", 0,
+         "Write to FILE, by its extension; - is .xyz on standard output", 0},
+        {0}};
+    struct host_points points = {0};
+    struct simple s = {.seed = 1, .output = "-"};
+    uint64_t n;
+    parse(argc, argv, options, "KIND N",
+          "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
+          "grid, or hub (one point amid N-1 on a sphere).",
+          2, &s);
+    if (host_parse_number(s.argument[1], 4, UINT32_MAX - 1, &n) != 0) {
+        return host_fail(error, HOST_USAGE,
+                         "gen: %s: not a number of points; give 4 to "
+                         "4294967294",
+                         s.argument[1]);
+    }
+    int status = host_gen(s.argument[0], n, s.seed, &points, error);
+    if (status == 0) {
+        status = host_points_write(s.output, &points, error);
+    }
+    host_points_free(&points);
+    return status;
+}
+
+static int command_verify(int argc, char **argv, struct host_error *error)
+{
+    static struct host_verify_report report;
+    struct host_points points = {0};
+    struct host_tetrahedra tets = {0};
+    struct simple s = {0};
+    parse(argc, argv, NULL, "POINTS TETS",
+          "Checks exactly that TETS is the Delaunay triangulation of POINTS: "
+          "every tetrahedron positive, no vertex inside the sphere of a "
+          "neighbour, facets in pairs or on the convex hull, every distinct "
+          "point a vertex, Euler's relation.",
+          2, &s);
+    int status = host_points_read(s.argument[0], &points, error);
+    if (status == 0) {
+        status = host_tetrahedra_read(s.argument[1], &tets, NULL, error);
+    }
+    if (status == 0) {
+        status = host_verify(&points, &tets, &report, error);
+        if (status == HOST_UNVERIFIED) {
+            fputs(report.text, stderr);
+        }
+    }
+    if (status == 0) {
+        printf("%s: %llu tetrahedra, %llu hull facets: the Delaunay "
+               "triangulation of %llu distinct points of %s\n",
+               s.argument[1], (unsigned long long)report.tetrahedra,
+               (unsigned long long)report.hull_facets,
+               (unsigned long long)report.distinct, s.argument[0]);
+    }
+    host_points_free(&points);
+    host_tetrahedra_free(&tets);
+    return status;
+}
+
+static int command_digest(int argc, char **argv, struct host_error *error)
+{
+    struct host_tetrahedra tets = {0};
+    struct host_digest digest;
+    struct simple s = {0};
+    parse(argc, argv, NULL, "TETS",
+          "Prints the digest of a file of tetrahedra: SHA-256 of its rows, "
+          "vertices and rows in ascending order.",
+          1, &s);
+    int status = host_tetrahedra_read(s.argument[0], &tets, NULL, error);
+    if (status == 0) {
+        host_tetrahedra_sort(&tets);
+        host_digest(&tets, &digest);
+        printf("%s\n", digest.text);
+    }
+    host_tetrahedra_free(&tets);
+    return status;
+}
+
+static int command_convert(int argc, char **argv, struct host_error *error)
+{
+    struct simple s = {0};
+    parse(argc, argv, NULL, "IN OUT",
+          "Converts points to points, or tetrahedra to tetrahedra, by the "
+          "files' extensions.",
+          2, &s);
+    return host_convert(s.argument[0], s.argument[1], error);
+}
+
+static int command_bench(int argc, char **argv, struct host_error *error)
+{
+    static const struct argp_option options[] = {
+        {"nodes", 'n', "N", 0, "Up to N nodes. Default: 8", 0}, {0}};
+    struct host_run_options run;
+    struct simple s = {.nodes = 8};
+    parse(argc, argv, options, "paper",
+          "Measures this machine: paper prints Tables 2 and 4 of Cignoni, "
+          "Laforenza, Perego, Scopigno and Montani (1995).",
+          1, &s);
+    if (strcmp(s.argument[0], "paper") != 0) {
+        return host_fail(error, HOST_USAGE,
+                         "bench %s: not in this version; allowed: "
+                         "paper",
+                         s.argument[0]);
+    }
+    host_run_defaults(&run);
+    return host_bench_paper(&run, s.nodes, error);
+}
+
+struct command {
+    const char *name;
+    int (*run)(int argc, char **argv, struct host_error *error);
+};
+
+static const struct command commands[] = {
+    {"run", command_run},         {"gen", command_gen},
+    {"verify", command_verify},   {"digest", command_digest},
+    {"convert", command_convert}, {"bench", command_bench}};
+
+/* Stops at the first word that is no option: the command. */
+static error_t parse_top(int key, char *value, struct argp_state *state)
+{
+    int *command = state->input;
+    switch (key) {
+    case ARGP_KEY_ARG:
+        (void)value;
+        *command = state->next - 1;
+        state->next = state->argc;
+        return 0;
+    case ARGP_KEY_NO_ARGS:
+        argp_usage(state);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int dispatch(int argc, char **argv, struct host_error *error)
+{
+    static char name[64];
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        if (strcmp(argv[0], commands[i].name) == 0) {
+            snprintf(name, sizeof name, "incode %s", commands[i].name);
+            argv[0] = name;
+            return commands[i].run(argc, argv, error);
+        }
+    }
+    return host_fail(error, HOST_USAGE,
+                     "%s: no such command; allowed: run, gen, verify, "
+                     "digest, convert, bench",
+                     argv[0]);
+}
+
+int main(int argc, char **argv)
+{
+    static const struct argp argp = {
+        NULL,
+        parse_top,
+        "COMMAND ARGUMENT...",
+        "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
+        "Commands:\n"
+        "  run POINTS -o OUT    triangulate on a cube of nodes\n"
+        "  gen KIND N -o FILE   make points: uniform, bubbles, bluntfin, "
+        "sphere, grid, hub\n"
+        "  verify POINTS TETS   check a triangulation exactly\n"
+        "  digest TETS          print what tells triangulations apart\n"
+        "  convert IN OUT       from one file format to another\n"
+        "  bench paper          the paper's tables on this machine\n\n"
+        "incode COMMAND --help says more of each.",
+        NULL,
+        NULL,
+        NULL};
+    struct host_error error = {0};
+    int command = 0;
+    argp_err_exit_status = HOST_USAGE;
+    (void)signal(SIGPIPE, SIG_IGN);
+    (void)argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &command);
+    const char *fault = incode_arithmetic_fault();
+    if (fault != NULL) {
+        fprintf(stderr,
+                "incode: this machine: %s; run make clean and make without "
+                "flags that loosen floating point\n",
+                fault);
+        return HOST_BROKEN;
+    }
+    int status = dispatch(argc - command, argv + command, &error);
+    if (status != 0) {
+        fprintf(stderr, "incode: %s\n", error.text);
+        return status;
+    }
+    if (fflush(stdout) != 0) {
+        fprintf(stderr,
+                "incode: standard output: %s; make room and run "
+                "again\n",
+                strerror(errno));
+        return HOST_INPUT;
+    }
+    return 0;
+}

@@ -1,0 +1,343 @@
+#include "run.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "hull.h"
+#include "report.h"
+#include "stats.h"
+#include "write.h"
+
+static const char *const strategies[] = {"sequential", "spatial", "auto"};
+static const char *const partitions[] = {"adaptive", "uniform"};
+static const char *const indexes[] = {"naive", "grid", "kd"};
+
+const char *host_strategy_name(enum host_strategy strategy)
+{
+    return strategies[strategy];
+}
+
+const char *host_partition_name(enum host_partition partition)
+{
+    return partitions[partition];
+}
+
+const char *host_index_name(enum incode_index index)
+{
+    return indexes[index];
+}
+
+void host_run_defaults(struct host_run_options *options)
+{
+    memset(options, 0, sizeof *options);
+    options->strategy = HOST_AUTO;
+    options->partition = HOST_ADAPTIVE;
+    options->index = INCODE_KD;
+    options->face_rule = INCODE_FACE_OWN;
+    options->memory = 4u << 20;
+    options->progress = true;
+}
+
+static double seconds_since(uint64_t start_us)
+{
+    return 1e-6 * (double)(host_now_us() - start_us);
+}
+
+/* The largest power of two of nodes that have a processor each. */
+static unsigned suitable_nodes(void)
+{
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    unsigned nodes = 1;
+    while (nodes < HOST_NODES_MAX && (long)nodes * 2 <= processors) {
+        nodes *= 2;
+    }
+    return nodes;
+}
+
+/* Nodes and strategy, where they were left open. */
+static void settle(const struct host_run_options *options,
+                   struct host_run_result *result)
+{
+    result->strategy = options->strategy;
+    result->partition = options->partition;
+    result->index = options->index;
+    result->memory = options->memory;
+    result->nodes = options->nodes;
+    if (result->nodes == 0) {
+        result->nodes =
+            options->strategy == HOST_SEQUENTIAL ? 1 : suitable_nodes();
+    }
+    if (result->strategy == HOST_AUTO) {
+        result->strategy = result->nodes > 1 ? HOST_SPATIAL : HOST_SEQUENTIAL;
+    }
+}
+
+static uint64_t peak_bytes(void)
+{
+    struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return (uint64_t)usage.ru_maxrss * 1024;
+}
+
+/* Sums over the nodes. */
+static void gather_reports(const struct host_service *service,
+                           struct host_run_result *r)
+{
+    memcpy(r->node, service->report, sizeof r->node);
+    r->limited = service->cluster->limited;
+    r->retransmitted = service->retransmitted;
+    r->faces_spilled = service->spill.faces_total;
+    for (unsigned i = 0; i < r->nodes; i++) {
+        const struct node_finished_message *f = &r->node[i].statistics;
+        const struct incode_statistics *s = &f->statistics;
+        double wall = 1e-6 * (double)f->wall_us;
+        r->retransmitted += f->retransmitted;
+        if (i >= service->workers) {
+            continue;
+        }
+        r->t_min_s = i == 0 || wall < r->t_min_s ? wall : r->t_min_s;
+        r->t_max_s = wall > r->t_max_s ? wall : r->t_max_s;
+        r->make_tetra_calls += s->make_tetra_calls;
+        r->built += s->tetrahedra_built;
+        r->exact_orient3d += s->tally.exact_orient3d;
+        r->exact_in_sphere += s->tally.exact_in_sphere;
+        r->candidates += s->candidates;
+        r->vertices += s->vertices;
+        r->vertices_waited += s->vertices_waited;
+        for (unsigned k = 0; k < 24; k++) {
+            r->candidates_histogram[k] += s->candidates_histogram[k];
+        }
+    }
+}
+
+/* The part on the nodes: ordered points in, rows of input rows out. */
+static int run_service(const struct host_run_options *options,
+                       const struct host_order *order,
+                       struct host_cluster *cluster,
+                       struct host_service *service,
+                       struct host_tetrahedra *tets,
+                       struct host_run_result *result, struct host_error *error)
+{
+    service->order = order;
+    service->tets = tets;
+    service->setup.setup.index = (uint8_t)options->index;
+    service->setup.setup.face_rule = (uint8_t)options->face_rule;
+    service->setup.setup.shuffle_seed = options->shuffle_seed;
+    service->workers = result->strategy == HOST_SEQUENTIAL ? 1 : cluster->nodes;
+    int status = host_service_run(service, error);
+    gather_reports(service, result);
+    result->time_io_s += 1e-6 * (double)service->pages_us;
+    return status;
+}
+
+int host_triangulate(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_tetrahedra *tets,
+                     struct host_run_result *result, struct host_error *error)
+{
+    static struct host_service service;
+    struct host_cluster cluster;
+    struct host_order order;
+    struct host_cluster_options nodes = {0};
+    uint64_t start = host_now_us();
+    memset(&service, 0, sizeof service);
+    memset(&order, 0, sizeof order);
+    settle(options, result);
+    nodes.nodes = result->nodes;
+    nodes.memory = options->memory;
+    nodes.window = options->window;
+    nodes.program = options->node_program;
+    if (host_cluster_start(&cluster, &nodes, error) != 0) {
+        return error->code;
+    }
+    service.cluster = &cluster;
+    service.window = options->window;
+    service.hindrance = options->hindrance;
+    service.show_progress = options->progress && !options->quiet;
+    int status = host_service_start(&service, error);
+    result->time_start_up_s = seconds_since(start);
+    start = host_now_us();
+    if (status == 0) {
+        status = host_order_make(
+            &order, options->input == NULL ? "points" : options->input,
+            points->xyz, points->count, options->partition,
+            result->strategy == HOST_SEQUENTIAL ? 1 : result->nodes,
+            options->index == INCODE_GRID, error);
+        result->time_order_s = seconds_since(start);
+    }
+    if (status == 0) {
+        result->rows = order.rows;
+        result->points = order.points;
+        result->duplicates = order.duplicates;
+        status = run_service(options, &order, &cluster, &service, tets, result,
+                             error);
+    }
+    result->time_triangulation_s = seconds_since(start);
+    result->tetrahedra = tets->count;
+    host_service_end(&service);
+    if (status == 0) {
+        status =
+            host_hull_facets(tets, (uint64_t)order.bricks * INCODE_BRICK_POINTS,
+                             &result->hull_facets, error);
+    }
+    if (status == 0) {
+        start = host_now_us();
+        host_tetrahedra_map(tets, order.row);
+        result->time_triangulation_s += seconds_since(start);
+    }
+    host_order_free(&order);
+    return status;
+}
+
+/* Whether standard output takes tetrahedra or statistics. */
+static bool stdout_is_data(const struct host_run_options *options)
+{
+    bool data = options->stats != NULL && strcmp(options->stats, "-") == 0;
+    for (unsigned i = 0; i < options->outputs; i++) {
+        data = data || strcmp(options->output[i], "-") == 0;
+    }
+    return data;
+}
+
+/* Outputs that were whole before a later one failed: a failed run leaves
+ * none. */
+static void remove_outputs(const struct host_run_options *options,
+                           unsigned count)
+{
+    static const char *const beside[] = {".ele", ".node", ".neigh", ".face"};
+    for (unsigned i = 0; i < count; i++) {
+        const char *path = options->output[i];
+        size_t length = strlen(path);
+        char name[4096];
+        if (strcmp(path, "-") == 0 || length + 8 > sizeof name) {
+            continue;
+        }
+        (void)unlink(path);
+        if (length > 4 && strcmp(path + length - 4, ".ele") == 0) {
+            for (unsigned k = 0; k < 4; k++) {
+                snprintf(name, sizeof name, "%.*s%s", (int)length - 4, path,
+                         beside[k]);
+                (void)unlink(name);
+            }
+        }
+    }
+}
+
+static int check_outputs(const struct host_run_options *options,
+                         struct host_error *error)
+{
+    if (options->stats != NULL && strcmp(options->stats, "-") != 0 &&
+        host_write_probe(options->stats, error) != 0) {
+        return error->code;
+    }
+    for (unsigned i = 0; i < options->outputs; i++) {
+        if (host_write_check(options->output[i], error) != 0 ||
+            host_write_probe(options->output[i], error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+static int verify(const struct host_points *points,
+                  struct host_tetrahedra *tets, struct host_run_result *result,
+                  struct host_error *error)
+{
+    uint64_t start = host_now_us();
+    int status = host_verify(points, tets, &result->check, error);
+    result->time_verify_s = seconds_since(start);
+    result->verified = status == 0;
+    if (status == HOST_UNVERIFIED) {
+        fputs(result->check.text, stderr);
+    }
+    return status;
+}
+
+/* Order, check, digest and files, once the tetrahedra are here. */
+static int finish(const struct host_run_options *options,
+                  const struct host_points *points,
+                  struct host_tetrahedra *tets, struct host_run_result *result,
+                  struct host_error *error)
+{
+    uint64_t start = host_now_us();
+    host_tetrahedra_sort(tets);
+    host_digest(tets, &result->digest);
+    result->time_write_s = seconds_since(start);
+    if (options->verify && verify(points, tets, result, error) != 0) {
+        return error->code;
+    }
+    start = host_now_us();
+    for (unsigned i = 0; i < options->outputs; i++) {
+        if (host_write(options->output[i], points, tets, error) != 0) {
+            remove_outputs(options, i);
+            return error->code;
+        }
+    }
+    result->time_write_s += seconds_since(start);
+    return 0;
+}
+
+/* The same on one node, for the table's speed-up. */
+static int run_alone(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_run_result *alone, struct host_error *error)
+{
+    struct host_run_options one = *options;
+    struct host_tetrahedra tets = {0};
+    one.nodes = 1;
+    one.strategy = HOST_SEQUENTIAL;
+    int status = host_triangulate(&one, points, &tets, alone, error);
+    host_tetrahedra_free(&tets);
+    return status;
+}
+
+static int run_on(const struct host_run_options *options,
+                  const struct host_points *points,
+                  struct host_run_result *result, struct host_run_result *alone,
+                  struct host_error *error)
+{
+    struct host_tetrahedra tets = {0};
+    alone->time_io_s = result->time_read_s;
+    if (options->table && run_alone(options, points, alone, error) != 0) {
+        return error->code;
+    }
+    result->time_io_s = result->time_read_s;
+    int status = host_triangulate(options, points, &tets, result, error);
+    if (status == 0) {
+        status = finish(options, points, &tets, result, error);
+    }
+    host_tetrahedra_free(&tets);
+    return status;
+}
+
+int host_run(const struct host_run_options *options,
+             struct host_run_result *result, struct host_error *error)
+{
+    static struct host_run_result alone;
+    struct host_points points = {0};
+    uint64_t start = host_now_us();
+    memset(result, 0, sizeof *result);
+    memset(&alone, 0, sizeof alone);
+    if (check_outputs(options, error) != 0) {
+        return error->code;
+    }
+    int status = host_points_read(options->input, &points, error);
+    result->time_read_s = seconds_since(start);
+    if (status == 0) {
+        status = run_on(options, &points, result, &alone, error);
+    }
+    host_points_free(&points);
+    result->host_peak_bytes = peak_bytes();
+    result->time_total_s = seconds_since(start);
+    if (status == 0 && options->stats != NULL) {
+        status = host_stats_write(options->stats, result, error);
+    }
+    if (status == 0 && !options->quiet) {
+        host_report_run(stdout_is_data(options) ? stderr : stdout, options,
+                        result, options->table ? &alone : NULL);
+    }
+    return status;
+}

@@ -1,0 +1,82 @@
+/* `incode run`: points in, a cube of nodes, tetrahedra out.
+ *
+ * Memory: 52 bytes a point and 16 a tetrahedron at the end, 108 a point while
+ * the points are ordered.  Work: the sum of its parts; the times are in the
+ * result.
+ *
+ *     host_run_defaults(&options);
+ *     options.input = "bunny.xyz";
+ *     if (host_run(&options, &result, &error) != 0) ... error.text
+ */
+#ifndef HOST_RUN_H
+#define HOST_RUN_H
+
+#include "order.h"
+#include "points.h"
+#include "service.h"
+#include "tetrahedra.h"
+#include "verify.h"
+
+enum host_strategy { HOST_SEQUENTIAL, HOST_SPATIAL, HOST_AUTO };
+
+enum { HOST_OUTPUTS_MAX = 16 };
+
+struct host_run_options {
+    const char *input;
+    const char *output[HOST_OUTPUTS_MAX];
+    unsigned outputs;
+    enum host_strategy strategy;
+    enum host_partition partition;
+    enum incode_index index;
+    enum incode_face_rule face_rule;
+    unsigned nodes; /* 0: what suits this machine */
+    uint64_t memory;
+    const char *stats; /* a file for the statistics, or NULL */
+    bool verify, quiet, progress, table;
+    /* For tests. */
+    unsigned window;
+    uint64_t shuffle_seed;
+    struct host_hindrance hindrance;
+    const char *node_program;
+};
+
+struct host_run_result {
+    uint64_t rows, points, duplicates, tetrahedra, hull_facets;
+    struct host_digest digest;
+    enum host_strategy strategy; /* the one taken */
+    enum host_partition partition;
+    enum incode_index index;
+    unsigned nodes;
+    uint64_t memory;
+    double time_total_s, time_read_s, time_order_s, time_io_s;
+    double time_start_up_s, time_triangulation_s, time_verify_s, time_write_s;
+    double t_min_s, t_max_s; /* of the nodes that worked */
+    uint64_t host_peak_bytes;
+    uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
+    uint64_t retransmitted, faces_spilled;
+    uint64_t candidates, candidates_histogram[24];
+    uint64_t vertices, vertices_waited;
+    struct host_node_report node[HOST_NODES_MAX];
+    bool limited; /* the kernel held the nodes to their memory */
+    bool verified;
+    struct host_verify_report check;
+};
+
+void host_run_defaults(struct host_run_options *options);
+
+/* The names of the enumerations, as options and statistics have them. */
+const char *host_strategy_name(enum host_strategy strategy);
+const char *host_partition_name(enum host_partition partition);
+const char *host_index_name(enum incode_index index);
+
+/* Triangulates points: tets become rows of points, in no order. */
+int host_triangulate(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_tetrahedra *tets,
+                     struct host_run_result *result, struct host_error *error);
+
+/* The whole command: reads, triangulates, verifies, writes. */
+int host_run(const struct host_run_options *options,
+             struct host_run_result *result, struct host_error *error);
+
+#endif
