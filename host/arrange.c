@@ -13,7 +13,8 @@ enum {
 };
 
 void host_arrange_box(const struct host_item *items, size_t n, double lo[3],
-                      double hi[3]) {
+                      double hi[3])
+{
     double l0 = INFINITY, l1 = INFINITY, l2 = INFINITY;
     double h0 = -INFINITY, h1 = -INFINITY, h2 = -INFINITY;
     for (size_t i = 0; i < n; i++) {
@@ -29,7 +30,8 @@ void host_arrange_box(const struct host_item *items, size_t n, double lo[3],
     hi[0] = h0, hi[1] = h1, hi[2] = h2;
 }
 
-int host_arrange_longest(const double lo[3], const double hi[3]) {
+int host_arrange_longest(const double lo[3], const double hi[3])
+{
     int longest = 0;
     double best = -1;
     for (int d = 0; d < 3; d++) {
@@ -46,7 +48,8 @@ int host_arrange_longest(const double lo[3], const double hi[3]) {
 /* Both partitions move by an unconditional exchange, since the outcome of the
  * comparison is a coin toss that no branch predictor learns. */
 static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
-                             double pivot) {
+                             double pivot)
+{
     size_t m = 0;
     for (size_t i = 0; i < n; i++) {
         struct host_item t = a[i];
@@ -58,7 +61,8 @@ static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
 }
 
 static size_t partition_not_greater(struct host_item *a, size_t n, int d,
-                                    double sign, double pivot) {
+                                    double sign, double pivot)
+{
     size_t m = 0;
     for (size_t i = 0; i < n; i++) {
         struct host_item t = a[i];
@@ -69,13 +73,14 @@ static size_t partition_not_greater(struct host_item *a, size_t n, int d,
     return m;
 }
 
-size_t host_arrange_below(struct host_item *items, size_t n, int d,
-                          double wall) {
+size_t host_arrange_below(struct host_item *items, size_t n, int d, double wall)
+{
     return partition_less(items, n, d, 1, wall);
 }
 
 static int less(const struct host_item *a, const struct host_item *b,
-                const int order[3], double sign) {
+                const int order[3], double sign)
+{
     for (int i = 0; i < 3; i++) {
         double p = sign * a->c[order[i]], q = sign * b->c[order[i]];
         if (p != q) {
@@ -86,7 +91,8 @@ static int less(const struct host_item *a, const struct host_item *b,
 }
 
 static void insertion_sort(struct host_item *a, size_t n, const int order[3],
-                           double sign) {
+                           double sign)
+{
     for (size_t i = 1; i < n; i++) {
         struct host_item t = a[i];
         size_t j = i;
@@ -98,7 +104,8 @@ static void insertion_sort(struct host_item *a, size_t n, const int order[3],
     }
 }
 
-static void sort_keys(double *key, size_t n) {
+static void sort_keys(double *key, size_t n)
+{
     for (size_t gap = n < 24    ? 1
                       : n < 120 ? 10
                                 : 57;
@@ -124,7 +131,8 @@ static void sort_keys(double *key, size_t n) {
  * that the larger part falls away at once: the median of the sample is taken
  * with a margin of its standard deviation. */
 static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
-                           double sign, uint64_t *state) {
+                           double sign, uint64_t *state)
+{
     double key[SAMPLE_MAX];
     size_t s = n / 32;
     s = s < 5 ? 5 : s > SAMPLE_MAX ? SAMPLE_MAX : s;
@@ -146,7 +154,8 @@ static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
 }
 
 void host_arrange_rank(struct host_item *a, size_t n, size_t k, int d,
-                       int from_above) {
+                       int from_above)
+{
     int order[3] = {d, d == 0 ? 1 : 0, d == 2 ? 1 : 2};
     double sign = from_above ? -1 : 1;
     uint64_t state = n;
@@ -175,7 +184,8 @@ void host_arrange_rank(struct host_item *a, size_t n, size_t k, int d,
 }
 
 /* Cuts n > 8 items into leaves of 8: the first part is a multiple of 8. */
-static void arrange_leaves(struct host_item *a, size_t n) {
+static void arrange_leaves(struct host_item *a, size_t n)
+{
     while (n > INCODE_LEAF_POINTS) {
         double lo[3], hi[3];
         host_arrange_box(a, n, lo, hi);
@@ -190,7 +200,8 @@ static void arrange_leaves(struct host_item *a, size_t n) {
 /* Where to cut bricks [a, a + count): at the multiple of 32^k nearest to the
  * middle, for the largest k that leaves a fifth on either side, so that the
  * children of a box page lie together. */
-static uint32_t cut_bricks(uint32_t a, uint32_t count) {
+static uint32_t cut_bricks(uint32_t a, uint32_t count)
+{
     uint64_t first = a, last = first + count, middle = first + count / 2;
     uint64_t fifth = (count + 4) / 5;
     for (uint64_t step = (uint64_t)1 << 25; step > 1; step >>= 5) {
@@ -213,7 +224,8 @@ struct task {
     void *context;
 };
 
-static void arrange(void *argument) {
+static void arrange(void *argument)
+{
     struct task *t = argument;
     if (t->n <= INCODE_BRICK_POINTS) {
         arrange_leaves(t->items, t->n);
@@ -250,7 +262,8 @@ static void arrange(void *argument) {
 
 void host_arrange_bricks(struct host_item *items, size_t n,
                          uint32_t first_brick, unsigned threads,
-                         host_brick_sink *sink, void *context) {
+                         host_brick_sink *sink, void *context)
+{
     struct task task = {items, n, first_brick, threads, 0, sink, context};
     if (n > 0) {
         arrange(&task);

@@ -30,7 +30,8 @@ struct cut {
 
 /* Equal counts, in whole bricks and whole box pages where that costs at most
  * one part in 64 of the balance. */
-static size_t half_rank(size_t n) {
+static size_t half_rank(size_t n)
+{
     size_t half = (n + 1) / 2;
     const size_t page = (size_t)INCODE_BRICK_POINTS * INCODE_FANOUT;
     size_t step = n >= 32 * page                          ? page
@@ -39,7 +40,8 @@ static size_t half_rank(size_t n) {
     return (half + step / 2) / step * step;
 }
 
-static void cut_regions(void *argument) {
+static void cut_regions(void *argument)
+{
     struct cut *c = argument;
     struct host_item *items = c->items + c->first;
     if (c->regions == 1) {
@@ -87,7 +89,8 @@ static void cut_regions(void *argument) {
 /* --- Bricks ----------------------------------------------------------- */
 
 static void store_brick(void *context, uint32_t number,
-                        const struct host_item *items, size_t count) {
+                        const struct host_item *items, size_t count)
+{
     struct host_order *order = context;
     struct incode_brick *brick = &order->brick[number];
     uint32_t *row = order->row + (size_t)number * INCODE_BRICK_POINTS;
@@ -110,7 +113,8 @@ struct spread {
 };
 
 /* Arranges a run of regions, forking where there are threads and points. */
-static void arrange_regions(void *argument) {
+static void arrange_regions(void *argument)
+{
     struct spread *s = argument;
     if (s->regions == 1) {
         host_arrange_bricks(s->items + s->first, s->n,
@@ -139,7 +143,8 @@ static void arrange_regions(void *argument) {
     }
 }
 
-static uint64_t number_bricks(struct host_order *order) {
+static uint64_t number_bricks(struct host_order *order)
+{
     uint64_t bricks = 0;
     for (uint32_t r = 0; r < order->regions; r++) {
         struct host_region *region = &order->region[r];
@@ -154,7 +159,8 @@ static uint64_t number_bricks(struct host_order *order) {
 /* --- Box pages -------------------------------------------------------- */
 
 static void box_of_brick(const struct host_order *order, uint32_t b,
-                         struct incode_boxes *boxes, uint32_t child) {
+                         struct incode_boxes *boxes, uint32_t child)
+{
     const struct incode_brick *brick = &order->brick[b];
     const double *axis[3] = {brick->x, brick->y, brick->z};
     for (int d = 0; d < 3; d++) {
@@ -170,7 +176,8 @@ static void box_of_brick(const struct host_order *order, uint32_t b,
 }
 
 static void box_of_boxes(const struct incode_boxes *from,
-                         struct incode_boxes *boxes, uint32_t child) {
+                         struct incode_boxes *boxes, uint32_t child)
+{
     for (int d = 0; d < 3; d++) {
         double lo = INFINITY, hi = -INFINITY;
         for (int i = 0; i < INCODE_FANOUT; i++) {
@@ -182,7 +189,8 @@ static void box_of_boxes(const struct incode_boxes *from,
     }
 }
 
-static void make_boxes(struct host_order *order) {
+static void make_boxes(struct host_order *order)
+{
     const struct incode_tree *tree = &order->tree;
     for (uint32_t level = 1; level < tree->levels; level++) {
         struct incode_boxes *to =
@@ -209,13 +217,15 @@ static void make_boxes(struct host_order *order) {
 
 /* --- The uniform grid ------------------------------------------------- */
 
-static uint32_t cells_along(double extent, double side) {
+static uint32_t cells_along(double extent, double side)
+{
     double cells = extent / side;
     return cells >= 1e9 ? 1000000000u : cells > 1 ? (uint32_t)cells : 1;
 }
 
 /* Cubic cells, as many as points or a few less. */
-static void choose_cells(struct host_order *order) {
+static void choose_cells(struct host_order *order)
+{
     double extent[3], longest = 0;
     for (int d = 0; d < 3; d++) {
         extent[d] = 0.5 * order->hi[d] - 0.5 * order->lo[d];
@@ -244,7 +254,8 @@ static void choose_cells(struct host_order *order) {
     }
 }
 
-static int make_grid(struct host_order *order, struct host_error *error) {
+static int make_grid(struct host_order *order, struct host_error *error)
+{
     choose_cells(order);
     size_t cells = (size_t)order->cells[0] * order->cells[1] * order->cells[2];
     order->first_of_cell = host_map((cells + 1) * sizeof(uint32_t));
@@ -281,7 +292,8 @@ static int make_grid(struct host_order *order, struct host_error *error) {
  * first that is off that plane.  Neighbours in the arrangement are close, so
  * the second point is taken from the far end. */
 static int check_dimension(const struct host_order *order, const char *where,
-                           struct host_error *error) {
+                           struct host_error *error)
+{
     struct incode_tally tally = {0, 0};
     double a[3], b[3], c[3], d[3];
     host_vertex(order, 0, a);
@@ -307,7 +319,8 @@ static int check_dimension(const struct host_order *order, const char *where,
 
 /* --- All together ----------------------------------------------------- */
 
-static int allocate(struct host_order *order, struct host_error *error) {
+static int allocate(struct host_order *order, struct host_error *error)
+{
     size_t bricks = order->bricks;
     order->brick = host_map(bricks * sizeof *order->brick);
     order->fill = host_map(bricks);
@@ -323,7 +336,8 @@ static int allocate(struct host_order *order, struct host_error *error) {
 
 static int arrange_items(struct host_order *order, struct host_item *items,
                          enum host_partition partition,
-                         struct host_error *error) {
+                         struct host_error *error)
+{
     struct cut cut = {.order = order,
                       .items = items,
                       .partition = partition,
@@ -358,7 +372,8 @@ static int arrange_items(struct host_order *order, struct host_item *items,
 int host_order_make(struct host_order *order, const char *where,
                     const double *xyz, uint64_t rows,
                     enum host_partition partition, uint32_t regions, bool grid,
-                    struct host_error *error) {
+                    struct host_error *error)
+{
     *order = (struct host_order){.rows = rows, .regions = regions};
     struct host_unique unique;
     if (host_unique_make(&unique, xyz, rows, error) != 0) {
@@ -394,7 +409,8 @@ int host_order_make(struct host_order *order, const char *where,
     return error->code;
 }
 
-void host_order_free(struct host_order *order) {
+void host_order_free(struct host_order *order)
+{
     size_t bricks = order->bricks;
     size_t cells = (size_t)order->cells[0] * order->cells[1] * order->cells[2];
     host_unmap(order->brick, bricks * sizeof *order->brick);
@@ -409,7 +425,8 @@ void host_order_free(struct host_order *order) {
 }
 
 static size_t copy_words(const uint32_t *from, size_t count, uint32_t page,
-                         void *buffer) {
+                         void *buffer)
+{
     size_t first = (size_t)page * INCODE_PAGE_WORDS;
     size_t n = first < count ? count - first : 0;
     n = n > INCODE_PAGE_WORDS ? INCODE_PAGE_WORDS : n;
@@ -420,7 +437,8 @@ static size_t copy_words(const uint32_t *from, size_t count, uint32_t page,
     return INCODE_PAGE_BYTES;
 }
 
-size_t host_page(const struct host_order *order, uint32_t page, void *buffer) {
+size_t host_page(const struct host_order *order, uint32_t page, void *buffer)
+{
     const struct incode_tree *tree = &order->tree;
     if (page < order->bricks) {
         const struct incode_brick *brick = &order->brick[page];

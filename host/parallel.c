@@ -4,7 +4,8 @@
 
 enum { THREADS_MAX = 16 };
 
-unsigned host_threads(void) {
+unsigned host_threads(void)
+{
     cpu_set_t set;
     if (sched_getaffinity(0, sizeof set, &set) != 0) {
         return 1;
@@ -13,14 +14,16 @@ unsigned host_threads(void) {
     return count < 1 ? 1 : count > THREADS_MAX ? THREADS_MAX : (unsigned)count;
 }
 
-static void *trampoline(void *argument) {
+static void *trampoline(void *argument)
+{
     struct host_fork *fork = argument;
     fork->function(fork->argument);
     return NULL;
 }
 
 void host_fork_start(struct host_fork *fork, void (*function)(void *),
-                     void *argument) {
+                     void *argument)
+{
     fork->function = function;
     fork->argument = argument;
     fork->running = pthread_create(&fork->thread, NULL, trampoline, fork) == 0;
@@ -29,7 +32,8 @@ void host_fork_start(struct host_fork *fork, void (*function)(void *),
     }
 }
 
-void host_fork_join(struct host_fork *fork) {
+void host_fork_join(struct host_fork *fork)
+{
     if (fork->running) {
         (void)pthread_join(fork->thread, NULL);
         fork->running = false;
@@ -42,13 +46,15 @@ struct part {
     unsigned number;
 };
 
-static void run_part(void *argument) {
+static void run_part(void *argument)
+{
     struct part *part = argument;
     part->function(part->context, part->number);
 }
 
 void host_fork_all(unsigned parts, void (*function)(void *, unsigned),
-                   void *context) {
+                   void *context)
+{
     struct host_fork fork[THREADS_MAX];
     struct part part[THREADS_MAX];
     for (unsigned i = 0; i + 1 < parts; i++) {

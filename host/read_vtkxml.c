@@ -296,6 +296,7 @@ static size_t find_appended(struct xml *x)
 static void parse(struct xml *x, size_t bytes)
 {
     const char *at = (const char *)x->source->data;
+    bool whole = bytes == x->source->bytes; /* else appended data follows */
     XML_SetUserData(x->parser, x);
     XML_SetElementHandler(x->parser, start_element, end_element);
     XML_SetCharacterDataHandler(x->parser, characters);
