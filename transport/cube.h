@@ -6,8 +6,8 @@
  *
  * Memory: one arena of cube_arena_bytes(): a send and a receive window for each
  * link, nothing shared between links (Dally and Seitz, 1987: e-cube routing is
- * free of deadlock with buffers of each channel's own).  Work: cube_poll handles
- * at most one window of frames a link.
+ * free of deadlock with buffers of each channel's own).  Work: cube_poll
+ * handles at most one window of frames a link.
  *
  *     cube_init(&cube, arena, bytes, &config);
  *     while (cube_read(&cube, &message)) { use; cube_release(&cube); }
@@ -31,12 +31,18 @@ enum {
 };
 
 struct cube_config {
-    uint16_t self;        /* 0 .. 2^dimension - 1, or CUBE_HOST */
+    uint16_t self; /* 0 .. 2^dimension - 1, or CUBE_HOST */
     uint8_t dimension;
-    uint16_t window;      /* frames a link and direction, 1 .. LINK_WINDOW_MAX */
-    uint32_t epoch;       /* of this start of the node, never repeated */
+    uint16_t window; /* frames a link and direction, 1 .. LINK_WINDOW_MAX */
+    uint32_t epoch;  /* of this start of the node, never repeated */
     struct link_pipe pipes[CUBE_LINKS_MAX]; /* the bytes of each link; the host
                                                uses pipes[0] alone */
+    /* Zero means the default. */
+    uint16_t host_window;   /* of the host's link, at both ends; `window` */
+    uint16_t frame_payload; /* bytes, a multiple of 8, the same on both ends of
+                               a wire; a message a frame */
+    uint16_t staging;       /* frames encoded ahead of the pipe; see link.h */
+    uint32_t timeout_min_us, ack_delay_us; /* see link.h */
 };
 
 struct cube_message {
@@ -44,6 +50,13 @@ struct cube_message {
     uint16_t size;   /* bytes of data */
     uint8_t type;    /* the application's */
     const uint8_t *data;
+};
+
+struct cube_statistics {
+    uint64_t written, read; /* messages of this node */
+    uint64_t passed_on;     /* copies of messages of others */
+    uint64_t misrouted;     /* dropped: no such node, or too many hops */
+    uint64_t blocked;       /* polls in which a message found no room ahead */
 };
 
 struct cube; /* opaque: lives at the start of its arena */
@@ -59,8 +72,8 @@ int cube_poll(struct cube *cube, uint64_t now_us);
 /* Queues a message.  dest: a node, CUBE_HOST or CUBE_ALL (every node but the
  * sender, along the binomial tree rooted at the sender; the host's goes by
  * node 0).  0, or CUBE_AGAIN while the first link has no room. */
-int cube_write(struct cube *cube, uint16_t dest, uint8_t type,
-               const void *data, size_t size);
+int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
+               size_t size);
 #define CUBE_AGAIN (-1)
 
 /* Messages cube_write would take now towards dest. */
@@ -75,6 +88,16 @@ void cube_release(struct cube *cube);
 const struct link_statistics *cube_link_statistics(const struct cube *cube,
                                                    unsigned d);
 enum link_state cube_link_state(const struct cube *cube, unsigned d);
+const struct link_peer *cube_link_peer(const struct cube *cube, unsigned d);
+unsigned cube_links(const struct cube *cube);
+const struct cube_statistics *cube_statistics(const struct cube *cube);
+
+/* True when the neighbours have acknowledged all that is written here and no
+ * message waits to be passed on: a node may leave then. */
+bool cube_idle(const struct cube *cube);
+
+/* Says farewell on all links once they are idle, or at deadline_us. */
+void cube_close(struct cube *cube, uint64_t deadline_us);
 
 /* Microseconds until cube_poll must be called again even if no byte comes. */
 uint64_t cube_next_due_us(const struct cube *cube, uint64_t now_us);

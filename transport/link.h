@@ -132,8 +132,11 @@ struct link;
 struct link *link_init(void *memory, size_t bytes,
                        const struct link_config *config);
 
-/* Moves bytes and frames. Returns the number of frames handled, in and out. */
+/* Moves bytes and frames. Returns the number of frames handled, in and out.
+ * The two halves, for one who has something to do between them. */
 int link_poll(struct link *link, uint64_t now_us);
+int link_poll_receive(struct link *link, uint64_t now_us);
+int link_poll_send(struct link *link, uint64_t now_us);
 
 /* Queues a message made of two parts: 0, or LINK_AGAIN while there is no room.
  * Messages may be queued before the peer was heard. */

@@ -1,0 +1,443 @@
+#include "cube.h"
+
+#include <string.h>
+
+#include "check.h"
+
+/* A message's own header: dest, source (16 bits, low byte first), type, hops,
+ * two bytes of zero. */
+enum { HEAD = 8, MESSAGE_MAX = HEAD + CUBE_PAYLOAD_MAX };
+
+enum { LOCAL = CUBE_LINKS_MAX }; /* bit of this node among the ways */
+
+/* The oldest message of a link, while it is under way. */
+struct arrival {
+    struct link_message message;
+    uint32_t ways; /* bits of links that still need a copy, and LOCAL */
+    bool there;
+};
+
+struct cube {
+    struct cube_config config;
+    struct cube_statistics statistics;
+    struct link *links[CUBE_LINKS_MAX];
+    struct arrival arrivals[CUBE_LINKS_MAX];
+    unsigned count;
+    unsigned turn;      /* link that is served first */
+    unsigned held;      /* link of the message being read, or CUBE_LINKS_MAX */
+    uint32_t kept_back; /* links whose last slot is left to this node once */
+    bool again;         /* a message waits only for that turn to pass */
+};
+
+/* --- which way ------------------------------------------------------------ */
+
+static bool is_host(const struct cube *cube)
+{
+    return cube->config.self == CUBE_HOST;
+}
+
+static unsigned nodes(const struct cube *cube)
+{
+    return 1u << cube->config.dimension;
+}
+
+/* E-cube: the lowest dimension in which we differ; the host is behind node
+ * 0's last link. */
+static uint32_t way_to(const struct cube *cube, unsigned dest)
+{
+    unsigned self = cube->config.self;
+    if (is_host(cube)) {
+        return 1;
+    }
+    if (dest == CUBE_HOST) {
+        dest = 0;
+        if (self == 0) {
+            return (uint32_t)1 << cube->config.dimension;
+        }
+    }
+    return dest == self ? (uint32_t)1 << LOCAL : (self ^ dest) & -(self ^ dest);
+}
+
+/* The binomial tree rooted at source: from a node whose relative address ends
+ * at bit h, on along the dimensions above h.  Its paths are those of e-cube. */
+static uint32_t ways_to_all(const struct cube *cube, unsigned source)
+{
+    unsigned root = source == CUBE_HOST ? 0 : source;
+    unsigned relative = cube->config.self ^ root;
+    if (is_host(cube)) {
+        return 1;
+    }
+    unsigned above =
+        relative == 0 ? 0 : 32u - (unsigned)__builtin_clz(relative);
+    uint32_t ways = (nodes(cube) - 1) >> above << above;
+    return cube->config.self == source ? ways : ways | (uint32_t)1 << LOCAL;
+}
+
+/* Of a message that came in; 0: it has lost its way. */
+static uint32_t ways_of(const struct cube *cube, unsigned source, unsigned dest)
+{
+    bool source_known = source < nodes(cube) || source == CUBE_HOST;
+    bool dest_known =
+        dest < nodes(cube) || dest == CUBE_HOST || dest == CUBE_ALL;
+    if (!source_known || !dest_known || source == cube->config.self) {
+        return 0;
+    }
+    if (is_host(cube)) {
+        return dest == CUBE_HOST ? (uint32_t)1 << LOCAL : 0;
+    }
+    return dest == CUBE_ALL ? ways_to_all(cube, source) : way_to(cube, dest);
+}
+
+/* --- memory --------------------------------------------------------------- */
+
+static struct link_config link_config_of(const struct cube_config *config,
+                                         unsigned d)
+{
+    bool host = config->self == CUBE_HOST;
+    bool to_host = !host && d == config->dimension;
+    struct link_config c;
+    memset(&c, 0, sizeof c);
+    c.pipe = config->pipes[d];
+    c.epoch = config->epoch;
+    c.node = config->self;
+    c.port = (uint8_t)d;
+    c.peer_node = host      ? 0
+                  : to_host ? CUBE_HOST
+                            : (uint16_t)(config->self ^ 1u << d);
+    c.peer_port = host ? config->dimension : to_host ? 0 : (uint8_t)d;
+    c.window = (host || to_host) && config->host_window != 0
+                   ? config->host_window
+                   : config->window;
+    c.message_max = MESSAGE_MAX;
+    c.frame_payload = config->frame_payload;
+    c.staging = config->staging;
+    c.timeout_min_us = config->timeout_min_us;
+    c.ack_delay_us = config->ack_delay_us;
+    return c;
+}
+
+static unsigned links_of(const struct cube_config *config)
+{
+    if (config->self == CUBE_HOST) {
+        return 1;
+    }
+    return config->dimension + (config->self == 0 ? 1u : 0u);
+}
+
+static bool sound(const struct cube_config *config)
+{
+    return config->dimension <= CUBE_DIMENSION_MAX &&
+           (config->self == CUBE_HOST ||
+            config->self < 1u << config->dimension);
+}
+
+static size_t up64(size_t bytes)
+{
+    return (bytes + 63) / 64 * 64;
+}
+
+size_t cube_arena_bytes(const struct cube_config *config)
+{
+    size_t bytes = up64(sizeof(struct cube));
+    if (!sound(config)) {
+        return 0;
+    }
+    for (unsigned d = 0; d < links_of(config); d++) {
+        struct link_config c = link_config_of(config, d);
+        size_t link = link_bytes(&c);
+        if (link == 0) {
+            return 0;
+        }
+        bytes += up64(link);
+    }
+    return bytes;
+}
+
+struct cube *cube_init(void *arena, size_t bytes,
+                       const struct cube_config *config)
+{
+    size_t needed = cube_arena_bytes(config);
+    if (needed == 0 || bytes < needed) {
+        return NULL;
+    }
+    struct cube *cube = arena;
+    uint8_t *rest = (uint8_t *)arena + up64(sizeof *cube);
+    memset(cube, 0, sizeof *cube);
+    cube->config = *config;
+    cube->count = links_of(config);
+    cube->held = CUBE_LINKS_MAX;
+    for (unsigned d = 0; d < cube->count; d++) {
+        struct link_config c = link_config_of(config, d);
+        cube->links[d] = link_init(rest, link_bytes(&c), &c);
+        if (cube->links[d] == NULL) {
+            return NULL;
+        }
+        rest += up64(link_bytes(&c));
+    }
+    return cube;
+}
+
+/* --- passing on ----------------------------------------------------------- */
+
+static unsigned field16(const uint8_t *bytes)
+{
+    return bytes[0] | (unsigned)bytes[1] << 8;
+}
+
+/* The oldest message of link d, and where it must still go. */
+static bool look_at(struct cube *cube, unsigned d)
+{
+    struct arrival *a = &cube->arrivals[d];
+    while (!a->there && link_read(cube->links[d], &a->message)) {
+        const uint8_t *head = a->message.data;
+        bool whole = a->message.size >= HEAD;
+        unsigned hops_max = cube->config.dimension + 2u;
+        a->ways = whole && head[5] < hops_max
+                      ? ways_of(cube, field16(head + 2), field16(head))
+                      : 0;
+        a->ways &= ~((uint32_t)1 << d); /* never back */
+        if (a->ways == 0) {
+            cube->statistics.misrouted++;
+            link_release(cube->links[d]);
+        } else {
+            a->there = true;
+        }
+    }
+    return a->there;
+}
+
+static void done_with(struct cube *cube, unsigned d)
+{
+    cube->arrivals[d].there = false;
+    link_release(cube->links[d]);
+}
+
+/* A link's last free slot goes to messages of others and of this node in
+ * turn, so that neither starves. */
+static bool may_pass_on(struct cube *cube, unsigned out, size_t size)
+{
+    unsigned room = link_room(cube->links[out], size);
+    uint32_t bit = (uint32_t)1 << out;
+    if (room == 0) {
+        return false;
+    }
+    if (room == 1 && (cube->kept_back & bit) != 0) {
+        cube->again = true;
+        return false;
+    }
+    if (room == 1) {
+        cube->kept_back |= bit;
+    }
+    return true;
+}
+
+static void pass_on(struct cube *cube, struct arrival *a, unsigned out)
+{
+    uint8_t head[HEAD];
+    const struct link_message *m = &a->message;
+    memcpy(head, m->data, HEAD);
+    head[5]++;
+    int status = link_write(cube->links[out], head, HEAD, m->data + HEAD,
+                            m->size - HEAD);
+    LINK_ASSERT(status == 0);
+    cube->statistics.passed_on++;
+}
+
+/* Passes on what link d has brought, up to a message that must wait: for room
+ * ahead, or for this node to read it. */
+static int pass_on_from(struct cube *cube, unsigned d)
+{
+    struct arrival *a = &cube->arrivals[d];
+    int passed = 0;
+    unsigned most = LINK_WINDOW_MAX;
+    while (most-- > 0 && look_at(cube, d)) {
+        for (unsigned out = 0; out < cube->count; out++) {
+            uint32_t bit = (uint32_t)1 << out;
+            if ((a->ways & bit) != 0 &&
+                may_pass_on(cube, out, a->message.size)) {
+                pass_on(cube, a, out);
+                a->ways &= ~bit;
+                passed++;
+            }
+        }
+        if (a->ways != 0) {
+            cube->statistics.blocked += a->ways != (uint32_t)1 << LOCAL;
+            break;
+        }
+        done_with(cube, d);
+    }
+    return passed;
+}
+
+int cube_poll(struct cube *cube, uint64_t now_us)
+{
+    int count = 0;
+    cube->again = false;
+    for (unsigned d = 0; d < cube->count; d++) {
+        count += link_poll_receive(cube->links[d], now_us);
+    }
+    cube->turn = cube->turn + 1 >= cube->count ? 0 : cube->turn + 1;
+    uint32_t kept_before = cube->kept_back;
+    for (unsigned i = 0; i < cube->count; i++) {
+        unsigned d = cube->turn + i;
+        count += pass_on_from(cube, d < cube->count ? d : d - cube->count);
+    }
+    for (unsigned d = 0; d < cube->count; d++) {
+        /* Kept back for one poll with room, no longer. */
+        if (link_room(cube->links[d], MESSAGE_MAX) > 0) {
+            cube->kept_back &= ~(kept_before & (uint32_t)1 << d);
+        }
+        count += link_poll_send(cube->links[d], now_us);
+    }
+    return count;
+}
+
+/* --- messages of this node ------------------------------------------------ */
+
+static uint32_t ways_out(const struct cube *cube, uint16_t dest)
+{
+    LINK_ASSERT(dest != cube->config.self);
+    LINK_ASSERT(dest == CUBE_ALL || dest == CUBE_HOST || dest < nodes(cube));
+    return dest == CUBE_ALL ? ways_to_all(cube, cube->config.self)
+                            : way_to(cube, dest);
+}
+
+static unsigned room_on(const struct cube *cube, uint32_t ways, size_t size)
+{
+    unsigned room = LINK_WINDOW_MAX;
+    for (unsigned d = 0; d < cube->count; d++) {
+        unsigned here = link_room(cube->links[d], size);
+        if ((ways & (uint32_t)1 << d) != 0 && here < room) {
+            room = here;
+        }
+    }
+    return room;
+}
+
+int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
+               size_t size)
+{
+    uint16_t self = cube->config.self;
+    uint32_t ways = ways_out(cube, dest);
+    uint8_t head[HEAD] = {(uint8_t)dest,
+                          (uint8_t)(dest >> 8),
+                          (uint8_t)self,
+                          (uint8_t)(self >> 8),
+                          type,
+                          0,
+                          0,
+                          0};
+    LINK_ASSERT(size <= CUBE_PAYLOAD_MAX);
+    if (room_on(cube, ways, HEAD + size) == 0) {
+        return CUBE_AGAIN;
+    }
+    for (unsigned d = 0; d < cube->count; d++) {
+        if ((ways & (uint32_t)1 << d) != 0) {
+            int status = link_write(cube->links[d], head, HEAD, data, size);
+            LINK_ASSERT(status == 0);
+        }
+    }
+    cube->kept_back &= ~ways;
+    cube->statistics.written++;
+    return 0;
+}
+
+unsigned cube_room(const struct cube *cube, uint16_t dest)
+{
+    return room_on(cube, ways_out(cube, dest), MESSAGE_MAX);
+}
+
+bool cube_read(struct cube *cube, struct cube_message *message)
+{
+    LINK_ASSERT(cube->held == CUBE_LINKS_MAX);
+    for (unsigned i = 0; i < cube->count; i++) {
+        unsigned d = cube->turn + i;
+        d = d < cube->count ? d : d - cube->count;
+        pass_on_from(cube, d);
+        struct arrival *a = &cube->arrivals[d];
+        if (!a->there || (a->ways & (uint32_t)1 << LOCAL) == 0) {
+            continue;
+        }
+        const uint8_t *head = a->message.data;
+        message->source = (uint16_t)field16(head + 2);
+        message->type = head[4];
+        message->size = (uint16_t)(a->message.size - HEAD);
+        message->data = head + HEAD;
+        cube->held = d;
+        return true;
+    }
+    return false;
+}
+
+void cube_release(struct cube *cube)
+{
+    unsigned d = cube->held;
+    LINK_ASSERT(d < cube->count);
+    struct arrival *a = &cube->arrivals[d];
+    cube->held = CUBE_LINKS_MAX;
+    cube->statistics.read++;
+    a->ways &= ~((uint32_t)1 << LOCAL);
+    if (a->ways == 0) {
+        done_with(cube, d);
+    }
+}
+
+/* --- state ---------------------------------------------------------------- */
+
+unsigned cube_links(const struct cube *cube)
+{
+    return cube->count;
+}
+
+const struct link_statistics *cube_link_statistics(const struct cube *cube,
+                                                   unsigned d)
+{
+    LINK_ASSERT(d < cube->count);
+    return link_statistics(cube->links[d]);
+}
+
+enum link_state cube_link_state(const struct cube *cube, unsigned d)
+{
+    LINK_ASSERT(d < cube->count);
+    return link_state(cube->links[d]);
+}
+
+const struct link_peer *cube_link_peer(const struct cube *cube, unsigned d)
+{
+    LINK_ASSERT(d < cube->count);
+    return link_peer(cube->links[d]);
+}
+
+const struct cube_statistics *cube_statistics(const struct cube *cube)
+{
+    return &cube->statistics;
+}
+
+bool cube_idle(const struct cube *cube)
+{
+    for (unsigned d = 0; d < cube->count; d++) {
+        const struct arrival *a = &cube->arrivals[d];
+        bool under_way = a->there && (a->ways & ~((uint32_t)1 << LOCAL)) != 0;
+        if (under_way || !link_idle(cube->links[d])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+void cube_close(struct cube *cube, uint64_t deadline_us)
+{
+    for (unsigned d = 0; d < cube->count; d++) {
+        link_close(cube->links[d], deadline_us);
+    }
+}
+
+uint64_t cube_next_due_us(const struct cube *cube, uint64_t now_us)
+{
+    uint64_t due = cube->again ? 0 : UINT64_MAX;
+    for (unsigned d = 0; d < cube->count; d++) {
+        uint64_t link = link_next_due_us(cube->links[d], now_us);
+        due = link < due ? link : due;
+    }
+    return due;
+}

@@ -1,0 +1,182 @@
+#include "tcp.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+/* --- the pipe ------------------------------------------------------------- */
+
+/* Bytes moved, 0 for the present, or closed. */
+static int result(struct tcp_pipe *pipe, ssize_t moved)
+{
+    if (moved >= 0) {
+        return (int)moved;
+    }
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ||
+        errno == ENOBUFS) {
+        return 0;
+    }
+    pipe->closed = true;
+    return LINK_PIPE_CLOSED;
+}
+
+static int tcp_send(void *context, const uint8_t *bytes, size_t size)
+{
+    struct tcp_pipe *pipe = context;
+    if (pipe->closed) {
+        return LINK_PIPE_CLOSED;
+    }
+    int taken =
+        result(pipe, send(pipe->fd, bytes, size, MSG_DONTWAIT | MSG_NOSIGNAL));
+    pipe->blocked = taken >= 0 && (size_t)taken < size;
+    return taken;
+}
+
+static int tcp_receive(void *context, uint8_t *bytes, size_t size)
+{
+    struct tcp_pipe *pipe = context;
+    if (pipe->closed) {
+        return LINK_PIPE_CLOSED;
+    }
+    if (size == 0) {
+        return 0;
+    }
+    ssize_t got = recv(pipe->fd, bytes, size, MSG_DONTWAIT);
+    if (got == 0) {
+        pipe->closed = true;
+        return LINK_PIPE_CLOSED;
+    }
+    return result(pipe, got);
+}
+
+void tcp_pipe_init(struct tcp_pipe *pipe, int fd)
+{
+    *pipe = (struct tcp_pipe){.fd = fd, .blocked = false, .closed = fd < 0};
+}
+
+struct link_pipe tcp_link_pipe(struct tcp_pipe *pipe)
+{
+    return (struct link_pipe){pipe, tcp_send, tcp_receive};
+}
+
+short tcp_events(const struct tcp_pipe *pipe)
+{
+    if (pipe->closed) {
+        return 0;
+    }
+    return pipe->blocked ? POLLIN | POLLOUT : POLLIN;
+}
+
+/* --- sockets -------------------------------------------------------------- */
+
+/* Fixed before the connection is made, when the window's scale is agreed. */
+static int fix_buffers(int fd)
+{
+    int bytes = TCP_BUFFER_BYTES;
+    if (setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes) != 0) {
+        return -1;
+    }
+    return setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+}
+
+int tcp_prepare(int fd)
+{
+    int on = 1;
+    int flags = fcntl(fd, F_GETFL);
+    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) != 0 ||
+        fcntl(fd, F_SETFD, FD_CLOEXEC) != 0 || fix_buffers(fd) != 0) {
+        return -1;
+    }
+    return setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+int tcp_buffers(int fd, int *send_bytes, int *receive_bytes)
+{
+    socklen_t size = sizeof *send_bytes;
+    if (getsockopt(fd, SOL_SOCKET, SO_SNDBUF, send_bytes, &size) != 0) {
+        return -1;
+    }
+    size = sizeof *receive_bytes;
+    return getsockopt(fd, SOL_SOCKET, SO_RCVBUF, receive_bytes, &size);
+}
+
+/* A listener on a port of the kernel's choice. */
+static int listen_on_loopback(struct sockaddr_in *address)
+{
+    socklen_t size = sizeof *address;
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    memset(address, 0, sizeof *address);
+    address->sin_family = AF_INET;
+    address->sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (fd < 0) {
+        return -1;
+    }
+    if (fix_buffers(fd) != 0 ||
+        bind(fd, (struct sockaddr *)address, sizeof *address) != 0 ||
+        listen(fd, 8) != 0 ||
+        getsockname(fd, (struct sockaddr *)address, &size) != 0) {
+        int reason = errno;
+        close(fd);
+        errno = reason;
+        return -1;
+    }
+    return fd;
+}
+
+/* Accepts the connection that comes from `ours`, and no stranger's. */
+static int accept_ours(int listener, int ours)
+{
+    struct sockaddr_in here, there;
+    socklen_t size = sizeof here;
+    if (getsockname(ours, (struct sockaddr *)&here, &size) != 0) {
+        return -1;
+    }
+    for (;;) {
+        size = sizeof there;
+        int fd =
+            accept4(listener, (struct sockaddr *)&there, &size, SOCK_CLOEXEC);
+        if (fd < 0 && (errno == EINTR || errno == ECONNABORTED)) {
+            continue;
+        }
+        if (fd < 0 || (there.sin_port == here.sin_port &&
+                       there.sin_addr.s_addr == here.sin_addr.s_addr)) {
+            return fd;
+        }
+        close(fd);
+    }
+}
+
+int tcp_pair(int fds[2])
+{
+    struct sockaddr_in address;
+    int listener = listen_on_loopback(&address);
+    if (listener < 0) {
+        return -1;
+    }
+    fds[1] = -1;
+    fds[0] = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fds[0] >= 0 && fix_buffers(fds[0]) == 0 &&
+        connect(fds[0], (struct sockaddr *)&address, sizeof address) == 0) {
+        fds[1] = accept_ours(listener, fds[0]);
+    }
+    int reason = errno;
+    close(listener);
+    if (fds[1] >= 0 && tcp_prepare(fds[0]) == 0 && tcp_prepare(fds[1]) == 0) {
+        return 0;
+    }
+    reason = fds[1] >= 0 ? errno : reason;
+    for (int i = 0; i < 2; i++) {
+        if (fds[i] >= 0) {
+            close(fds[i]);
+        }
+        fds[i] = -1;
+    }
+    errno = reason;
+    return -1;
+}

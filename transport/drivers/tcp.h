@@ -1,0 +1,46 @@
+/* Pipes of bytes over TCP on Linux: pairs of connected sockets on loopback, and
+ * what a link needs of a socket.
+ *
+ * Memory: struct tcp_pipe here, and in the kernel TCP_BUFFER_BYTES asked for
+ * each way at each end (the kernel doubles that for its own books, and
+ * tcp_buffers tells what it gave).  Work: one system call a function, but for
+ * tcp_pair.
+ *
+ *     tcp_pair(fds);
+ *     tcp_pipe_init(&pipe, fds[0]);
+ *     config.pipe = tcp_link_pipe(&pipe);
+ */
+#ifndef TRANSPORT_DRIVERS_TCP_H
+#define TRANSPORT_DRIVERS_TCP_H
+
+#include <stdbool.h>
+
+#include "../link.h"
+
+enum { TCP_BUFFER_BYTES = 65536 };
+
+struct tcp_pipe {
+    int fd;       /* connected; -1: none */
+    bool blocked; /* had no room for all bytes at the last send */
+    bool closed;  /* the other end is gone */
+};
+
+/* Two connected sockets on 127.0.0.1, without delay, non-blocking, closed on
+ * exec: 0, or -1 and errno. */
+int tcp_pair(int fds[2]);
+
+/* Sets a connected socket up in the same way: 0, or -1 and errno. */
+int tcp_prepare(int fd);
+
+/* The socket's buffers as the kernel counts them: 0, or -1 and errno. */
+int tcp_buffers(int fd, int *send_bytes, int *receive_bytes);
+
+/* The pipe uses fd, which stays the caller's. */
+void tcp_pipe_init(struct tcp_pipe *pipe, int fd);
+struct link_pipe tcp_link_pipe(struct tcp_pipe *pipe);
+
+/* What to wait for with poll(2): POLLIN, with POLLOUT while bytes wait for
+ * room; 0 when the other end is gone. */
+short tcp_events(const struct tcp_pipe *pipe);
+
+#endif

@@ -1,0 +1,335 @@
+#include "link_internal.h"
+
+#include <string.h>
+
+#include "check.h"
+
+/* --- memory --------------------------------------------------------------- */
+
+enum { STAGING_DEFAULT = 8, TIMEOUT_FIRST_US = 200000 };
+
+static uint32_t or_default(uint32_t value, uint32_t otherwise)
+{
+    return value != 0 ? value : otherwise;
+}
+
+static struct link_config complete(const struct link_config *config)
+{
+    struct link_config c = *config;
+    unsigned staging = c.window < STAGING_DEFAULT ? c.window : STAGING_DEFAULT;
+    c.message_max = (uint16_t)or_default(c.message_max, LINK_MESSAGE_MAX);
+    c.frame_payload = (uint16_t)or_default(c.frame_payload, c.message_max);
+    c.staging = (uint16_t)or_default(c.staging, staging);
+    c.timeout_min_us = or_default(c.timeout_min_us, 20000);
+    c.timeout_max_us = or_default(c.timeout_max_us, 1000000);
+    c.ack_delay_us = or_default(c.ack_delay_us, 1000);
+    c.hello_us = or_default(c.hello_us, 50000);
+    c.keep_alive_us = or_default(c.keep_alive_us, 500000);
+    c.silence_us = or_default(c.silence_us, 3000000);
+    return c;
+}
+
+static unsigned fragments(const struct link_config *c, size_t size)
+{
+    return size == 0
+               ? 1
+               : (unsigned)((size + c->frame_payload - 1u) / c->frame_payload);
+}
+
+static bool sound(const struct link_config *c)
+{
+    return c->epoch != 0 && c->window >= 1 && c->window <= LINK_WINDOW_MAX &&
+           c->message_max <= LINK_MESSAGE_MAX &&
+           c->frame_payload >= LINK_FRAME_PAYLOAD_MIN &&
+           c->frame_payload <= LINK_FRAME_PAYLOAD_MAX &&
+           c->frame_payload % 8 == 0 &&
+           fragments(c, c->message_max) <= c->window &&
+           c->staging <= LINK_WINDOW_MAX && c->pipe.send != NULL &&
+           c->pipe.receive != NULL && c->timeout_min_us <= c->timeout_max_us;
+}
+
+static size_t up8(size_t bytes)
+{
+    return (bytes + 7) / 8 * 8;
+}
+
+/* A greeting, then `staging` frames; on the way in, one frame more that is
+ * not whole yet. */
+static size_t buffer_bytes(const struct link_config *c)
+{
+    return up8(c->staging * FRAME_ENCODED(c->frame_payload) + FRAME_SLACK +
+               FRAME_ENCODED(LINK_HELLO_SIZE) + 2);
+}
+
+static size_t receive_bytes(const struct link_config *c)
+{
+    return (size_t)c->frame_payload *
+           (c->window + fragments(c, c->message_max) - 1u);
+}
+
+size_t link_bytes(const struct link_config *config)
+{
+    struct link_config c = complete(config);
+    if (!sound(&c)) {
+        return 0;
+    }
+    return up8(sizeof(struct link)) +
+           up8(c.window * sizeof(struct link_send_slot)) +
+           up8(c.window * sizeof(struct link_receive_slot)) +
+           (size_t)c.window * c.frame_payload + receive_bytes(&c) +
+           2 * buffer_bytes(&c);
+}
+
+static void *carve(uint8_t **memory, size_t bytes)
+{
+    void *part = *memory;
+    *memory += up8(bytes);
+    return part;
+}
+
+struct link *link_init(void *memory, size_t bytes,
+                       const struct link_config *config)
+{
+    struct link_config c = complete(config);
+    size_t needed = link_bytes(config);
+    if (needed == 0 || bytes < needed || (uintptr_t)memory % 8 != 0) {
+        return NULL;
+    }
+    uint8_t *rest = memory;
+    struct link *link = carve(&rest, sizeof *link);
+    memset(link, 0, sizeof *link);
+    link->config = c;
+    link->buffer_bytes = buffer_bytes(&c);
+    link->send.slots = carve(&rest, c.window * sizeof *link->send.slots);
+    link->receive.slots = carve(&rest, c.window * sizeof *link->receive.slots);
+    link->send.payload = carve(&rest, (size_t)c.window * c.frame_payload);
+    link->receive.payload = carve(&rest, receive_bytes(&c));
+    link->in.bytes = carve(&rest, link->buffer_bytes);
+    link->out.bytes = carve(&rest, link->buffer_bytes);
+    LINK_ASSERT((size_t)(rest - (uint8_t *)memory) == needed);
+    memset(link->send.slots, 0, c.window * sizeof *link->send.slots);
+    memset(link->receive.slots, 0, c.window * sizeof *link->receive.slots);
+    link->fragments_max = (uint16_t)fragments(&c, c.message_max);
+    link->send.first = link->send.next = link->send.end = (uint16_t)c.epoch;
+    link->send.limit = link->send.first;
+    link->statistics.timeout_us = TIMEOUT_FIRST_US < c.timeout_min_us
+                                      ? c.timeout_min_us
+                                      : TIMEOUT_FIRST_US;
+    link->hello_now = true;
+    return link;
+}
+
+/* --- messages ------------------------------------------------------------- */
+
+static unsigned used(const struct link *link)
+{
+    return (uint16_t)(link->send.end - link->send.first);
+}
+
+unsigned link_room(const struct link *link, size_t size)
+{
+    if (link->closing || link->closed) {
+        return 0;
+    }
+    return (link->config.window - used(link)) / fragments(&link->config, size);
+}
+
+/* A message in two parts, from which fragments are cut. */
+struct parts {
+    const uint8_t *head, *data;
+    size_t head_left, data_left;
+};
+
+static void cut(struct parts *parts, uint8_t *out, size_t size)
+{
+    size_t n = size < parts->head_left ? size : parts->head_left;
+    if (n > 0) {
+        memcpy(out, parts->head, n);
+        parts->head += n;
+        parts->head_left -= n;
+    }
+    if (size > n) {
+        memcpy(out + n, parts->data, size - n);
+        parts->data += size - n;
+        parts->data_left -= size - n;
+    }
+}
+
+int link_write(struct link *link, const void *head, size_t head_size,
+               const void *data, size_t size)
+{
+    struct parts parts = {head, data, head_size, size};
+    struct link_sender *s = &link->send;
+    size_t left = head_size + size;
+    LINK_ASSERT(left <= link->config.message_max);
+    if (link_room(link, left) == 0) {
+        return LINK_AGAIN;
+    }
+    link->statistics.messages_sent++;
+    link->statistics.payload_sent += left;
+    bool more = true;
+    while (more) {
+        unsigned at = s->head + used(link);
+        at = at >= link->config.window ? at - link->config.window : at;
+        struct link_send_slot *slot = &s->slots[at];
+        size_t part = left < link->config.frame_payload
+                          ? left
+                          : link->config.frame_payload;
+        more = part < left;
+        cut(&parts, s->payload + (size_t)at * link->config.frame_payload, part);
+        left -= part;
+        slot->size = (uint16_t)part;
+        slot->flags = more ? LINK_MORE : 0;
+        slot->state = LINK_WAITING;
+        s->end++;
+    }
+    if (used(link) > link->statistics.send_high_water) {
+        link->statistics.send_high_water = used(link);
+    }
+    return 0;
+}
+
+bool link_read(struct link *link, struct link_message *message)
+{
+    struct link_receiver *r = &link->receive;
+    size_t stride = link->config.frame_payload;
+    unsigned window = link->config.window, at = r->head, count = 1;
+    if (r->complete == 0) {
+        return false;
+    }
+    message->size = r->slots[at].size;
+    while (r->slots[at].more) {
+        at = at + 1 == window ? 0 : at + 1;
+        message->size += r->slots[at].size;
+        count++;
+    }
+    LINK_ASSERT(count <= r->complete && count <= link->fragments_max);
+    if (r->head + count > window) {
+        /* The part that wrapped goes behind the last slot. */
+        memcpy(r->payload + window * stride, r->payload,
+               (r->head + count - window) * stride);
+    }
+    message->data = r->payload + r->head * stride;
+    r->held = (uint16_t)count;
+    return true;
+}
+
+void link_release(struct link *link)
+{
+    struct link_receiver *r = &link->receive;
+    LINK_ASSERT(r->held > 0 && r->held <= r->complete);
+    if (r->unreported == 0 &&
+        r->reported == (uint16_t)(r->next + link_credit(link))) {
+        r->unreported_us = link->now_us;
+    }
+    link->statistics.messages_received++;
+    for (; r->held > 0; r->held--) {
+        struct link_receive_slot *slot = &r->slots[r->head];
+        link->statistics.payload_received += slot->size;
+        slot->full = false;
+        r->head =
+            (uint16_t)(r->head + 1 == link->config.window ? 0 : r->head + 1);
+        r->complete--;
+        r->ready--;
+    }
+}
+
+/* --- state ---------------------------------------------------------------- */
+
+int link_poll(struct link *link, uint64_t now_us)
+{
+    int count = link_poll_receive(link, now_us);
+    return count + link_poll_send(link, now_us);
+}
+
+void link_close(struct link *link, uint64_t deadline_us)
+{
+    link->closing = true;
+    link->deadline_us = deadline_us;
+    link->bye_us = link->now_us - link->config.hello_us;
+}
+
+bool link_idle(const struct link *link)
+{
+    return used(link) == 0;
+}
+
+enum link_state link_state(const struct link *link)
+{
+    if (link->closed) {
+        return LINK_CLOSED;
+    }
+    if (link_refuses(link)) {
+        return LINK_REFUSED;
+    }
+    if (link->closing) {
+        return LINK_CLOSING;
+    }
+    if (!link->pipe_up) {
+        return LINK_DOWN;
+    }
+    if (!link->up) {
+        return LINK_OPENING;
+    }
+    return link->now_us - link->heard_us > link->config.silence_us ? LINK_SILENT
+                                                                   : LINK_UP;
+}
+
+const struct link_statistics *link_statistics(const struct link *link)
+{
+    return &link->statistics;
+}
+
+const struct link_peer *link_peer(const struct link *link)
+{
+    return &link->peer;
+}
+
+static uint64_t until(uint64_t start_us, uint64_t span_us, uint64_t now_us)
+{
+    uint64_t passed = now_us - start_us;
+    return passed < span_us ? span_us - passed : 0;
+}
+
+static uint64_t least(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+uint64_t link_next_due_us(const struct link *link, uint64_t now_us)
+{
+    const struct link_config *c = &link->config;
+    const struct link_receiver *r = &link->receive;
+    uint64_t due = c->keep_alive_us;
+    if (link->in.pending) {
+        return 0;
+    }
+    if (link->stalled || (link->closed && !link->bye_due)) {
+        return due;
+    }
+    if (!link->pipe_up || !link->up) {
+        return link->pipe_up ? until(link->hello_us, c->hello_us, now_us)
+                             : c->hello_us;
+    }
+    if (link_may_send(link) || link_ack_due(link) || link_hello_due(link)) {
+        return 0;
+    }
+    due = until(link->sent_us, c->keep_alive_us, now_us);
+    if (link->send.first != link->send.end) {
+        due = least(due,
+                    until(link->send.timer_us, link_timeout_us(link), now_us));
+    }
+    if (r->unreported > 0 ||
+        r->reported != (uint16_t)(r->next + link_credit(link))) {
+        due = least(due, until(r->unreported_us, c->ack_delay_us, now_us));
+    }
+    if (link->candidate.epoch != 0) {
+        due = least(due, until(link->hello_us, c->hello_us, now_us));
+    }
+    if (link->closing) {
+        uint64_t left =
+            link->deadline_us > now_us ? link->deadline_us - now_us : 0;
+        due = least(least(due, c->hello_us), left);
+    }
+    return due;
+}

@@ -1,0 +1,231 @@
+#include "link_internal.h"
+
+/* The name of frames that go from one start of a node to one of another. */
+uint32_t link_session(uint32_t from, uint32_t to)
+{
+    uint8_t bytes[8];
+    for (int i = 0; i < 4; i++) {
+        bytes[i] = (uint8_t)(from >> 8 * i);
+        bytes[4 + i] = (uint8_t)(to >> 8 * i);
+    }
+    return frame_crc32c(0, bytes, sizeof bytes);
+}
+
+bool link_refuses(const struct link *link)
+{
+    return link->peer.refusal != LINK_FITS;
+}
+
+static void put16(uint8_t *p, unsigned value)
+{
+    p[0] = (uint8_t)value;
+    p[1] = (uint8_t)(value >> 8);
+}
+
+static void put32(uint8_t *p, uint32_t value)
+{
+    put16(p, value & 0xffff);
+    put16(p + 2, value >> 16);
+}
+
+static uint16_t get16(const uint8_t *p)
+{
+    return (uint16_t)(p[0] | p[1] << 8);
+}
+
+static uint32_t get32(const uint8_t *p)
+{
+    return get16(p) | (uint32_t)get16(p + 2) << 16;
+}
+
+void link_pack_hello(const struct link *link, uint8_t *hello)
+{
+    const struct link_config *c = &link->config;
+    bool candidate = link->candidate.epoch != 0;
+    hello[0] = LINK_VERSION;
+    hello[1] = c->port;
+    put16(hello + 2, c->node);
+    put16(hello + 4, c->peer_node);
+    hello[6] = c->peer_port;
+    hello[7] = 0;
+    put32(hello + 8, c->epoch);
+    put32(hello + 12, candidate ? link->candidate.epoch : link->peer_epoch);
+    put16(hello + 16, c->window);
+    put16(hello + 18, c->frame_payload);
+    put16(hello + 20, c->message_max);
+    put16(hello + 22, 0);
+}
+
+/* The name of frames that go from one start of a node to one of another. */
+static uint32_t session(uint32_t from_epoch, unsigned from, uint32_t to_epoch,
+                        unsigned to)
+{
+    uint8_t bytes[12];
+    put32(bytes, from_epoch);
+    put32(bytes + 4, to_epoch);
+    put16(bytes + 8, from);
+    put16(bytes + 10, to);
+    return frame_crc32c(0, bytes, sizeof bytes);
+}
+
+static uint32_t session_from(const struct link *link, uint32_t peer_epoch)
+{
+    const struct link_config *c = &link->config;
+    return session(peer_epoch, c->peer_node, c->epoch, c->node);
+}
+
+static uint32_t session_to(const struct link *link, uint32_t peer_epoch)
+{
+    const struct link_config *c = &link->config;
+    return session(c->epoch, c->node, peer_epoch, c->peer_node);
+}
+
+static enum link_refusal fits(const struct link *link, const uint8_t *hello)
+{
+    const struct link_config *c = &link->config;
+    unsigned window = get16(hello + 16);
+    if (hello[0] != LINK_VERSION) {
+        return LINK_WRONG_VERSION;
+    }
+    if (get16(hello + 2) != c->peer_node || hello[1] != c->peer_port ||
+        get16(hello + 4) != c->node || hello[6] != c->port) {
+        return LINK_WRONG_WIRE;
+    }
+    if (get16(hello + 18) != c->frame_payload ||
+        get16(hello + 20) != c->message_max || window < link->fragments_max ||
+        window > LINK_WINDOW_MAX) {
+        return LINK_WRONG_SIZES;
+    }
+    return LINK_FITS;
+}
+
+static void note_peer(struct link *link, const uint8_t *hello)
+{
+    struct link_peer *peer = &link->peer;
+    peer->version = hello[0];
+    peer->port = hello[1];
+    peer->node = get16(hello + 2);
+    peer->epoch = get32(hello + 8);
+    peer->window = get16(hello + 16);
+    peer->frame_payload = get16(hello + 18);
+    peer->message_max = get16(hello + 20);
+    peer->refusal = fits(link, hello);
+}
+
+static void come_up(struct link *link)
+{
+    link->up = true;
+    link->receive.ack_now = true;
+    link->send.timer_us = link->now_us;
+    link->send.backoff = 0;
+}
+
+/* The peer is another start than before, if there was one: what was on its way
+ * to the old one is lost, and counted. */
+static void start_session(struct link *link)
+{
+    const struct link_candidate *c = &link->candidate;
+    bool first = link->peer_epoch == 0;
+    link->peer_epoch = c->epoch;
+    link->peer_window = c->window;
+    link->session_in = c->session_in;
+    link->session_out = session_to(link, c->epoch);
+    link->statistics.sessions++;
+    if (!first) {
+        link_send_reset(link, c->credit);
+    } else {
+        link->send.limit = (uint16_t)(link->send.first + c->credit);
+    }
+    link_receive_reset(link, (uint16_t)c->epoch);
+    link->candidate.epoch = 0;
+    link->closed = false;
+    link->bye_due = false;
+    come_up(link);
+}
+
+static void resume_session(struct link *link)
+{
+    link->statistics.resumed++;
+    link_send_resume(link);
+    come_up(link);
+}
+
+/* Whether a frame of that session, its header sound, is one to look at.  It
+ * proves that its sender knows both epochs. */
+bool link_accept_session(struct link *link, uint32_t session)
+{
+    if (link_refuses(link)) {
+        return false;
+    }
+    if (link->peer_epoch != 0 && session == link->session_in) {
+        if (!link->up && !link->closed) {
+            resume_session(link);
+        }
+        return true;
+    }
+    if (link->candidate.epoch != 0 && session == link->candidate.session_in) {
+        start_session(link);
+        return true;
+    }
+    return false;
+}
+
+void link_on_hello(struct link *link, const struct frame_header *header,
+                   const uint8_t *hello)
+{
+    uint32_t epoch = get32(hello + 8), mine = get32(hello + 12);
+    if (epoch == 0 || link->closing) {
+        return;
+    }
+    link->heard_us = link->now_us;
+    note_peer(link, hello);
+    if (link_refuses(link)) {
+        link->up = false;
+        return;
+    }
+    if (epoch != link->peer_epoch) {
+        struct link_candidate *c = &link->candidate;
+        c->epoch = epoch;
+        c->session_in = session_from(link, epoch);
+        c->window = get16(hello + 16);
+        c->credit = header->credit <= c->window ? header->credit : 0;
+        c->hellos_left = LINK_CANDIDATE_HELLOS;
+    }
+    if (mine != link->config.epoch) {
+        link->hello_now = true;
+        return;
+    }
+    link_accept_session(link, session_from(link, epoch));
+    link->receive.ack_now = true;
+}
+
+/* A greeting soon, but no more often than greetings go. */
+void link_greet(struct link *link)
+{
+    if (link->now_us - link->hello_us >= link->config.hello_us) {
+        link->hello_now = true;
+    }
+}
+
+bool link_hello_due(const struct link *link)
+{
+    bool waiting =
+        !link->up || link->candidate.epoch != 0 || link_refuses(link);
+    return link->hello_now ||
+           (waiting && !link->closed &&
+            link->now_us - link->hello_us >= link->config.hello_us);
+}
+
+void link_pipe_lost(struct link *link)
+{
+    if (link->pipe_up) {
+        link->statistics.pipe_closed++;
+    }
+    link->pipe_up = false;
+    link->up = false;
+    link->stalled = false;
+    link->in.begin = link->in.scanned = link->in.end = 0;
+    link->in.skipping = false;
+    link->in.pending = false;
+    link->out.begin = link->out.end = 0;
+}
