@@ -32,7 +32,7 @@ HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
 # V=1 shows every command.
 Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
-HOST_LIBS = -ljansson -lnettle -lz -lm
+HOST_LIBS = -ljansson -lnettle -lexpat -lz -lm
 
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
 # drivers, boards and the host have a system beneath them.
@@ -213,10 +213,10 @@ help:
 
 # --- packages --------------------------------------------------------------
 
-run_packages   = gcc libc6-dev make musl-tools zlib1g-dev nettle-dev \
+run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-dev \
 	libjansson-dev
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
-	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq \
+	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi
 bench_packages = $(run_packages) g++ libcgal-dev jq
 full_packages  = $(test_packages) $(bench_packages) debootstrap
