@@ -214,7 +214,7 @@ help:
 # --- packages --------------------------------------------------------------
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-dev \
-	libjansson-dev
+	libjansson-dev libexpat1-dev
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi
