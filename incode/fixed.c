@@ -27,49 +27,61 @@ static struct scale scale_of(int32_t k)
     return s;
 }
 
-/* out += v * 2^k; false where one of these is no integer. */
-static bool add_scaled(int64_t out[12], const double v[12],
-                       const struct scale *s)
+/* n = v * 2^k; 1 where that is no integer, else 0. */
+static inline int scaled(int64_t *n, double v, const struct scale *s)
 {
-    int bad = 0;
-    for (int i = 0; i < 12; i++) {
-        int64_t n = (int64_t)(v[i] * s->up1 * s->up2);
-        bad |= (double)n * s->down1 * s->down2 != v[i];
-        out[i] += n;
+    *n = (int64_t)(v * s->up1 * s->up2);
+    return (double)*n * s->down1 * s->down2 != v;
+}
+
+/* Inlined for each count, so that the loops are straight code. */
+static inline __attribute__((always_inline)) bool
+differences(int64_t d[][3], const double *const p[], int count,
+            const double origin[3], const struct scale *s)
+{
+    double tail[4][3];
+    int bad = 0, inexact = 0;
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < 3; k++) {
+            /* Knuth's two-sum: a - b = x + y without error. */
+            double a = p[i][k], b = origin[k];
+            double x = a - b, bv = a - x, av = x + bv;
+            double y = (a - av) + (bv - b);
+            bad |= scaled(&d[i][k], x, s);
+            inexact |= y != 0;
+            tail[i][k] = y;
+        }
+    }
+    if (bad != 0 || inexact == 0)
+        return bad == 0;
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < 3; k++) {
+            int64_t n;
+            bad |= scaled(&n, tail[i][k], s);
+            d[i][k] += n;
+        }
     }
     return bad == 0;
 }
 
 bool incode_fixed_differences(int64_t d[][3], const double *const p[],
-                              int count, const double origin[3])
+                              int count, const double origin[3], double most)
 {
-    double head[12] = {0}, tail[12] = {0}, most = 0;
-    int inexact = 0;
-    for (int i = 0; i < count; i++) {
-        for (int k = 0; k < 3; k++) {
-            /* Knuth's two-sum: p - o = x + y without error. */
-            double a = p[i][k], b = origin[k], x = a - b;
-            double bv = a - x, av = x + bv;
-            double y = (a - av) + (bv - b);
-            double m = __builtin_fabs(x);
-            most = m > most ? m : most;
-            inexact |= y != 0;
-            head[3 * i + k] = x;
-            tail[3 * i + k] = y;
-        }
-    }
     uint64_t bits;
     memcpy(&bits, &most, sizeof bits);
     int32_t e = (int32_t)(bits >> 52);
     if (e > 2044)
         return false; /* near overflow, where the two-sum could fail */
-    /* most < 2^(e-1022), denormals (e = 0) too, so most * 2^k < 2^61. */
+    /* All are below 2^(e-1022), denormals (e = 0) too: below 2^61 by 2^k. */
     struct scale s = scale_of(1083 - (e == 0 ? 1 : e));
-    int64_t n[12] = {0};
-    if (!add_scaled(n, head, &s) || (inexact != 0 && !add_scaled(n, tail, &s)))
-        return false;
-    memcpy(d, n, (size_t)count * sizeof d[0]);
-    return true;
+    switch (count) {
+    case 2:
+        return differences(d, p, 2, origin, &s);
+    case 3:
+        return differences(d, p, 3, origin, &s);
+    default:
+        return differences(d, p, 4, origin, &s);
+    }
 }
 
 /* ---- 32-bit words ---- */
@@ -163,10 +175,10 @@ int incode_fixed_orient3d_portable(const int64_t d[3][3])
     return words_sign(det, 6);
 }
 
-int incode_fixed_in_sphere_portable(const int64_t d[4][3])
+int incode_fixed_in_sphere_portable(const int64_t d[4][3], int swapped[4])
 {
     static const uint8_t rest[4][3] = {
-        {1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
+        {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
     uint32_t det[10] = {0};
     for (int i = 0; i < 4; i++) {
         words4 lift = {0}, square;
@@ -179,8 +191,9 @@ int incode_fixed_in_sphere_portable(const int64_t d[4][3])
             accumulate(lift, square, 4, false);
         }
         minor3_portable(minor, d[rest[i][0]], d[rest[i][1]], d[rest[i][2]]);
+        swapped[i] = words_sign(minor, 6);
         product(term, lift, 4, minor, 6);
-        accumulate(det, term, 10, i % 2 != 0);
+        accumulate(det, term, 10, false);
     }
     return words_sign(det, 10);
 }
@@ -264,16 +277,18 @@ static inline void add_lifted(struct columns *s, const int64_t d[3],
     s->c[4] += p12 >> 64;
 }
 
-int incode_fixed_in_sphere(const int64_t d[4][3])
+static int in_sphere_long(const int64_t d[4][3], int swapped[4])
 {
     const int64_t *a = d[0], *b = d[1], *c = d[2], *e = d[3];
     i128 ab = minor2(a, b), bc = minor2(b, c), ce = minor2(c, e);
     i128 ca = minor2(c, a), ea = minor2(e, a), eb = minor2(e, b);
+    struct i192 m[4] = {sum3(bc, e[2], eb, c[2], ce, b[2]),
+                        sum3(ca, e[2], ea, -c[2], ce, -a[2]),
+                        sum3(ab, e[2], ea, b[2], eb, -a[2]),
+                        sum3(ab, -c[2], ca, -b[2], bc, -a[2])};
     struct columns s = {{0}};
-    add_lifted(&s, a, sum3(bc, e[2], eb, c[2], ce, b[2]));
-    add_lifted(&s, b, sum3(ca, e[2], ea, -c[2], ce, -a[2]));
-    add_lifted(&s, c, sum3(ab, e[2], ea, b[2], eb, -a[2]));
-    add_lifted(&s, e, sum3(ab, -c[2], ca, -b[2], bc, -a[2]));
+    for (int i = 0; i < 4; i++)
+        add_lifted(&s, d[i], m[i]);
     uint64_t any = 0;
     i128 carry = 0;
     for (int i = 0; i < 5; i++) {
@@ -281,7 +296,59 @@ int incode_fixed_in_sphere(const int64_t d[4][3])
         any |= (uint64_t)carry;
         carry >>= 64;
     }
+    if (any == 0 && carry == 0) {
+        for (int i = 0; i < 4; i++)
+            swapped[i] = sign_of(m[i]);
+    }
     return carry < 0 ? -1 : any != 0 || carry > 0;
+}
+
+/* For |d[i][j]| < 2^24: minors of two below 2^49, of three below 2^75, lifts
+ * below 2^50, the determinant below 2^127. */
+static int in_sphere_short(const int64_t d[4][3], int swapped[4])
+{
+    int64_t ab = d[0][0] * d[1][1] - d[1][0] * d[0][1];
+    int64_t bc = d[1][0] * d[2][1] - d[2][0] * d[1][1];
+    int64_t ce = d[2][0] * d[3][1] - d[3][0] * d[2][1];
+    int64_t ca = d[2][0] * d[0][1] - d[0][0] * d[2][1];
+    int64_t ea = d[3][0] * d[0][1] - d[0][0] * d[3][1];
+    int64_t eb = d[3][0] * d[1][1] - d[1][0] * d[3][1];
+    int64_t az = d[0][2], bz = d[1][2], cz = d[2][2], ez = d[3][2];
+    i128 m[4] = {times(bc, ez) + times(eb, cz) + times(ce, bz),
+                 times(ca, ez) - times(ea, cz) - times(ce, az),
+                 times(ab, ez) + times(ea, bz) - times(eb, az),
+                 -times(ab, cz) - times(ca, bz) - times(bc, az)};
+    i128 det = 0;
+    for (int i = 0; i < 4; i++)
+        det +=
+            m[i] * (d[i][0] * d[i][0] + d[i][1] * d[i][1] + d[i][2] * d[i][2]);
+    if (det == 0) {
+        for (int i = 0; i < 4; i++)
+            swapped[i] = (m[i] > 0) - (m[i] < 0);
+    }
+    return (det > 0) - (det < 0);
+}
+
+int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4])
+{
+    uint64_t ones = 0, bits = 0;
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 3; k++) {
+            ones |= (uint64_t)d[i][k];
+            bits |= (uint64_t)(d[i][k] ^ d[i][k] >> 63);
+        }
+    }
+    if (ones == 0)
+        return swapped[0] = swapped[1] = swapped[2] = swapped[3] = 0;
+    int zeros = __builtin_ctzll(ones);
+    if (bits >> zeros >> 24 != 0)
+        return in_sphere_long(d, swapped);
+    int64_t n[4][3];
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 3; k++)
+            n[i][k] = d[i][k] >> zeros;
+    }
+    return in_sphere_short((const int64_t(*)[3])n, swapped);
 }
 
 #else
@@ -291,9 +358,9 @@ int incode_fixed_orient3d(const int64_t d[3][3])
     return incode_fixed_orient3d_portable(d);
 }
 
-int incode_fixed_in_sphere(const int64_t d[4][3])
+int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4])
 {
-    return incode_fixed_in_sphere_portable(d);
+    return incode_fixed_in_sphere_portable(d, swapped);
 }
 
 #endif

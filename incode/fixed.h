@@ -3,11 +3,11 @@
  * grids, and doubles at most 61 binary places below the largest difference).
  * True zeros cost here no more than other signs.
  *
- * Memory: under 1 KB of stack.  Work: 12 (orient3d) or some 80 (in_sphere)
+ * Memory: under 1 KB of stack.  Work: 12 (orient3d) or 72 (in_sphere)
  * products of 64-bit words.
  *
  *     int64_t d[3][3];
- *     if (incode_fixed_differences(d, p + 1, 3, p[0]))
+ *     if (incode_fixed_differences(d, p + 1, 3, p[0], most))
  *         sign = incode_fixed_orient3d(d);
  */
 #ifndef INCODE_FIXED_H
@@ -17,19 +17,22 @@
 #include <stdint.h>
 
 /* d[i] = (p[i] - origin) * 2^k for some k, exactly, with |d[i][j]| <= 2^61;
- * count <= 4.  False where there is no such k: d is then undefined. */
+ * count <= 4, most = the largest |p[i][j] - origin[j]| as rounded.  False
+ * where there is no such k: d is then undefined. */
 bool incode_fixed_differences(int64_t d[][3], const double *const p[],
-                              int count, const double origin[3]);
+                              int count, const double origin[3], double most);
 
 /* Sign of det(d), exact for |d[i][j]| <= 2^61. */
 int incode_fixed_orient3d(const int64_t d[3][3]);
 
-/* Sign of -det with rows (d[i], |d[i]|^2), exact for |d[i][j]| <= 2^61. */
-int incode_fixed_in_sphere(const int64_t d[4][3]);
+/* Sign of -det with rows (d[i], |d[i]|^2), exact for |d[i][j]| <= 2^61.  Where
+ * it is 0, swapped[i] is the sign of orient3d with the origin in place of the
+ * i-th point: the symbolic perturbation asks for it. */
+int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4]);
 
 /* The same from 32-bit words alone, for processors without a 128-bit product;
  * on the others they are there for comparison. */
 int incode_fixed_orient3d_portable(const int64_t d[3][3]);
-int incode_fixed_in_sphere_portable(const int64_t d[4][3]);
+int incode_fixed_in_sphere_portable(const int64_t d[4][3], int swapped[4]);
 
 #endif

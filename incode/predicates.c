@@ -48,55 +48,72 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     tally->exact_orient3d++;
     const double *p[4] = {a, b, c, d};
     int64_t n[3][3];
-    if (incode_fixed_differences(n, p + 1, 3, a))
+    if (incode_fixed_differences(n, p + 1, 3, a, most))
         return incode_fixed_orient3d((const int64_t(*)[3])n);
     return incode_exact_orient3d(p);
 }
 
+/* Whether a is above b in the order of (x, y, z), without a branch. */
+static inline bool higher(const double a[3], const double b[3])
+{
+    return (a[0] > b[0]) | ((a[0] >= b[0]) &
+                            ((a[1] > b[1]) | ((a[1] >= b[1]) & (a[2] > b[2]))));
+}
+
 int incode_lexicographic(const double a[3], const double b[3])
 {
-    for (int k = 0; k < 3; k++) {
-        if (a[k] != b[k])
-            return a[k] < b[k] ? -1 : 1;
-    }
-    return 0;
+    return higher(a, b) - higher(b, a);
 }
 
-/* Cospherical points: the answer of the symbolic perturbation, in which the
- * lexicographically largest point is lifted most.  p[4] is the query. */
-static int in_sphere_tie(struct incode_tally *tally, const double *const p[5])
+/* The two lexicographically largest of five distinct points, largest first:
+ * each is compared with each, since branches would be mispredicted. */
+static void two_largest(const double *const p[5], int m[2])
 {
-    int first = 0, second = -1;
-    for (int i = 1; i < 5; i++) {
-        if (incode_lexicographic(p[i], p[first]) > 0) {
-            second = first;
-            first = i;
-        } else if (second < 0 || incode_lexicographic(p[i], p[second]) > 0) {
-            second = i;
+    int above[5] = {0};
+    for (int i = 0; i < 5; i++) {
+        for (int j = i + 1; j < 5; j++) {
+            int up = higher(p[i], p[j]);
+            above[i] += up;
+            above[j] += 1 - up;
         }
     }
-    for (int step = 0; step < 2; step++) {
-        int m = step == 0 ? first : second;
-        if (m == 4)
-            return -1;
-        const double *q[4] = {p[0], p[1], p[2], p[3]};
-        q[m] = p[4];
-        int o = incode_orient3d(tally, q[0], q[1], q[2], q[3]);
-        if (o != 0)
-            return o;
+    m[0] = m[1] = 0;
+    for (int i = 1; i < 5; i++) {
+        m[0] = above[i] == 4 ? i : m[0];
+        m[1] = above[i] == 3 ? i : m[1];
     }
-    /* Unreachable where the points are distinct and p0..p3 span space. */
-    return -1;
 }
 
-static int in_sphere_exact(struct incode_tally *tally, const double *const p[5])
+/* Signs of orient3d(p0..p3) with p4 in place of each. */
+static void swapped_orientations(struct incode_tally *tally,
+                                 const double *const p[5], int swapped[4])
 {
-    tally->exact_in_sphere++;
+    for (int i = 0; i < 4; i++) {
+        const double *q[4] = {p[0], p[1], p[2], p[3]};
+        q[i] = p[4];
+        swapped[i] = incode_orient3d(tally, q[0], q[1], q[2], q[3]);
+    }
+}
+
+/* p[4] is the query.  Five cospherical points: the larger one, the more its
+ * lift is raised, so the largest decides unless the others are coplanar. */
+static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
+                           double most)
+{
     int64_t n[4][3];
-    int sign = incode_fixed_differences(n, p, 4, p[4])
-                   ? incode_fixed_in_sphere((const int64_t(*)[3])n)
-                   : incode_exact_in_sphere(p);
-    return sign != 0 ? sign : in_sphere_tie(tally, p);
+    int swapped[4], m[2];
+    bool fixed = incode_fixed_differences(n, p, 4, p[4], most);
+    int sign = fixed ? incode_fixed_in_sphere((const int64_t(*)[3])n, swapped)
+                     : incode_exact_in_sphere(p);
+    tally->exact_in_sphere++;
+    if (sign != 0)
+        return sign;
+    two_largest(p, m);
+    if (!fixed && m[0] != 4)
+        swapped_orientations(tally, p, swapped);
+    if (m[0] != 4 && swapped[m[0]] != 0)
+        return swapped[m[0]];
+    return m[0] == 4 || m[1] == 4 ? -1 : swapped[m[1]];
 }
 
 int incode_in_sphere(struct incode_tally *tally, const double a[3],
@@ -130,7 +147,7 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
             return -1;
     }
     const double *p[5] = {a, b, c, d, e};
-    return in_sphere_exact(tally, p);
+    return in_sphere_exact(tally, p, most);
 }
 
 int incode_compare_distance(const double p[3], const double a[3],
