@@ -123,24 +123,54 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
 
 struct face {
     double b[3], c[3]; /* relative to v */
-    double n[3];       /* unit normal, outward */
-    double c2[3];      /* twice the circumcentre */
-    bool regular;      /* n and c2 are numbers of moderate size */
+    double m[3], nn;   /* m / nn: twice the circumcentre; nn = |n|^2 */
 };
 
 static void set_face(struct face *f, const struct incode_sphere *s)
 {
-    double bb = incode_dot(f->b, f->b), cc = incode_dot(f->c, f->c);
-    double nn = incode_dot(s->n, s->n), cn[3], nb[3];
+    double cn[3], nb[3];
     incode_cross(cn, f->c, s->n);
     incode_cross(nb, s->n, f->b);
-    double inverse = 1 / nn, unit = __builtin_sqrt(inverse);
-    f->regular = nn > 1e-60 && nn < 1e60;
+    f->nn = incode_dot(s->n, s->n);
+    for (int d = 0; d < 3; d++)
+        f->m[d] = s->bb * cn[d] + s->cc * nb[d];
+}
+
+/* Whether single precision may propose an apex: nothing out of its range. */
+static bool is_regular(const struct face *f)
+{
+    return f->nn > 1e-60 && f->nn < 1e60 &&
+           incode_max_norm(f->m) < 1e12 * f->nn;
+}
+
+/* Of the sphere, only the closed cap beyond the face matters: where an extreme
+ * point of the sphere lies on the known side, the rim of the face's circle is
+ * the extreme. */
+static bool cap_fits(const struct incode_gather *g,
+                     const struct incode_sphere *s, const struct face *f,
+                     double radius, double wide)
+{
+    double half = 0.5 / s->det, inverse = 1 / f->nn, centre[3], n[3], c0[3];
+    double unit = __builtin_sqrt(inverse);
     for (int d = 0; d < 3; d++) {
-        f->n[d] = s->n[d] * unit;
-        f->c2[d] = (bb * cn[d] + cc * nb[d]) * inverse;
-        f->regular = f->regular && __builtin_fabs(f->c2[d]) < 1e15;
+        centre[d] = s->m[d] * half;
+        n[d] = s->n[d] * unit;
+        c0[d] = 0.5 * f->m[d] * inverse;
     }
+    double circle = __builtin_sqrt(incode_dot(c0, c0));
+    double level = incode_dot(n, centre);
+    for (int d = 0; d < 3; d++) {
+        double hi = centre[d] + radius, lo = centre[d] - radius;
+        double flat = 1 - n[d] * n[d];
+        double rim = circle * (flat > 0 ? __builtin_sqrt(flat) : 0);
+        if (level + radius * n[d] < 0)
+            hi = c0[d] + rim;
+        if (level - radius * n[d] < 0)
+            lo = c0[d] - rim;
+        if (!(hi + wide < g->rhi[d] && lo - wide > g->rlo[d]))
+            return false;
+    }
+    return true;
 }
 
 /* Whether the closed cap of the sphere beyond the face lies strictly inside
@@ -149,34 +179,16 @@ static void set_face(struct face *f, const struct incode_sphere *s)
 static bool cap_is_gathered(const struct incode_gather *g,
                             const struct incode_sphere *s, const struct face *f)
 {
-    if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) || !f->regular)
+    if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) || !is_regular(f))
         return false;
-    double half = 0.5 / s->det, centre[3], slack = 0;
-    for (int d = 0; d < 3; d++) {
-        centre[d] = s->m[d] * half;
-        slack += s->pm[d];
-    }
-    slack = 4 * INCODE_SPHERE_EPS * slack * half;
-    double radius = __builtin_sqrt(incode_dot(centre, centre));
-    double circle = 0.5 * __builtin_sqrt(incode_dot(f->c2, f->c2));
-    double wide = radius * 1e-6 + slack;
-    for (int d = 0; d < 3; d++) {
-        double hi = centre[d] + radius, lo = centre[d] - radius;
-        if (hi + wide < g->rhi[d] && lo - wide > g->rlo[d])
-            continue;
-        /* The extreme points of the sphere that lie on the known side give
-         * way to those of the face's circle. */
-        double level = incode_dot(f->n, centre);
-        double flat = 1 - f->n[d] * f->n[d];
-        double rim = circle * (flat > 0 ? __builtin_sqrt(flat) : 0);
-        if (level + radius * f->n[d] < 0)
-            hi = 0.5 * f->c2[d] + rim;
-        if (level - radius * f->n[d] < 0)
-            lo = 0.5 * f->c2[d] - rim;
-        if (!(hi + wide < g->rhi[d] && lo - wide > g->rlo[d]))
-            return false;
-    }
-    return true;
+    /* The centre is m / (2 det), the radius its length. */
+    double length = __builtin_sqrt(incode_dot(s->m, s->m)), two = 2 * s->det;
+    double wide = length * 1e-6 + 12 * INCODE_SPHERE_EPS * s->pm;
+    bool fits = true;
+    for (int d = 0; d < 3; d++)
+        fits = fits && s->m[d] + length + wide < g->rhi[d] * two &&
+               s->m[d] - length - wide > g->rlo[d] * two;
+    return fits || cap_fits(g, s, f, length / two, wide / two);
 }
 
 struct near {
@@ -201,18 +213,26 @@ static void consider(struct near *n, uint32_t i)
 {
     struct incode_gather *g = &n->t->gather;
     struct incode_tally *tally = &n->t->stats.tally;
-    if (i == n->b || i == n->c || i == n->best || g->id[i] == g->vertex)
+    if (i == n->b || i == n->c || i == n->best || i == g->self)
         return;
     double p[3], r[3];
     incode_gather_relative(g, i, r);
-    if (n->best != INCODE_GATHER_NONE &&
-        incode_sphere_value(&n->sphere, r) <
-            -incode_sphere_error(&n->sphere, r))
+    bool any = n->best != INCODE_GATHER_NONE, inside = !any;
+    if (any) {
+        double value = incode_sphere_value(&n->sphere, r);
+        double error = incode_sphere_error(&n->sphere, r);
+        if (value < -error)
+            return;
+        inside = value > error;
+    }
+    double level = incode_dot(n->sphere.n, r);
+    double error = incode_plane_error(&n->sphere, r);
+    if (level < -error)
         return;
     copy_point(p, g, i);
-    if (incode_orient3d(tally, n->pv, n->pb, n->pc, p) <= 0)
+    if (!(level > error) && incode_orient3d(tally, n->pv, n->pb, n->pc, p) <= 0)
         return;
-    if (n->best != INCODE_GATHER_NONE &&
+    if (!inside &&
         incode_in_sphere(tally, n->pv, n->pb, n->pc, n->store[3], p) < 0)
         return;
     n->best = i;
@@ -223,28 +243,19 @@ static void consider(struct near *n, uint32_t i)
 static void tournament(struct near *n)
 {
     struct incode_gather *g = &n->t->gather;
-    if (n->face.regular) {
-        uint32_t first = incode_gather_first(g, n->face.n, n->face.c2);
+    if (is_regular(&n->face)) {
+        uint32_t first =
+            incode_gather_first(g, n->sphere.n, n->face.m, n->face.nn);
         if (first != INCODE_GATHER_NONE)
             consider(n, first);
     }
     if (n->best == INCODE_GATHER_NONE) {
-        /* Nothing clearly beyond the face: the predicates must look at all
-         * that is not clearly short of it. */
-        for (uint32_t i = 0; i < g->count; i++) {
-            double r[3], level = 0, error = INCODE_SPHERE_TINY;
-            incode_gather_relative(g, i, r);
-            for (int d = 0; d < 3; d++) {
-                level += n->sphere.n[d] * r[d];
-                error +=
-                    INCODE_SPHERE_EPS * n->sphere.pn[d] * __builtin_fabs(r[d]);
-            }
-            if (!(level < -error))
-                consider(n, i);
-        }
+        /* Nothing clearly beyond the face: look at all. */
+        for (uint32_t k = 0; k < g->near; k++)
+            consider(n, g->at[k]);
         return;
     }
-    uint16_t inside[INCODE_GATHER_ALL];
+    uint16_t inside[INCODE_NEAR_ALL];
     uint32_t count = incode_gather_inside(g, &n->sphere, inside);
     for (uint32_t k = 0; k < count; k++)
         consider(n, inside[k]);
@@ -255,7 +266,11 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
                                   struct incode_search *s)
 {
     struct incode_gather *g = &t->gather;
-    struct near n = {.t = t, .b = b, .c = c, .best = INCODE_GATHER_NONE};
+    struct near n;
+    n.t = t;
+    n.b = b;
+    n.c = c;
+    n.best = INCODE_GATHER_NONE;
     memcpy(n.store[0], g->p0, sizeof g->p0);
     copy_point(n.store[1], g, b);
     copy_point(n.store[2], g, c);
@@ -266,7 +281,7 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     incode_gather_relative(g, c, n.face.c);
     incode_sphere_plane(&n.sphere, n.face.b, n.face.c);
     set_face(&n.face, &n.sphere);
-    t->stats.candidates += g->count;
+    t->stats.candidates += g->near;
     tournament(&n);
     if (n.best != INCODE_GATHER_NONE &&
         cap_is_gathered(g, &n.sphere, &n.face)) {

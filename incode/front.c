@@ -33,8 +33,9 @@ static bool in_region(const struct incode_triangulator *t,
     return true;
 }
 
-bool incode_front_key(const struct incode_triangulator *t, uint32_t f[3],
-                      const double *const p[3])
+bool incode_front_key_slow(const struct incode_triangulator *t,
+                           const uint32_t f[3], const double *const p[3],
+                           unsigned *turn)
 {
     int best = -1, best_class = 4;
     bool any_own = false;
@@ -50,8 +51,7 @@ bool incode_front_key(const struct incode_triangulator *t, uint32_t f[3],
     if (!any_own &&
         (t->setup.face_rule != INCODE_FACE_PAPER || !in_region(t, p)))
         return false;
-    uint32_t g[3] = {f[best], f[(best + 1) % 3], f[(best + 2) % 3]};
-    memcpy(f, g, sizeof g);
+    *turn = (unsigned)best;
     return true;
 }
 

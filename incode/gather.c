@@ -5,20 +5,15 @@
 #include "check.h"
 #include "simd.h"
 
-static void convert(struct incode_gather *g, uint32_t first, uint32_t count)
+#define INFINITE __builtin_inff()
+
+void incode_gather_reset(struct incode_gather *g)
 {
-    for (uint32_t i = first; i < first + count; i++) {
-        double x = (g->p[0][i] - g->p0[0]) * g->scale;
-        double y = (g->p[1][i] - g->p0[1]) * g->scale;
-        double z = (g->p[2][i] - g->p0[2]) * g->scale;
-        g->x[i] = (float)x;
-        g->y[i] = (float)y;
-        g->z[i] = (float)z;
-        g->w[i] = (float)(x * x + y * y + z * z);
-        g->l[i] =
-            (float)(__builtin_fabs(x) + __builtin_fabs(y) + __builtin_fabs(z));
-    }
+    g->leaf = INCODE_NONE;
+    g->near = g->around = g->count = 0;
 }
+
+/* ---- around a leaf ---- */
 
 static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
                         const struct incode_frame *frame, uint32_t brick,
@@ -26,63 +21,155 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
 {
     struct incode_gather *g = context;
     (void)walker;
-    (void)q;
     if (++g->pages > g->pages_max)
         return false;
+    const struct incode_brick *b = &frame->page.brick;
     for (; leaves != 0; leaves &= leaves - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
         uint32_t n = frame->count - slot;
-        n = n > INCODE_LEAF_POINTS ? INCODE_LEAF_POINTS : n;
-        if (g->count + INCODE_LEAF_POINTS > INCODE_GATHER_POINTS)
+        if (g->around + INCODE_LEAF_POINTS > INCODE_AROUND_POINTS)
             return false;
-        memcpy(g->p[0] + g->count, frame->page.brick.x + slot, 64);
-        memcpy(g->p[1] + g->count, frame->page.brick.y + slot, 64);
-        memcpy(g->p[2] + g->count, frame->page.brick.z + slot, 64);
-        for (uint32_t i = 0; i < INCODE_LEAF_POINTS; i++)
-            g->id[g->count + i] = brick * INCODE_BRICK_POINTS + slot + i;
-        convert(g, g->count, INCODE_LEAF_POINTS);
-        g->count += n;
+        incode_vd x = incode_vd_load(b->x + slot),
+                  y = incode_vd_load(b->y + slot),
+                  z = incode_vd_load(b->z + slot);
+        uint32_t in = incode_vd_mask(
+            (x >= incode_vd_all(q->lo[0])) & (x <= incode_vd_all(q->hi[0])) &
+            (y >= incode_vd_all(q->lo[1])) & (y <= incode_vd_all(q->hi[1])) &
+            (z >= incode_vd_all(q->lo[2])) & (z <= incode_vd_all(q->hi[2])));
+        if (n < INCODE_LEAF_POINTS)
+            in &= (UINT32_C(1) << n) - 1;
+        incode_vd_pack(g->p[0] + g->around, in, x);
+        incode_vd_pack(g->p[1] + g->around, in, y);
+        incode_vd_pack(g->p[2] + g->around, in, z);
+        incode_pack_count(g->id + g->around, in,
+                          brick * INCODE_BRICK_POINTS + slot);
+        g->around += (uint32_t)__builtin_popcount(in);
     }
     return true;
 }
 
-enum incode_gathered
-incode_gather_fill(struct incode_gather *g, struct incode_walker *walker,
-                   uint32_t vertex, const double p[3], double radius,
-                   const double domain_lo[3], const double domain_hi[3])
+enum incode_gathered incode_gather_around(struct incode_gather *g,
+                                          struct incode_walker *walker,
+                                          uint32_t leaf, const double lo[3],
+                                          const double hi[3], double radius)
 {
     struct incode_query *q = &g->query;
     memset(q, 0, sizeof *q);
     q->question = INCODE_QUERY_BOX;
     q->boxed = true;
-    g->vertex = vertex;
-    g->scale = incode_scale_for(radius);
+    g->leaf = INCODE_NONE;
+    g->around = g->pages = 0;
     g->radius = radius;
-    g->count = g->pages = 0;
     for (int d = 0; d < 3; d++) {
-        g->p0[d] = p[d];
-        q->lo[d] = g->lo[d] = p[d] - radius;
-        q->hi[d] = g->hi[d] = p[d] + radius;
-        g->rlo[d] = (g->lo[d] - p[d]) * g->scale;
-        g->rhi[d] = (g->hi[d] - p[d]) * g->scale;
-        if (g->lo[d] <= domain_lo[d])
-            g->rlo[d] = -__builtin_inf();
-        if (g->hi[d] >= domain_hi[d])
-            g->rhi[d] = __builtin_inf();
+        q->lo[d] = g->around_lo[d] = lo[d] - radius;
+        q->hi[d] = g->around_hi[d] = hi[d] + radius;
     }
     enum incode_walk r = incode_walk(walker, q, copy_leaves, g);
-    g->points = g->count;
-    if (r == INCODE_WALK_STOP)
-        return INCODE_GATHER_CROWDED;
-    return r == INCODE_WALK_WAIT ? INCODE_GATHER_WAIT : INCODE_GATHER_READY;
+    g->count = g->around;
+    if (r == INCODE_WALK_WAIT)
+        return INCODE_GATHER_WAIT;
+    g->leaf = leaf;
+    if (r == INCODE_WALK_DONE)
+        return INCODE_GATHER_READY;
+    /* Not the whole box: what was copied serves, but certifies nothing. */
+    for (int d = 0; d < 3; d++) {
+        g->around_lo[d] = __builtin_inf();
+        g->around_hi[d] = -__builtin_inf();
+    }
+    return INCODE_GATHER_CROWDED;
 }
 
-void incode_gather_disclaim(struct incode_gather *g)
+/* ---- around a vertex ---- */
+
+/* w and l from index `first` on, and padding that no scan mistakes for a point:
+ * two vectors' worth, with l infinite. */
+static void set_lengths(struct incode_gather *g, uint32_t first)
 {
-    for (int d = 0; d < 3; d++) {
-        g->lo[d] = g->hi[d] = g->p0[d];
-        g->rlo[d] = g->rhi[d] = 0;
+    incode_vi lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    incode_vf zero = incode_vf_all(0), infinite = incode_vf_all(INFINITE);
+    for (uint32_t i = first & ~15U; i < g->near + INCODE_VF_LANES;
+         i += INCODE_VF_LANES) {
+        int32_t n = (int32_t)(g->near - i);
+        incode_vi in =
+            lane < (incode_vi){n, n, n, n, n, n, n, n, n, n, n, n, n, n, n, n};
+        incode_vf x = incode_vf_select(in, incode_vf_load(g->x + i), zero),
+                  y = incode_vf_select(in, incode_vf_load(g->y + i), zero),
+                  z = incode_vf_select(in, incode_vf_load(g->z + i), zero);
+        incode_vf l = incode_vf_select(x < zero, -x, x) +
+                      incode_vf_select(y < zero, -y, y) +
+                      incode_vf_select(z < zero, -z, z);
+        *(incode_vf *)(g->x + i) = x;
+        *(incode_vf *)(g->y + i) = y;
+        *(incode_vf *)(g->z + i) = z;
+        *(incode_vf *)(g->w + i) =
+            incode_vf_fma(x, x, incode_vf_fma(y, y, z * z));
+        *(incode_vf *)(g->l + i) = incode_vf_select(in, l, infinite);
     }
+}
+
+/* Packs what lies in lo..hi; false: too many. */
+static bool select_near(struct incode_gather *g)
+{
+    incode_vd scale = incode_vd_all(g->scale), p0[3], lo[3], hi[3];
+    for (int d = 0; d < 3; d++) {
+        p0[d] = incode_vd_all(g->p0[d]);
+        lo[d] = incode_vd_all(g->lo[d]);
+        hi[d] = incode_vd_all(g->hi[d]);
+    }
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < g->around; i += INCODE_VD_LANES) {
+        incode_vd x = incode_vd_load(g->p[0] + i),
+                  y = incode_vd_load(g->p[1] + i),
+                  z = incode_vd_load(g->p[2] + i);
+        uint32_t in =
+            incode_vd_mask((x >= lo[0]) & (x <= hi[0]) & (y >= lo[1]) &
+                           (y <= hi[1]) & (z >= lo[2]) & (z <= hi[2]));
+        if (g->around - i < INCODE_VD_LANES)
+            in &= (UINT32_C(1) << (g->around - i)) - 1;
+        incode_vd_pack_float(g->x + n, in, (x - p0[0]) * scale);
+        incode_vd_pack_float(g->y + n, in, (y - p0[1]) * scale);
+        incode_vd_pack_float(g->z + n, in, (z - p0[2]) * scale);
+        incode_pack_count(g->at + n, in, i);
+        n += (uint32_t)__builtin_popcount(in);
+        if (n > INCODE_NEAR_POINTS - INCODE_AROUND_EXTRA)
+            return false;
+    }
+    g->near = n;
+    set_lengths(g, 0);
+    return true;
+}
+
+static void set_box(struct incode_gather *g, double radius,
+                    const double domain_lo[3], const double domain_hi[3])
+{
+    g->radius = radius;
+    g->scale = incode_scale_for(radius);
+    for (int d = 0; d < 3; d++) {
+        double lo = g->p0[d] - radius, hi = g->p0[d] + radius;
+        lo = lo > g->around_lo[d] ? lo : g->around_lo[d];
+        hi = hi < g->around_hi[d] ? hi : g->around_hi[d];
+        g->lo[d] = lo;
+        g->hi[d] = hi;
+        g->rlo[d] =
+            lo <= domain_lo[d] ? -__builtin_inf() : (lo - g->p0[d]) * g->scale;
+        g->rhi[d] =
+            hi >= domain_hi[d] ? __builtin_inf() : (hi - g->p0[d]) * g->scale;
+    }
+}
+
+void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
+                          const double p[3], double radius,
+                          const double domain_lo[3], const double domain_hi[3])
+{
+    g->vertex = vertex;
+    memcpy(g->p0, p, sizeof g->p0);
+    g->count = g->around; /* far vertices of the last one go */
+    set_box(g, radius, domain_lo, domain_hi);
+    while (!select_near(g)) {
+        radius *= 0.8;
+        set_box(g, radius, domain_lo, domain_hi);
+    }
+    g->self = incode_gather_find(g, vertex);
 }
 
 uint32_t incode_gather_find(const struct incode_gather *g, uint32_t id)
@@ -103,65 +190,85 @@ uint32_t incode_gather_find(const struct incode_gather *g, uint32_t id)
 uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
                               const double p[3])
 {
-    if (g->count == INCODE_GATHER_ALL)
+    if (g->count == INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA ||
+        g->near == INCODE_NEAR_POINTS)
         return INCODE_GATHER_NONE;
     uint32_t i = g->count++;
+    double r[3];
     g->id[i] = id;
     for (int d = 0; d < 3; d++)
         g->p[d][i] = p[d];
-    convert(g, i, 1);
+    incode_gather_relative(g, i, r);
+    uint32_t k = g->near++;
+    g->x[k] = (float)r[0];
+    g->y[k] = (float)r[1];
+    g->z[k] = (float)r[2];
+    g->at[k] = i;
+    set_lengths(g, k);
     return i;
 }
 
-/* Lanes of the last vector that hold points. */
-static incode_vi lanes_below(uint32_t count)
-{
-    incode_vi lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    int32_t n = (int32_t)count;
-    return lane < (incode_vi){n, n, n, n, n, n, n, n, n, n, n, n, n, n, n, n};
-}
+/* ---- scans ---- */
 
 #define PLANE_SLACK 1e-6F /* rounding of n . p, relative to |x|+|y|+|z| */
 
-uint32_t incode_gather_first(const struct incode_gather *g, const double n[3],
-                             const double c2[3])
+/* The best of each lane so far: numerator, denominator, index. */
+struct lanes {
+    incode_vf top, bottom;
+    incode_vi which;
+};
+
+/* n: the plane; c: minus twice the circumcentre, and the weight of w. */
+INCODE_INLINE void best_of(struct lanes *best, const struct incode_gather *g,
+                           uint32_t i, const incode_vf n[3],
+                           const incode_vf c[4], incode_vf slack)
 {
-    incode_vf nx = incode_vf_all((float)n[0]), ny = incode_vf_all((float)n[1]),
-              nz = incode_vf_all((float)n[2]);
-    incode_vf cx = incode_vf_all((float)c2[0]),
-              cy = incode_vf_all((float)c2[1]),
-              cz = incode_vf_all((float)c2[2]);
-    incode_vf slack = incode_vf_all(PLANE_SLACK);
-    incode_vf top = incode_vf_all(0x1p100F), bottom = incode_vf_all(0x1p-20F);
-    incode_vi lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    incode_vi step = {16, 16, 16, 16, 16, 16, 16, 16,
-                      16, 16, 16, 16, 16, 16, 16, 16};
-    incode_vi which = {-1, -1, -1, -1, -1, -1, -1, -1,
-                       -1, -1, -1, -1, -1, -1, -1, -1};
-    for (uint32_t i = 0; i < g->count; i += INCODE_VF_LANES) {
-        incode_vf x = incode_vf_load(g->x + i), y = incode_vf_load(g->y + i),
-                  z = incode_vf_load(g->z + i), w = incode_vf_load(g->w + i);
-        incode_vf below = nx * x + ny * y + nz * z;
-        incode_vf above = w - cx * x - cy * y - cz * z;
-        incode_vi better = (below > slack * incode_vf_load(g->l + i)) &
-                           (above * bottom < top * below);
-        if (g->count - i < INCODE_VF_LANES)
-            better &= lanes_below(g->count - i);
-        top = incode_vf_select(better, above, top);
-        bottom = incode_vf_select(better, below, bottom);
-        which = (better & lane) | (~better & which);
-        lane += step;
+    incode_vf x = incode_vf_load(g->x + i), y = incode_vf_load(g->y + i),
+              z = incode_vf_load(g->z + i);
+    incode_vf below = incode_vf_fma(n[0], x, incode_vf_fma(n[1], y, n[2] * z));
+    incode_vf above = incode_vf_fma(
+        c[0], x,
+        incode_vf_fma(c[1], y,
+                      incode_vf_fma(c[2], z, c[3] * incode_vf_load(g->w + i))));
+    incode_vi better = (below > slack * incode_vf_load(g->l + i)) &
+                       (above * best->bottom < best->top * below);
+    int32_t k = (int32_t)i;
+    incode_vi here = {k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k};
+    best->top = incode_vf_select(better, above, best->top);
+    best->bottom = incode_vf_select(better, below, best->bottom);
+    best->which = (better & here) | (~better & best->which);
+}
+
+uint32_t incode_gather_first(const struct incode_gather *g, const double n[3],
+                             const double m[3], double nn)
+{
+    incode_vf normal[3], centre[4];
+    double extent = incode_max_norm(n);
+    double sn = incode_scale_for(extent), sm = incode_scale_for(nn);
+    for (int d = 0; d < 3; d++) {
+        normal[d] = incode_vf_all((float)(n[d] * sn));
+        centre[d] = incode_vf_all((float)(-m[d] * sm));
     }
-    incode_vf t = top / bottom;
-    uint32_t best = INCODE_GATHER_NONE;
-    float least = 0;
-    for (int k = 0; k < INCODE_VF_LANES; k++) {
-        if (which[k] < 0 || (best != INCODE_GATHER_NONE && !(t[k] < least)))
-            continue;
-        least = t[k];
-        best = (uint32_t)which[k];
+    centre[3] = incode_vf_all((float)(nn * sm));
+    incode_vf slack = incode_vf_all((float)(extent * sn) * PLANE_SLACK);
+    struct lanes a, b;
+    a.top = b.top = incode_vf_all(0x1p60F);
+    a.bottom = b.bottom = incode_vf_all(0x1p-40F);
+    a.which = b.which = (incode_vi){-1, -1, -1, -1, -1, -1, -1, -1,
+                                    -1, -1, -1, -1, -1, -1, -1, -1};
+    for (uint32_t i = 0; i < g->near; i += 2 * INCODE_VF_LANES) {
+        best_of(&a, g, i, normal, centre, slack);
+        best_of(&b, g, i + INCODE_VF_LANES, normal, centre, slack);
     }
-    return best;
+    incode_vi better = a.top * b.bottom < b.top * a.bottom;
+    incode_vf top = incode_vf_select(better, a.top, b.top);
+    incode_vf bottom = incode_vf_select(better, a.bottom, b.bottom);
+    incode_vi which = (better & a.which) | (~better & b.which);
+    uint32_t found = ~incode_vf_mask(which) & 0xffff;
+    if (found == 0)
+        return INCODE_GATHER_NONE;
+    uint32_t lane = incode_vf_least(top / bottom, found);
+    return g->at[(uint32_t)which[lane] + lane];
 }
 
 static float float_up(double a)
@@ -171,23 +278,15 @@ static float float_up(double a)
 
 uint32_t incode_gather_inside(const struct incode_gather *g,
                               const struct incode_sphere *s,
-                              uint16_t out[INCODE_GATHER_ALL])
+                              uint16_t out[INCODE_NEAR_ALL])
 {
     /* One power of two for all coefficients keeps them in range. */
-    double largest = __builtin_fabs(s->det), slack = 0;
-    for (int d = 0; d < 3; d++)
-        largest = largest > __builtin_fabs(s->m[d]) ? largest
-                                                    : __builtin_fabs(s->m[d]);
-    double scale = incode_scale_for(largest);
-    /* Single precision: 8 roundings of 2^-24 on each term, beside those of
-     * the coefficients themselves. */
-    for (int d = 0; d < 3; d++) {
-        double k =
-            0x1p-20 * __builtin_fabs(s->m[d]) + INCODE_SPHERE_EPS * s->pm[d];
-        slack = k > slack ? k : slack;
-    }
-    double square =
-        0x1p-20 * __builtin_fabs(s->det) + INCODE_SPHERE_EPS * s->pdet - s->det;
+    double largest = incode_max_norm(s->m), det = __builtin_fabs(s->det);
+    double scale = incode_scale_for(largest > det ? largest : det);
+    /* Single precision: fewer than 16 roundings of 2^-24 on each term, beside
+     * those of the coefficients themselves. */
+    double slack = 0x1p-20 * largest + INCODE_SPHERE_EPS * s->pm;
+    double square = 0x1p-20 * det + INCODE_SPHERE_EPS * s->pdet - s->det;
     /* The last terms: what underflows in single precision. */
     incode_vf mx = incode_vf_all((float)(s->m[0] * scale)),
               my = incode_vf_all((float)(s->m[1] * scale)),
@@ -195,18 +294,23 @@ uint32_t incode_gather_inside(const struct incode_gather *g,
               mw = incode_vf_all((float)(square * scale) + 1e-37F),
               ml = incode_vf_all(float_up(slack * scale) + 1e-37F),
               tiny = incode_vf_all(-1e-34F);
+    uint64_t words[(INCODE_NEAR_ALL + 63) / 64] = {0};
+    for (uint32_t i = 0; i < g->near; i += INCODE_VF_LANES) {
+        incode_vf value = incode_vf_fma(mx, incode_vf_load(g->x + i),
+                                        my * incode_vf_load(g->y + i)) +
+                          incode_vf_fma(mz, incode_vf_load(g->z + i),
+                                        mw * incode_vf_load(g->w + i));
+        value = incode_vf_fma(ml, incode_vf_load(g->l + i), value);
+        uint64_t in = ~incode_vf_mask(value < tiny) & 0xffff;
+        words[i / 64] |= in << (i % 64);
+    }
     uint32_t count = 0;
-    for (uint32_t i = 0; i < g->count; i += INCODE_VF_LANES) {
-        incode_vf value =
-            mx * incode_vf_load(g->x + i) + my * incode_vf_load(g->y + i) +
-            mz * incode_vf_load(g->z + i) + mw * incode_vf_load(g->w + i) +
-            ml * incode_vf_load(g->l + i);
-        uint32_t in = ~incode_vf_mask(value < tiny) & 0xffff;
-        for (; in != 0; in &= in - 1) {
-            uint32_t k = i + (uint32_t)__builtin_ctz(in);
-            if (k < g->count)
-                out[count++] = (uint16_t)k;
-        }
+    for (uint32_t i = 0; i < g->near; i += 64) {
+        uint64_t word = words[i / 64];
+        if (g->near - i < 64)
+            word &= (UINT64_C(1) << (g->near - i)) - 1;
+        for (; word != 0; word &= word - 1)
+            out[count++] = (uint16_t)g->at[i + (uint32_t)__builtin_ctzll(word)];
     }
     return count;
 }

@@ -1,13 +1,16 @@
-/* The points around one vertex, copied out of their pages once and scanned for
- * every tetrahedron that is built there; far vertices are appended as they are
- * met.
+/* The points around one leaf, copied out of their pages once for its (up to 8)
+ * vertices; and of these the points around one vertex, relative to it, scanned
+ * for every tetrahedron that is built there.  Far vertices are appended as they
+ * are met.
  *
- * Memory: struct incode_gather, about 20 KB.  Work: one walk to fill; a scan
- * looks at every point, 16 at a time in single precision, and leaves what its
- * error bound cannot tell to the exact predicates.
+ * Memory: struct incode_gather, about 35 KB.  Work: one walk a leaf, one pass a
+ * vertex; a scan looks at every point around the vertex, 16 at a time in single
+ * precision, and leaves what its error bound cannot tell to the exact
+ * predicates.
  *
- *     incode_gather_fill(&g, &walker, v, p, radius);
- *     i = incode_gather_first(&g, n, c2);          nearest by Delaunay distance
+ *     incode_gather_around(&g, &walker, leaf, lo, hi, radius);
+ *     incode_gather_centre(&g, v, p, radius, domain_lo, domain_hi);
+ *     i = incode_gather_first(&g, n, m, nn);       nearest by Delaunay distance
  *     count = incode_gather_inside(&g, &sphere, out);     what may be inside
  */
 #ifndef INCODE_GATHER_H
@@ -19,28 +22,37 @@
 #include "query.h"
 
 enum {
-    INCODE_GATHER_POINTS = 384,
-    INCODE_GATHER_EXTRA = 64,
-    INCODE_GATHER_ALL = INCODE_GATHER_POINTS + INCODE_GATHER_EXTRA,
+    INCODE_AROUND_POINTS = 768, /* around a leaf */
+    INCODE_AROUND_EXTRA = 64,   /* far vertices */
+    INCODE_AROUND_ALL =
+        INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA + INCODE_LEAF_POINTS,
+    INCODE_NEAR_POINTS = 384, /* around a vertex, far vertices included */
+    INCODE_NEAR_ALL = INCODE_NEAR_POINTS + 32,
     INCODE_GATHER_NONE = 0xffff
 };
 
 struct incode_gather {
-    /* Relative to p0 and scaled; w = |p|^2, l = |x| + |y| + |z|. */
-    alignas(64) float x[INCODE_GATHER_ALL];
-    alignas(64) float y[INCODE_GATHER_ALL];
-    alignas(64) float z[INCODE_GATHER_ALL];
-    alignas(64) float w[INCODE_GATHER_ALL];
-    alignas(64) float l[INCODE_GATHER_ALL];
-    alignas(64) uint32_t id[INCODE_GATHER_ALL];
-    double p[3][INCODE_GATHER_ALL]; /* absolute */
+    /* Around the vertex: relative to p0 and scaled; w = |p|^2, l = |x| + |y| +
+     * |z|; at: the point's index below. */
+    alignas(64) float x[INCODE_NEAR_ALL];
+    alignas(64) float y[INCODE_NEAR_ALL];
+    alignas(64) float z[INCODE_NEAR_ALL];
+    alignas(64) float w[INCODE_NEAR_ALL];
+    alignas(64) float l[INCODE_NEAR_ALL];
+    alignas(64) uint32_t at[INCODE_NEAR_ALL];
+    uint32_t near;
+    /* Around the leaf, then the far vertices: absolute. */
+    alignas(64) double p[3][INCODE_AROUND_ALL];
+    alignas(64) uint32_t id[INCODE_AROUND_ALL];
+    uint32_t around, count; /* copied from the box; with the far ones */
+    uint32_t leaf;          /* vertex number / 8, or INCODE_NONE */
+    uint32_t pages, pages_max;
+    double around_lo[3], around_hi[3];
+    uint32_t vertex, self; /* its number, its index in p */
     double p0[3], scale, radius;
-    double lo[3], hi[3];   /* absolute: every point within was copied */
+    double lo[3], hi[3];   /* absolute: every point within is at hand */
     double rlo[3], rhi[3]; /* the same, relative; infinite where the domain
                               ends before */
-    uint32_t vertex;
-    uint32_t points, count; /* copied from the box; with the far ones */
-    uint32_t pages, pages_max;
     struct incode_query query;
 };
 
@@ -50,24 +62,30 @@ enum incode_gathered {
     INCODE_GATHER_CROWDED /* too many points or pages: try a smaller box */
 };
 
-/* Copies every leaf that meets the box of half-width radius around the vertex
- * at p; domain: tight box of all points. */
-enum incode_gathered
-incode_gather_fill(struct incode_gather *g, struct incode_walker *walker,
-                   uint32_t vertex, const double p[3], double radius,
-                   const double domain_lo[3], const double domain_hi[3]);
+/* Forgets what is around the last leaf. */
+void incode_gather_reset(struct incode_gather *g);
 
-/* After INCODE_GATHER_CROWDED: keeps what was copied, but as no whole box. */
-void incode_gather_disclaim(struct incode_gather *g);
+/* Copies every point of the box lo..hi widened by radius on all sides. */
+enum incode_gathered incode_gather_around(struct incode_gather *g,
+                                          struct incode_walker *walker,
+                                          uint32_t leaf, const double lo[3],
+                                          const double hi[3], double radius);
 
-/* Index of a vertex among the gathered, or INCODE_GATHER_NONE. */
+/* Selects the points of the box of half-width radius, at most that of the
+ * leaf's box, around the vertex at p; a crowded box is made smaller.  domain:
+ * tight box of all points. */
+void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
+                          const double p[3], double radius,
+                          const double domain_lo[3], const double domain_hi[3]);
+
+/* Index of a vertex among the points at hand, or INCODE_GATHER_NONE. */
 uint32_t incode_gather_find(const struct incode_gather *g, uint32_t id);
 
 /* Appends a far vertex; INCODE_GATHER_NONE: full. */
 uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
                               const double p[3]);
 
-/* Relative coordinates, in double precision. */
+/* Relative coordinates of point i, in double precision. */
 static inline void incode_gather_relative(const struct incode_gather *g,
                                           uint32_t i, double r[3])
 {
@@ -75,14 +93,16 @@ static inline void incode_gather_relative(const struct incode_gather *g,
         r[d] = (g->p[d][i] - g->p0[d]) * g->scale;
 }
 
-/* Of the points clearly on the positive side of the plane with unit normal n,
- * the one with the least (w - c2 . p) / (n . p), approximately. */
+/* Of the points near the vertex and clearly on the positive side of the plane
+ * with normal n, the one with the least (nn w - m . p) / (n . p), or about it;
+ * INCODE_GATHER_NONE: there is none.  m / nn is twice the circumcentre. */
 uint32_t incode_gather_first(const struct incode_gather *g, const double n[3],
-                             const double c2[3]);
+                             const double m[3], double nn);
 
-/* The points that are not certainly outside the sphere; returns how many. */
+/* The points near the vertex that are not certainly outside the sphere; returns
+ * how many. */
 uint32_t incode_gather_inside(const struct incode_gather *g,
                               const struct incode_sphere *s,
-                              uint16_t out[INCODE_GATHER_ALL]);
+                              uint16_t out[INCODE_NEAR_ALL]);
 
 #endif

@@ -107,7 +107,7 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
         incode_vd far = incode_vd_max(incode_vd_abs(lo), incode_vd_abs(hi));
         incode_vd n = incode_vd_all(s->n[d]);
         plane += incode_vd_max(n * lo, n * hi);
-        plane_error += incode_vd_all(s->pn[d]) * far;
+        plane_error += incode_vd_all(s->pn) * far;
         if (!s->has_apex)
             continue;
         incode_vd m = incode_vd_all(s->m[d]);
@@ -116,7 +116,7 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
         incode_vd best =
             incode_vd_max((m - det * lo) * lo, (m - det * hi) * hi);
         value += incode_vd_max((m - det * top) * top, best);
-        value_error += (incode_vd_all(s->pm[d]) + pdet * far) * far;
+        value_error += (incode_vd_all(s->pm) + pdet * far) * far;
     }
     incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
     incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
@@ -287,11 +287,11 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     for (int d = 0; d < 3; d++) {
         incode_vd r = p->r[d], far = incode_vd_abs(r);
         plane += incode_vd_all(s->n[d]) * r;
-        plane_error += incode_vd_all(s->pn[d]) * far;
+        plane_error += incode_vd_all(s->pn) * far;
         square += r * r;
         if (s->has_apex) {
             value += incode_vd_all(s->m[d]) * r;
-            value_error += incode_vd_all(s->pm[d]) * far;
+            value_error += incode_vd_all(s->pm) * far;
         }
     }
     incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);

@@ -101,6 +101,81 @@ INCODE_INLINE incode_vd incode_vd_min(incode_vd a, incode_vd b)
 #endif
 }
 
+/* a * b + c: for what only proposes, or stands under an error bound. */
+INCODE_INLINE incode_vf incode_vf_fma(incode_vf a, incode_vf b, incode_vf c)
+{
+#ifdef __AVX512DQ__
+    return (incode_vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
+#else
+    return a * b + c;
+#endif
+}
+
+/* Lanes of eight whose bit is set, packed together; the rest is undefined. */
+INCODE_INLINE void incode_vd_pack(double *out, uint32_t mask, incode_vd a)
+{
+#ifdef __AVX512DQ__
+    _mm512_storeu_pd(out, _mm512_maskz_compress_pd((__mmask8)mask, (__m512d)a));
+#else
+    for (int i = 0, n = 0; i < INCODE_VD_LANES; i++) {
+        out[n] = a[i];
+        n += (int)(mask >> i & 1);
+    }
+#endif
+}
+
+/* The same, converted to single precision. */
+INCODE_INLINE void incode_vd_pack_float(float *out, uint32_t mask, incode_vd a)
+{
+#ifdef __AVX512DQ__
+    __m256 f = _mm512_cvtpd_ps((__m512d)a);
+    _mm256_storeu_ps(out, _mm256_maskz_compress_ps((__mmask8)mask, f));
+#else
+    for (int i = 0, n = 0; i < INCODE_VD_LANES; i++) {
+        out[n] = (float)a[i];
+        n += (int)(mask >> i & 1);
+    }
+#endif
+}
+
+/* first, first + 1, ... of the lanes whose bit is set, packed together. */
+INCODE_INLINE void incode_pack_count(uint32_t *out, uint32_t mask,
+                                     uint32_t first)
+{
+#ifdef __AVX512DQ__
+    __m256i lane = _mm256_add_epi32(_mm256_set1_epi32((int)first),
+                                    _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+    _mm256_storeu_si256((__m256i *)(void *)out,
+                        _mm256_maskz_compress_epi32((__mmask8)mask, lane));
+#else
+    for (uint32_t i = 0, n = 0; i < INCODE_VD_LANES; i++) {
+        out[n] = first + i;
+        n += mask >> i & 1;
+    }
+#endif
+}
+
+/* The lane of the least value among those whose bit is set (mask != 0). */
+INCODE_INLINE uint32_t incode_vf_least(incode_vf a, uint32_t mask)
+{
+#ifdef __AVX512DQ__
+    __mmask16 m = (__mmask16)mask;
+    float least = _mm512_mask_reduce_min_ps(m, (__m512)a);
+    m = _mm512_mask_cmp_ps_mask(m, (__m512)a, _mm512_set1_ps(least),
+                                _CMP_EQ_OQ);
+    return m == 0 ? (uint32_t)__builtin_ctz(mask)
+                  : (uint32_t)__builtin_ctz((uint32_t)m);
+#else
+    uint32_t best = (uint32_t)__builtin_ctz(mask);
+    for (; mask != 0; mask &= mask - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(mask);
+        if (a[i] < a[best])
+            best = i;
+    }
+    return best;
+#endif
+}
+
 INCODE_INLINE incode_vd incode_vd_abs(incode_vd a)
 {
     return incode_vd_max(a, -a);

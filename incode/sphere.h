@@ -1,7 +1,7 @@
 /* The plane of a face and the sphere through it and an apex, in coordinates
  * relative to the face's first vertex v and scaled by a power of two, with
- * forward error bounds: permanents of the determinants times a small multiple
- * of the unit roundoff (Higham, Accuracy and Stability, chapter 3).
+ * forward error bounds: a small multiple of the unit roundoff times bounds of
+ * the terms from the maximum norms (Higham, Accuracy and Stability, chapter 3).
  *
  *     plane:  n . p > 0                  p lies on the unknown side
  *     sphere: m . p - det |p|^2 > 0      p lies inside
@@ -18,8 +18,9 @@
 #include <stdbool.h>
 
 struct incode_sphere {
-    double n[3], pn[3];            /* plane, permanents */
-    double m[3], pm[3], det, pdet; /* sphere, permanents */
+    double n[3], pn;            /* plane; |error of n[d]| <= EPS pn */
+    double m[3], pm, det, pdet; /* sphere; likewise */
+    double lb, lc, bb, cc;      /* of b and c: maximum norm, square */
     bool has_apex;
 };
 
@@ -41,6 +42,14 @@ static inline double incode_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+static inline double incode_max_norm(const double a[3])
+{
+    double x = __builtin_fabs(a[0]), y = __builtin_fabs(a[1]),
+           z = __builtin_fabs(a[2]);
+    double l = x > y ? x : y;
+    return l > z ? l : z;
+}
+
 void incode_sphere_plane(struct incode_sphere *s, const double b[3],
                          const double c[3]);
 void incode_sphere_apex(struct incode_sphere *s, const double b[3],
@@ -55,11 +64,18 @@ static inline double incode_sphere_value(const struct incode_sphere *s,
 static inline double incode_sphere_error(const struct incode_sphere *s,
                                          const double p[3])
 {
-    double x = __builtin_fabs(p[0]), y = __builtin_fabs(p[1]),
-           z = __builtin_fabs(p[2]);
-    return INCODE_SPHERE_EPS * (s->pm[0] * x + s->pm[1] * y + s->pm[2] * z +
-                                s->pdet * incode_dot(p, p)) +
+    double l =
+        __builtin_fabs(p[0]) + __builtin_fabs(p[1]) + __builtin_fabs(p[2]);
+    return INCODE_SPHERE_EPS * (s->pm * l + s->pdet * incode_dot(p, p)) +
            INCODE_SPHERE_TINY;
+}
+
+static inline double incode_plane_error(const struct incode_sphere *s,
+                                        const double p[3])
+{
+    double l =
+        __builtin_fabs(p[0]) + __builtin_fabs(p[1]) + __builtin_fabs(p[2]);
+    return INCODE_SPHERE_EPS * s->pn * l + INCODE_SPHERE_TINY;
 }
 
 #endif

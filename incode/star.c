@@ -1,6 +1,7 @@
 #include <string.h>
 
 #include "check.h"
+#include "simd.h"
 #include "state.h"
 
 /* Closing the star of a vertex: its open faces are taken out of the active face
@@ -13,8 +14,19 @@ static void put_back(struct incode_triangulator *t)
 {
     struct incode_star *star = &t->star;
     for (uint32_t i = 0; i < star->faces; i++)
-        incode_afl_toggle(&t->afl, star->v, star->face[i].b, star->face[i].c);
+        incode_afl_toggle(&t->afl, star->v, star->b[i], star->c[i]);
     star->faces = 0;
+}
+
+static void push_face(struct incode_star *star,
+                      const struct incode_star_face *face)
+{
+    INCODE_ASSERT(star->faces < INCODE_STAR_FACES);
+    uint32_t i = star->faces++;
+    star->b[i] = face->b;
+    star->c[i] = face->c;
+    star->ib[i] = face->ib;
+    star->ic[i] = face->ic;
 }
 
 static void take_faces(struct incode_triangulator *t, uint32_t limit)
@@ -22,19 +34,33 @@ static void take_faces(struct incode_triangulator *t, uint32_t limit)
     struct incode_star *star = &t->star;
     uint32_t pairs[INCODE_STAR_FACES][2];
     uint32_t n = incode_afl_take(&t->afl, star->v, pairs, limit, &star->more);
+    star->faces = 0;
     for (uint32_t i = 0; i < n; i++)
-        star->face[i] = (struct incode_star_face){
-            pairs[i][0], pairs[i][1], INCODE_GATHER_NONE, INCODE_GATHER_NONE};
-    star->faces = n;
+        push_face(star, &(struct incode_star_face){pairs[i][0], pairs[i][1],
+                                                   INCODE_GATHER_NONE,
+                                                   INCODE_GATHER_NONE});
 }
 
 static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c)
 {
-    for (uint32_t i = 0; i < star->faces; i++) {
-        if (star->face[i].b == b && star->face[i].c == c) {
-            star->face[i] = star->face[--star->faces];
-            return true;
-        }
+    int32_t x = (int32_t)b, y = (int32_t)c;
+    incode_vi bs = {x, x, x, x, x, x, x, x, x, x, x, x, x, x, x, x};
+    incode_vi cs = {y, y, y, y, y, y, y, y, y, y, y, y, y, y, y, y};
+    for (uint32_t i = 0; i < star->faces; i += INCODE_VF_LANES) {
+        uint32_t found = incode_vf_mask(
+            (*(const incode_vi *)(const void *)(star->b + i) == bs) &
+            (*(const incode_vi *)(const void *)(star->c + i) == cs));
+        if (star->faces - i < INCODE_VF_LANES)
+            found &= (UINT32_C(1) << (star->faces - i)) - 1;
+        if (found == 0)
+            continue;
+        uint32_t k = i + (uint32_t)__builtin_ctz(found);
+        uint32_t last = --star->faces;
+        star->b[k] = star->b[last];
+        star->c[k] = star->c[last];
+        star->ib[k] = star->ib[last];
+        star->ic[k] = star->ic[last];
+        return true;
     }
     return false;
 }
@@ -51,9 +77,11 @@ static void spread_hub(struct incode_triangulator *t)
     uint32_t n = star->faces;
     star->faces = 0;
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t f[3] = {star->v, star->face[i].b, star->face[i].c};
-        if (!incode_front_key(t, f, NULL))
+        const uint32_t v[3] = {star->v, star->b[i], star->c[i]};
+        unsigned turn;
+        if (!incode_front_key(t, v, NULL, &turn))
             INCODE_ASSERT(false);
+        const uint32_t f[3] = {v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]};
         incode_front_toggle(t, f);
     }
 }
@@ -66,22 +94,20 @@ static void toggle_here(struct incode_triangulator *t, uint32_t b, uint32_t c,
         return;
     if (star->more && incode_afl_close_twin(&t->afl, star->v, b, c))
         return;
-    star->face[star->faces++] = (struct incode_star_face){b, c, ib, ic};
-    INCODE_ASSERT(star->faces <= INCODE_STAR_FACES);
+    push_face(star, &(struct incode_star_face){b, c, ib, ic});
 }
 
 static void toggle_face(struct incode_triangulator *t, const uint32_t v[3],
                         const double *const p[3], const uint16_t i[3])
 {
-    uint32_t f[3] = {v[0], v[1], v[2]};
-    if (!incode_front_key(t, f, p))
+    unsigned turn;
+    if (!incode_front_key(t, v, p, &turn))
         return;
+    const uint32_t f[3] = {v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]};
     if (f[0] != t->star.v) {
         incode_front_toggle(t, f);
         return;
     }
-    /* i follows the same turn as f. */
-    unsigned turn = f[0] == v[0] ? 0 : f[0] == v[1] ? 1 : 2;
     toggle_here(t, f[1], f[2], i[(turn + 1) % 3], i[(turn + 2) % 3]);
 }
 
@@ -144,17 +170,16 @@ static void star_emit(struct incode_triangulator *t)
 
 /* ---- gathering ---- */
 
-/* Half-width of the box to gather: the extent of the vertex's leaf, times what
- * has lately given the wanted number of points. */
+enum { NEAR_WANTED = 176, GATHER_TRIES = 64 };
+
+/* Half-width of the box to gather: the extent of the leaf, times what has
+ * lately given the wanted number of points around a vertex. */
 static double first_radius(const struct incode_triangulator *t,
-                           const struct incode_frame *f, uint32_t slot)
+                           const double lo[3], const double hi[3])
 {
-    uint32_t leaf = slot / INCODE_LEAF_POINTS;
     double extent = 0;
-    for (int d = 0; d < 3; d++) {
-        double e = f->leaf_hi[d][leaf] - f->leaf_lo[d][leaf];
-        extent = e > extent ? e : extent;
-    }
+    for (int d = 0; d < 3; d++)
+        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
     if (!(extent > 0)) {
         for (int d = 0; d < 3; d++) {
             double e = t->setup.hi[d] * 0x1p-10 - t->setup.lo[d] * 0x1p-10;
@@ -165,45 +190,58 @@ static double first_radius(const struct incode_triangulator *t,
     return radius < 0x1p1000 ? radius : 0x1p1000;
 }
 
-enum { GATHER_WANTED = 160, GATHER_TRIES = 64 };
-
 static void learn_spread(struct incode_triangulator *t, uint32_t points)
 {
-    if (points > GATHER_WANTED * 5 / 4)
-        t->spread *= 0.97;
-    else if (points < GATHER_WANTED * 3 / 4)
-        t->spread *= 1.03;
-    t->spread = t->spread < 0.25 ? 0.25 : t->spread > 8 ? 8 : t->spread;
+    if (points > NEAR_WANTED * 9 / 8)
+        t->spread *= 0.98;
+    else if (points < NEAR_WANTED * 7 / 8)
+        t->spread *= 1.02;
+    t->spread = t->spread < 0.25 ? 0.25 : t->spread > 16 ? 16 : t->spread;
+}
+
+/* Brings the points around the leaf of a vertex to hand. */
+static enum incode_outcome gather_leaf(struct incode_triangulator *t,
+                                       struct incode_task *task,
+                                       const struct incode_frame *f)
+{
+    struct incode_gather *g = &t->gather;
+    uint32_t leaf = task->v % INCODE_BRICK_POINTS / INCODE_LEAF_POINTS;
+    double lo[3], hi[3];
+    for (int d = 0; d < 3; d++) {
+        lo[d] = f->leaf_lo[d][leaf];
+        hi[d] = f->leaf_hi[d][leaf];
+    }
+    double radius = first_radius(t, lo, hi);
+    for (int tries = 0;; tries++) {
+        enum incode_gathered r = incode_gather_around(
+            g, &t->walker, task->v / INCODE_LEAF_POINTS, lo, hi, radius);
+        task->page = g->query.missing;
+        if (r == INCODE_GATHER_WAIT)
+            return INCODE_WAIT;
+        if (r == INCODE_GATHER_READY || tries == GATHER_TRIES)
+            return INCODE_OK;
+        radius *= 0.75;
+        t->spread *= 0.99;
+    }
 }
 
 static enum incode_outcome star_gather(struct incode_triangulator *t,
                                        struct incode_task *task)
 {
+    struct incode_gather *g = &t->gather;
     uint32_t v = task->v, slot = v % INCODE_BRICK_POINTS;
     const struct incode_frame *f =
         incode_pager_get(&t->pager, v / INCODE_BRICK_POINTS);
     task->page = v / INCODE_BRICK_POINTS;
     if (f == NULL)
         return INCODE_WAIT;
+    if (g->leaf != v / INCODE_LEAF_POINTS &&
+        gather_leaf(t, task, f) == INCODE_WAIT)
+        return INCODE_WAIT;
     const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
                          f->page.brick.z[slot]};
-    double radius = first_radius(t, f, slot);
-    for (int tries = 0;; tries++) {
-        enum incode_gathered r = incode_gather_fill(
-            &t->gather, &t->walker, v, p, radius, t->setup.lo, t->setup.hi);
-        task->page = t->gather.query.missing;
-        if (r == INCODE_GATHER_WAIT)
-            return INCODE_WAIT;
-        if (r == INCODE_GATHER_READY)
-            break;
-        if (tries == GATHER_TRIES) {
-            incode_gather_disclaim(&t->gather);
-            break;
-        }
-        radius *= 0.6;
-        t->spread *= 0.99;
-    }
-    learn_spread(t, t->gather.points);
+    incode_gather_centre(g, v, p, g->radius, t->setup.lo, t->setup.hi);
+    learn_spread(t, g->near);
     return INCODE_OK;
 }
 
@@ -321,10 +359,12 @@ static enum incode_outcome advance(struct incode_triangulator *t,
     }
     if (task->kind == INCODE_TASK_FOUND)
         return use_found(t, task);
-    struct incode_star_face face = star->face[--star->faces];
+    uint32_t i = --star->faces;
+    struct incode_star_face face = {star->b[i], star->c[i], star->ib[i],
+                                    star->ic[i]};
     enum incode_outcome r = pursue(t, task, &face);
     if (r != INCODE_OK)
-        star->face[star->faces++] = face;
+        push_face(star, &face);
     return r == INCODE_AGAIN && task->kind == INCODE_TASK_SEARCH ? INCODE_OK
                                                                  : r;
 }

@@ -68,7 +68,9 @@ struct incode_star_face {
 struct incode_star {
     uint32_t v, faces, built;
     bool more; /* further faces of v are in the active face list */
-    struct incode_star_face face[INCODE_STAR_FACES];
+    alignas(64) uint32_t b[INCODE_STAR_FACES];
+    alignas(64) uint32_t c[INCODE_STAR_FACES];
+    uint16_t ib[INCODE_STAR_FACES], ic[INCODE_STAR_FACES];
     uint32_t kept;
     uint32_t apexes[INCODE_STAR_BUILT][3];
 };
@@ -146,10 +148,24 @@ static inline uint32_t incode_position(const struct incode_triangulator *t,
                                  : brick + t->setup.bricks - t->job.first;
 }
 
-/* Turns f so that the vertex whose list it belongs to comes first; false: the
- * face is not pursued.  p: the coordinates of f's vertices. */
-bool incode_front_key(const struct incode_triangulator *t, uint32_t f[3],
-                      const double *const p[3]);
+/* Which of f's vertices has it in its list: *turn is its index; false: the face
+ * is not pursued.  p: the coordinates of f's vertices. */
+bool incode_front_key_slow(const struct incode_triangulator *t,
+                           const uint32_t f[3], const double *const p[3],
+                           unsigned *turn);
+
+static inline bool incode_front_key(const struct incode_triangulator *t,
+                                    const uint32_t f[3],
+                                    const double *const p[3], unsigned *turn)
+{
+    if (t->afl.hubs != 0 || !incode_own(t, f[0]) || !incode_own(t, f[1]) ||
+        !incode_own(t, f[2]))
+        return incode_front_key_slow(t, f, p, turn);
+    unsigned least = f[1] < f[0];
+    *turn = f[2] < f[least] ? 2 : least;
+    return true;
+}
+
 /* Toggles a face whose key is not the vertex at work. */
 void incode_front_toggle(struct incode_triangulator *t, const uint32_t f[3]);
 /* Notes that a tetrahedron has this vertex. */

@@ -106,6 +106,7 @@ incode_triangulator_init(void *arena, size_t bytes,
     t->walker = (struct incode_walker){&t->pager, &t->tree, &t->stats.tally,
                                        &t->stats.candidates};
     t->gather.pages_max = (uint32_t)map.frame_count / 2;
+    incode_gather_reset(&t->gather);
     t->spread = 1.6;
     t->window = 4;
     t->lookahead = (uint32_t)map.frame_count / 48;
