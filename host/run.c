@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "../transport/drivers/tcp.h"
 #include "hull.h"
 #include "report.h"
 #include "stats.h"
@@ -88,6 +89,8 @@ static void gather_reports(const struct host_service *service,
 {
     memcpy(r->node, service->report, sizeof r->node);
     r->limited = service->cluster->limited;
+    (void)tcp_buffers(service->cluster->wire, &r->socket_send_bytes,
+                      &r->socket_receive_bytes);
     r->retransmitted = service->retransmitted;
     r->faces_spilled = service->spill.faces_total;
     for (unsigned i = 0; i < r->nodes; i++) {

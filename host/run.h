@@ -56,6 +56,7 @@ struct host_run_result {
     uint64_t retransmitted, faces_spilled;
     uint64_t candidates, candidates_histogram[24];
     uint64_t vertices, vertices_waited;
+    int socket_send_bytes, socket_receive_bytes; /* buffers of a wire's end */
     struct host_node_report node[HOST_NODES_MAX];
     bool limited; /* the kernel held the nodes to their memory */
     bool verified;

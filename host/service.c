@@ -300,10 +300,12 @@ int host_service_start(struct host_service *service, struct host_error *error)
         if (round_trip(service, error) != 0) {
             return error->code;
         }
-        if (host_now_us() - start > BRING_UP_US_MAX) {
+        if (host_now_us() - start > BRING_UP_US_MAX ||
+            cube_link_state(service->cube, 0) == LINK_REFUSED) {
             return host_fail(error, HOST_CUBE,
-                             "node 0 link %u: does not answer; is the machine "
-                             "very busy?",
+                             "node 0 link %u: does not answer as it should; "
+                             "is incode-node of this version, and the machine "
+                             "not too busy?",
                              service->cluster->dimension);
         }
     }
@@ -368,6 +370,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
     }
     host_progress_end(&s->progress);
     s->retransmitted = cube_link_statistics(s->cube, 0)->retransmitted;
+    s->finished = true;
     if (s->ledger.committed != s->ledger.bricks) {
         return host_fail(error, HOST_BROKEN,
                          "host: %u bricks of %u committed; please report this "
@@ -381,7 +384,10 @@ void host_service_end(struct host_service *service)
 {
     struct host_service *s = service;
     uint64_t start = host_now_us();
-    bool told = s->cube == NULL;
+    bool told = s->cube == NULL || !s->finished, closing = false;
+    if (!s->finished) {
+        host_cluster_stop(s->cluster); /* nothing to wait for */
+    }
     while (!told || (s->cube != NULL && !host_cluster_ended(s->cluster))) {
         uint64_t now = host_now_us();
         unsigned moved = (unsigned)cube_poll(s->cube, now);
@@ -390,6 +396,10 @@ void host_service_end(struct host_service *service)
             cube_release(s->cube);
         }
         told = told || cube_write(s->cube, CUBE_ALL, NODE_STOP, NULL, 0) == 0;
+        if (told && !closing && cube_idle(s->cube)) {
+            cube_close(s->cube, start + FAREWELL_US_MAX);
+            closing = true;
+        }
         if (now - start > FAREWELL_US_MAX) {
             break;
         }

@@ -78,7 +78,7 @@ struct host_service {
     struct host_spill spill;
     struct host_progress progress;
     struct host_wire *wire;
-    bool setup_due, started;
+    bool setup_due, started, finished;
     unsigned ready, done; /* nodes that have their setup; that finished */
     unsigned turn;        /* the node to be served next */
     uint64_t random, check_us;

@@ -126,6 +126,8 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "vertices", r->vertices);
     put(o, "vertices_waited", r->vertices_waited);
     put(o, "faces_spilled", r->faces_spilled);
+    put(o, "socket_send_bytes", (uint64_t)r->socket_send_bytes);
+    put(o, "socket_receive_bytes", (uint64_t)r->socket_receive_bytes);
     put(o, "retransmitted_frames", r->retransmitted);
     for (unsigned i = 0; i < r->nodes; i++) {
         json_array_append_new(nodes, node_object(r, i));

@@ -6,14 +6,14 @@
 #include "holder.h"
 #include "worker.h"
 
-enum { IDLE_MAX_US = 1000000, FAREWELL_US = 50000 };
+enum { IDLE_MAX_US = 1000000, FAREWELL_US = 500000 };
 
 struct node {
     const struct node_board *board;
     struct cube *cube;
     uint8_t *role_memory;
     size_t role_bytes, cube_bytes;
-    bool set_up, stopping;
+    bool set_up, stopping, closing;
     enum node_role role;
     struct node_worker worker;
     struct node_holder holder;
@@ -254,10 +254,25 @@ static unsigned serve_role(struct node *n)
     return moved;
 }
 
-/* The farewell must have been passed on to other nodes, and theirs read. */
-static bool may_stop(const struct node *n)
+/* The farewell is passed on to other nodes first, then said on each link. */
+static bool may_stop(struct node *n)
 {
-    return n->stopping && n->now_us - n->stop_us > FAREWELL_US;
+    unsigned links = cube_links(n->cube);
+    uint64_t end = n->stop_us + FAREWELL_US;
+    if (!n->stopping) {
+        return false;
+    }
+    if (!n->closing && cube_idle(n->cube)) {
+        cube_close(n->cube, end);
+        n->closing = true;
+    }
+    for (unsigned d = 0; d < links && n->now_us < end; d++) {
+        enum link_state state = cube_link_state(n->cube, d);
+        if (!n->closing || (state != LINK_CLOSED && state != LINK_DOWN)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 enum node_event node_step(struct node *node)
