@@ -1,0 +1,181 @@
+#include "output.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { BUFFER_BYTES = 1 << 20 };
+
+static int cannot_make(const char *path, int reason, struct host_error *error)
+{
+    return host_fail(error, HOST_INPUT,
+                     "%s: cannot be written (%s); choose another place", path,
+                     strerror(reason));
+}
+
+/* Opens a new file beside the target, or the target itself. */
+static int open_file(struct host_output *out, struct host_error *error)
+{
+    struct stat status;
+    out->target = realpath(out->path, NULL);
+    if (out->target == NULL) {
+        out->target = strdup(out->path); /* it is not there yet */
+    }
+    if (out->target == NULL) {
+        return host_fail_memory(error, "an output");
+    }
+    bool there = stat(out->target, &status) == 0;
+    if (there && S_ISDIR(status.st_mode)) {
+        return cannot_make(out->path, EISDIR, error);
+    }
+    if (there && !S_ISREG(status.st_mode)) {
+        out->file = open(out->target, O_WRONLY | O_CLOEXEC);
+        return out->file < 0 ? cannot_make(out->path, errno, error) : 0;
+    }
+    if (there && access(out->target, W_OK) != 0) {
+        return cannot_make(out->path, errno, error);
+    }
+    size_t size = strlen(out->target) + 32;
+    out->temporary = malloc(size);
+    if (out->temporary == NULL) {
+        return host_fail_memory(error, "an output");
+    }
+    (void)snprintf(out->temporary, size, "%s.part-%ld", out->target,
+                   (long)getpid());
+    out->file =
+        open(out->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (out->file < 0) {
+        int reason = errno;
+        free(out->temporary);
+        out->temporary = NULL; /* not ours to remove */
+        return cannot_make(out->path, reason, error);
+    }
+    return 0;
+}
+
+int host_output_open(struct host_output *out, const char *path,
+                     struct host_error *error)
+{
+    *out = (struct host_output){.path = path, .file = -1};
+    out->buffer = malloc(BUFFER_BYTES);
+    if (out->buffer == NULL) {
+        host_fail_memory(error, "an output");
+    } else if (strcmp(path, "-") == 0) {
+        out->file = STDOUT_FILENO;
+    } else {
+        open_file(out, error);
+    }
+    if (error->code != 0) {
+        host_output_close(out, 1, error);
+    }
+    return error->code;
+}
+
+static void flush(struct host_output *out)
+{
+    for (size_t done = 0; done < out->used && out->failure == 0;) {
+        ssize_t n = write(out->file, out->buffer + done, out->used - done);
+        if (n >= 0) {
+            done += (size_t)n;
+        } else if (errno != EINTR) {
+            out->failure = errno;
+        }
+    }
+    out->used = 0;
+}
+
+void host_output_bytes(struct host_output *out, const void *bytes, size_t n)
+{
+    const char *from = bytes;
+    while (n > 0) {
+        size_t room = BUFFER_BYTES - out->used;
+        size_t part = n < room ? n : room;
+        memcpy(out->buffer + out->used, from, part);
+        out->used += part;
+        from += part;
+        n -= part;
+        if (out->used == BUFFER_BYTES) {
+            flush(out);
+        }
+    }
+}
+
+void host_output_text(struct host_output *out, const char *text)
+{
+    host_output_bytes(out, text, strlen(text));
+}
+
+void host_output_unsigned(struct host_output *out, uint64_t value)
+{
+    char digits[20];
+    size_t at = sizeof digits;
+    do {
+        digits[--at] = (char)('0' + value % 10);
+        value /= 10;
+    } while (value != 0);
+    host_output_bytes(out, digits + at, sizeof digits - at);
+}
+
+void host_output_double(struct host_output *out, double value)
+{
+    char text[40];
+    if (value == floor(value) && fabs(value) < 1e15) {
+        if (signbit(value)) {
+            host_output_text(out, "-");
+        }
+        host_output_unsigned(out, (uint64_t)fabs(value));
+        return;
+    }
+    int n = snprintf(text, sizeof text, "%.17g", value);
+    host_output_bytes(out, text, (size_t)n);
+}
+
+static void finish(struct host_output *out, struct host_error *error)
+{
+    if (out->file >= 0) {
+        flush(out);
+        if (out->file != STDOUT_FILENO && close(out->file) != 0 &&
+            out->failure == 0) {
+            out->failure = errno;
+        }
+        out->file = -1;
+    }
+    if (out->failure != 0) {
+        host_fail(error, HOST_INPUT,
+                  "%s: writing failed (%s); make room or choose another place",
+                  out->path, strerror(out->failure));
+    }
+}
+
+int host_output_close(struct host_output *out, size_t n,
+                      struct host_error *error)
+{
+    for (size_t i = 0; i < n; i++) {
+        finish(&out[i], error);
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (out[i].temporary != NULL && error->code == 0 &&
+            rename(out[i].temporary, out[i].target) != 0) {
+            cannot_make(out[i].path, errno, error);
+        } else if (out[i].temporary != NULL && error->code == 0) {
+            free(out[i].temporary);
+            out[i].temporary = NULL;
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (out[i].temporary != NULL) {
+            (void)unlink(out[i].temporary);
+        }
+        free(out[i].temporary);
+        free(out[i].target);
+        free(out[i].buffer);
+        out[i] = (struct host_output){.file = -1};
+    }
+    return error->code;
+}
