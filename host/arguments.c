@@ -311,7 +311,7 @@ static error_t parse_report(int key, char *value, struct argp_state *state,
         return 0;
     case ARGP_KEY_END:
         if (o->input == NULL) {
-            argp_error(state, "no file of points; give one, or - for "
+            argp_error(state, "no POINTS; give a file, or - for "
                               "standard input");
         }
         return 0;

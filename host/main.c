@@ -26,7 +26,7 @@ struct simple {
     const char *output;
     uint64_t seed;
     unsigned nodes;
-    struct host_error *error;
+    const char *wanted; /* names of the arguments */
 };
 
 static error_t parse_simple(int key, char *value, struct argp_state *state)
@@ -60,7 +60,8 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
         return 0;
     case ARGP_KEY_END:
         if (s->count < s->least) {
-            argp_error(state, "too few arguments; see --help");
+            argp_error(state, "%s: too few arguments; give all of these",
+                       s->wanted);
         }
         return 0;
     default:
@@ -76,6 +77,7 @@ static void parse(int argc, char **argv, const struct argp_option *options,
                               NULL,    NULL,         NULL};
     simple->least = count;
     simple->most = count;
+    simple->wanted = arguments;
     (void)argp_parse(&argp, argc, argv, 0, NULL, simple);
 }
 
@@ -221,7 +223,8 @@ static error_t parse_top(int key, char *value, struct argp_state *state)
         state->next = state->argc;
         return 0;
     case ARGP_KEY_NO_ARGS:
-        argp_usage(state);
+        argp_error(state, "no command; allowed: run, gen, verify, digest, "
+                          "convert, bench");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;

@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "../node/node.h"
 #include "../transport/drivers/tcp.h"
 #include "hull.h"
 #include "report.h"
@@ -136,6 +137,41 @@ static int run_service(const struct host_run_options *options,
     return status;
 }
 
+/* The least memory that node 0, which has the most links, does with. */
+static uint64_t memory_needed(const struct host_run_options *options,
+                              unsigned dimension,
+                              const struct incode_setup *setup)
+{
+    struct node_identity identity = {0, (uint8_t)dimension,
+                                     (uint8_t)options->window, 1};
+    uint64_t memory = HOST_MEMORY_MIN;
+    while (node_arena_needed(&identity, memory, setup) + HOST_STACK_BYTES +
+               HOST_STATIC_BYTES >
+           memory) {
+        memory += 16384;
+    }
+    return memory;
+}
+
+static int check_memory(const struct host_run_options *options,
+                        const struct host_order *order, unsigned dimension,
+                        struct host_error *error)
+{
+    struct incode_setup setup = {0};
+    setup.bricks = order->bricks;
+    setup.index = (uint8_t)options->index;
+    memcpy(setup.cells, order->cells, sizeof setup.cells);
+    uint64_t needed = memory_needed(options, dimension, &setup);
+    return needed <= options->memory
+               ? 0
+               : host_fail(error, HOST_USAGE,
+                           "--memory %lluK: index %s on %u nodes needs at "
+                           "least %lluK; give that, or another --index",
+                           (unsigned long long)options->memory / 1024,
+                           host_index_name(options->index), 1u << dimension,
+                           (unsigned long long)needed / 1024);
+}
+
 int host_triangulate(const struct host_run_options *options,
                      const struct host_points *points,
                      struct host_tetrahedra *tets,
@@ -175,6 +211,9 @@ int host_triangulate(const struct host_run_options *options,
         result->rows = order.rows;
         result->points = order.points;
         result->duplicates = order.duplicates;
+        status = check_memory(options, &order, cluster.dimension, error);
+    }
+    if (status == 0) {
         status = run_service(options, &order, &cluster, &service, tets, result,
                              error);
     }

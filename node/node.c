@@ -36,19 +36,34 @@ static size_t up64(size_t bytes)
     return (bytes + 63) / 64 * 64;
 }
 
+/* The cube as this node's straps and memory make it. */
+static struct cube_config configure(const struct node_identity *identity,
+                                    size_t memory)
+{
+    struct cube_config config;
+    memset(&config, 0, sizeof config);
+    config.self = identity->self;
+    config.dimension = identity->dimension;
+    config.window =
+        identity->window != 0 ? identity->window : window_for(memory);
+    config.epoch = identity->epoch;
+    return config;
+}
+
+size_t node_arena_needed(const struct node_identity *identity, size_t memory,
+                         const struct incode_setup *setup)
+{
+    struct cube_config config = configure(identity, memory);
+    return up64(sizeof(struct node)) + up64(cube_arena_bytes(&config)) +
+           node_worker_outbox_bytes(memory) + incode_arena_min(setup);
+}
+
 struct node *node_start(const struct node_board *board, const char **why)
 {
     uint8_t *memory = board->arena;
     size_t own = up64(sizeof(struct node));
-    struct cube_config config;
-    memset(&config, 0, sizeof config);
-    config.self = board->identity.self;
-    config.dimension = board->identity.dimension;
-    config.window = board->identity.window;
-    if (config.window == 0) {
-        config.window = window_for(board->arena_bytes + board->fixed_bytes);
-    }
-    config.epoch = board->identity.epoch;
+    struct cube_config config =
+        configure(&board->identity, board->arena_bytes + board->fixed_bytes);
     memcpy(config.pipes, board->pipes, sizeof config.pipes);
     *why = incode_arithmetic_fault();
     if (*why != NULL) {

@@ -27,6 +27,11 @@ struct node; /* opaque: lives at the start of the arena */
 /* NULL where the arena does not suffice or the arithmetic is unsound: *why. */
 struct node *node_start(const struct node_board *board, const char **why);
 
+/* Bytes of arena that a node of this identity needs for this setup, where its
+ * memory (arena and fixed) is `memory` in all. */
+size_t node_arena_needed(const struct node_identity *identity, size_t memory,
+                         const struct incode_setup *setup);
+
 enum node_event node_step(struct node *node);
 
 /* Microseconds until node_step must be called even if no byte comes. */

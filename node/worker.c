@@ -159,6 +159,14 @@ static uint32_t slots(size_t bytes, uint32_t min, uint32_t max)
     return count < min ? min : count > max ? max : (uint32_t)count;
 }
 
+size_t node_worker_outbox_bytes(size_t memory)
+{
+    uint32_t results =
+        slots(memory, NODE_RESULT_SLOTS_MIN, NODE_RESULT_SLOTS_MAX);
+    uint32_t spills = slots(memory, NODE_SPILL_SLOTS_MIN, NODE_SPILL_SLOTS_MAX);
+    return (NODE_OUTBOX_BYTES(results + spills) + 63) / 64 * 64;
+}
+
 int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
                       struct cube *cube, const struct node_setup_message *setup,
                       const char **why)

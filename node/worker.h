@@ -48,7 +48,10 @@ struct node_worker {
     const char *fault; /* NULL, or why this node cannot go on */
 };
 
-/* NULL where the memory does not suffice, *why says so. */
+/* Bytes of both outboxes in a node of so much memory, at most. */
+size_t node_worker_outbox_bytes(size_t memory);
+
+/* 0, or -1 where the memory does not suffice: *why says so. */
 int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
                       struct cube *cube, const struct node_setup_message *setup,
                       const char **why);
