@@ -17,31 +17,23 @@ enum {
     TERM_LIMBS = 2 * FACTORS_MAX + 1
 };
 
-/* A coordinate: sign * (m[0] + 2^32 m[1]) * 2^e, e >= 0 counted from the least
- * exponent present; sign 0 for zero. */
-struct part {
-    uint32_t m[2];
-    int32_t e;
-    int32_t sign;
-};
-
-struct problem {
-    struct part p[POINTS_MAX][3];
-    int32_t limbs;           /* in use */
-    int64_t limb[LIMBS_MAX]; /* of 32 bits, with carries not yet passed on */
-};
-
-/* A monomial under way, of `limbs` limbs. */
+/* sign * m * 2^e, m of `limbs` limbs of 32 bits, the top one not zero; sign 0
+ * for zero.  e >= 0 is counted from the least exponent present. */
 struct term {
-    uint32_t limb[TERM_LIMBS];
+    uint32_t m[TERM_LIMBS];
     int32_t limbs;
     int32_t e;
     int32_t sign;
 };
 
-static struct part part_of(double value)
+struct problem {
+    struct term p[POINTS_MAX][3];
+    int32_t limbs;           /* in use */
+    int64_t limb[LIMBS_MAX]; /* of 32 bits, with carries not yet passed on */
+};
+
+static void term_of(struct term *t, double value)
 {
-    struct part part = {{0, 0}, 0, 0};
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     uint64_t m = bits & 0xfffffffffffffu;
@@ -51,16 +43,37 @@ static struct part part_of(double value)
         m |= 0x10000000000000u;
     else
         e = 1;
-    if (m == 0)
-        return part;
+    if (m == 0) {
+        t->sign = 0;
+        return;
+    }
     /* Trailing zeros go to the exponent: data of few bits stay short. */
     int32_t zeros = __builtin_ctzll(m);
     m >>= zeros;
-    part.m[0] = (uint32_t)m;
-    part.m[1] = (uint32_t)(m >> 32);
-    part.e = e - 1 + zeros + EXPONENT_LEAST;
-    part.sign = (bits >> 63) != 0 ? -1 : 1;
-    return part;
+    t->m[0] = (uint32_t)m;
+    t->m[1] = (uint32_t)(m >> 32);
+    t->limbs = t->m[1] != 0 ? 2 : 1;
+    t->e = e - 1 + zeros + EXPONENT_LEAST;
+    t->sign = (bits >> 63) != 0 ? -1 : 1;
+}
+
+/* The determinants depend on differences alone: where all those from the last
+ * point are doubles, they take the points' place and that point becomes 0,
+ * which leaves a fifth of the monomials.  False where they are not. */
+static bool translate(double q[POINTS_MAX][3], const double *const p[],
+                      int32_t points)
+{
+    const double *origin = p[points - 1];
+    for (int32_t i = 0; i < points; i++) {
+        for (int32_t k = 0; k < 3; k++) {
+            /* Knuth's two-sum; after an overflow its error is no number. */
+            double a = p[i][k], x = a - origin[k], bv = a - x, av = x + bv;
+            if ((a - av) + (bv - origin[k]) != 0)
+                return false;
+            q[i][k] = x;
+        }
+    }
+    return true;
 }
 
 /* Reads the points and clears an accumulator for sums of products of `degree`
@@ -68,73 +81,64 @@ static struct part part_of(double value)
 static void problem_init(struct problem *s, const double *const p[],
                          int32_t points, int32_t degree)
 {
-    int32_t least = 0, most = 0;
-    bool any = false;
+    double moved[POINTS_MAX][3];
+    bool translated = translate(moved, p, points);
+    int32_t least = INT32_MAX, most = INT32_MIN;
     for (int32_t i = 0; i < points; i++) {
         for (int32_t k = 0; k < 3; k++) {
-            struct part part = part_of(p[i][k]);
-            s->p[i][k] = part;
-            if (part.sign == 0)
+            struct term *t = &s->p[i][k];
+            term_of(t, translated ? moved[i][k] : p[i][k]);
+            if (t->sign == 0)
                 continue;
-            if (!any || part.e < least)
-                least = part.e;
-            if (!any || part.e > most)
-                most = part.e;
-            any = true;
+            least = t->e < least ? t->e : least;
+            most = t->e > most ? t->e : most;
         }
     }
+    s->limbs = 2;
+    if (most >= least)
+        s->limbs = (degree * (most - least + 53) + 10) / 32 + 2;
+    INCODE_ASSERT(s->limbs <= LIMBS_MAX);
+    memset(s->limb, 0, (size_t)s->limbs * sizeof s->limb[0]);
     for (int32_t i = 0; i < points; i++) {
         for (int32_t k = 0; k < 3; k++)
             s->p[i][k].e -= s->p[i][k].sign != 0 ? least : 0;
     }
-    s->limbs = (degree * (most - least + 53) + 10) / 32 + 2;
-    INCODE_ASSERT(s->limbs <= LIMBS_MAX);
-    memset(s->limb, 0, (size_t)s->limbs * sizeof s->limb[0]);
 }
 
-static struct term term_one(int32_t sign)
+/* r = a * b, neither of which is zero. */
+static void term_product(struct term *r, const struct term *a,
+                         const struct term *b)
 {
-    struct term t = {{1}, 1, 0, sign};
-    return t;
-}
-
-/* t * f; the caller has seen to it that f is not zero. */
-static struct term term_times(const struct term *t, const struct part *f)
-{
-    struct term r;
-    int32_t n = t->limbs;
-    INCODE_ASSERT(n + 2 <= TERM_LIMBS);
-    memset(r.limb, 0, (size_t)(n + 2) * sizeof r.limb[0]);
-    for (int32_t j = 0; j < 2; j++) {
+    INCODE_ASSERT(a->limbs + b->limbs <= TERM_LIMBS);
+    for (int32_t j = 0; j < b->limbs; j++) {
         uint64_t carry = 0;
-        for (int32_t i = 0; i < n; i++) {
-            carry += (uint64_t)t->limb[i] * f->m[j] + r.limb[i + j];
-            r.limb[i + j] = (uint32_t)carry;
+        for (int32_t i = 0; i < a->limbs; i++) {
+            carry += (uint64_t)a->m[i] * b->m[j] + (j != 0 ? r->m[i + j] : 0);
+            r->m[i + j] = (uint32_t)carry;
             carry >>= 32;
         }
-        r.limb[n + j] = (uint32_t)carry;
+        r->m[a->limbs + j] = (uint32_t)carry;
     }
-    r.limbs = n + 2;
-    while (r.limb[r.limbs - 1] == 0)
-        r.limbs--;
-    r.e = t->e + f->e;
-    r.sign = t->sign * f->sign;
-    return r;
+    r->limbs = a->limbs + b->limbs;
+    r->limbs -= r->m[r->limbs - 1] == 0;
+    r->e = a->e + b->e;
+    r->sign = a->sign * b->sign;
 }
 
-static void problem_add(struct problem *s, const struct term *t)
+/* s += factor * t, factor being 1, -1, 2 or -2. */
+static void problem_add(struct problem *s, const struct term *t, int32_t factor)
 {
-    int32_t at = t->e / 32, shift = t->e % 32;
+    int32_t e = t->e + (factor == 2 || factor == -2);
+    int32_t at = e / 32, shift = e % 32;
     INCODE_ASSERT(at + t->limbs < s->limbs);
+    int64_t flip = (t->sign < 0) != (factor < 0) ? -1 : 0;
     uint64_t carry = 0;
     for (int32_t i = 0; i < t->limbs; i++) {
-        carry |= (uint64_t)t->limb[i] << shift;
-        int64_t digit = (int64_t)(carry & 0xffffffffu);
-        s->limb[at + i] += t->sign < 0 ? -digit : digit;
+        carry |= (uint64_t)t->m[i] << shift;
+        s->limb[at + i] += ((int64_t)(carry & 0xffffffffu) ^ flip) - flip;
         carry >>= 32;
     }
-    int64_t digit = (int64_t)carry;
-    s->limb[at + t->limbs] += t->sign < 0 ? -digit : digit;
+    s->limb[at + t->limbs] += ((int64_t)carry ^ flip) - flip;
 }
 
 static int problem_sign(const struct problem *s)
@@ -149,24 +153,25 @@ static int problem_sign(const struct problem *s)
     return carry < 0 ? -1 : any != 0 || carry > 0;
 }
 
-/* sign * det(i, j, k) of three points, in each monomial; hands the monomials
- * that are not zero to t[0..5] and returns their number. */
-static int32_t minor3(const struct problem *s, int32_t i, int32_t j, int32_t k,
-                      int32_t sign, struct term t[6])
+/* The monomials of det(p_i, p_j, p_k) that are not zero, with their signs;
+ * returns their number. */
+static int32_t minor3(struct term t[6], const struct problem *s, int32_t i,
+                      int32_t j, int32_t k)
 {
     static const uint8_t order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
                                         {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
     int32_t n = 0;
     for (int32_t o = 0; o < 6; o++) {
-        const struct part *x = &s->p[i][order[o][0]];
-        const struct part *y = &s->p[j][order[o][1]];
-        const struct part *z = &s->p[k][order[o][2]];
+        const struct term *x = &s->p[i][order[o][0]];
+        const struct term *y = &s->p[j][order[o][1]];
+        const struct term *z = &s->p[k][order[o][2]];
         if (x->sign == 0 || y->sign == 0 || z->sign == 0)
             continue;
-        struct term one = term_one(o < 3 ? sign : -sign);
-        struct term fx = term_times(&one, x);
-        struct term fxy = term_times(&fx, y);
-        t[n++] = term_times(&fxy, z);
+        struct term xy;
+        term_product(&xy, x, y);
+        term_product(&t[n], &xy, z);
+        t[n].sign = o < 3 ? t[n].sign : -t[n].sign;
+        n++;
     }
     return n;
 }
@@ -180,66 +185,66 @@ int incode_exact_orient3d(const double *const p[4])
     static const uint8_t rows[4][3] = {
         {1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
     for (int32_t r = 0; r < 4; r++) {
-        int32_t n = minor3(&s, rows[r][0], rows[r][1], rows[r][2],
-                           r % 2 == 0 ? 1 : -1, t);
+        int32_t n = minor3(t, &s, rows[r][0], rows[r][1], rows[r][2]);
         for (int32_t m = 0; m < n; m++)
-            problem_add(&s, &t[m]);
+            problem_add(&s, &t[m], r % 2 == 0 ? 1 : -1);
     }
     return problem_sign(&s);
 }
 
-/* Adds sign * t * |p_i|^2. */
-static void add_lifted(struct problem *s, const struct term *t, int32_t i,
-                       int32_t sign)
+/* s += sign * t * |p_i|^2, squares being those of the coordinates of p_i. */
+static void add_lifted(struct problem *s, const struct term *t,
+                       const struct term squares[3], int32_t sign)
 {
+    struct term product;
     for (int32_t k = 0; k < 3; k++) {
-        const struct part *f = &s->p[i][k];
-        if (f->sign == 0)
+        if (squares[k].sign == 0)
             continue;
-        struct term once = term_times(t, f);
-        struct term twice = term_times(&once, f);
-        twice.sign *= sign;
-        problem_add(s, &twice);
+        term_product(&product, t, &squares[k]);
+        problem_add(s, &product, sign);
     }
 }
 
 int incode_exact_in_sphere(const double *const p[5])
 {
     struct problem s;
-    struct term t[6];
+    struct term squares[5][3], t[6];
     problem_init(&s, p, 5, 5);
+    for (int32_t i = 0; i < 5; i++) {
+        for (int32_t k = 0; k < 3; k++) {
+            squares[i][k].sign = 0;
+            if (s.p[i][k].sign != 0)
+                term_product(&squares[i][k], &s.p[i][k], &s.p[i][k]);
+        }
+    }
     /* -det with rows (x, y, z, |p|^2, 1): for each pair i < j of rows that
      * give the last two columns, (-1)^(i+j) (|p_i|^2 - |p_j|^2) det3. */
     for (int32_t i = 0; i < 5; i++) {
         for (int32_t j = i + 1; j < 5; j++) {
-            int32_t rest[3], n = 0;
+            int32_t rest[3], n = 0, sign = (i + j) % 2 == 0 ? 1 : -1;
             for (int32_t k = 0; k < 5; k++) {
                 if (k != i && k != j)
                     rest[n++] = k;
             }
-            n = minor3(&s, rest[0], rest[1], rest[2], (i + j) % 2 == 0 ? 1 : -1,
-                       t);
+            n = minor3(t, &s, rest[0], rest[1], rest[2]);
             for (int32_t m = 0; m < n; m++) {
-                add_lifted(&s, &t[m], i, 1);
-                add_lifted(&s, &t[m], j, -1);
+                add_lifted(&s, &t[m], squares[i], sign);
+                add_lifted(&s, &t[m], squares[j], -sign);
             }
         }
     }
     return problem_sign(&s);
 }
 
-/* Adds factor * x * y, factor being 1, -1, 2 or -2. */
-static void add_product(struct problem *s, int32_t factor, const struct part *x,
-                        const struct part *y)
+/* s += factor * x * y, factor being 1, -1, 2 or -2. */
+static void add_product(struct problem *s, int32_t factor, const struct term *x,
+                        const struct term *y)
 {
     if (x->sign == 0 || y->sign == 0)
         return;
-    struct term one = term_one(factor < 0 ? -1 : 1);
-    if (factor == 2 || factor == -2)
-        one.limb[0] = 2;
-    struct term fx = term_times(&one, x);
-    struct term fxy = term_times(&fx, y);
-    problem_add(s, &fxy);
+    struct term xy;
+    term_product(&xy, x, y);
+    problem_add(s, &xy, factor);
 }
 
 int incode_exact_compare_distance(const double *const p[3])

@@ -6,7 +6,7 @@
  * actually present (Kulisch's accumulator).  Differences are never formed, so
  * nothing can overflow, underflow or be rounded.
  *
- * Memory: at most 5 KB of stack (INCODE_EXACT_STACK).  Work: 24 (orient3d), 360
+ * Memory: at most 6 KB of stack (INCODE_EXACT_STACK).  Work: 24 (orient3d), 360
  * (in_sphere), 12 (compare_distance) or 18 (collinear) monomials.
  *
  *     const double *p[5] = {a, b, c, d, e};
@@ -18,7 +18,7 @@
 #include <stdbool.h>
 
 /* Stack of the deepest call here, bytes, on any of the machines built for. */
-#define INCODE_EXACT_STACK 5120
+#define INCODE_EXACT_STACK 6144
 
 /* Sign of the determinant with rows p1-p0, p2-p0, p3-p0. */
 int incode_exact_orient3d(const double *const p[4]);

@@ -2,33 +2,14 @@
 
 #include <string.h>
 
+#include "scale.h"
+
 _Static_assert((-1 >> 1) == -1, "shifts of negative numbers keep the sign");
 
 /* ---- from doubles to integers ---- */
 
-static double power_of_two(int32_t e)
-{
-    uint64_t bits = (uint64_t)(e + 1023) << 52;
-    double value;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
-/* Two factors, since 2^k itself may leave the range of doubles. */
-struct scale {
-    double up1, up2, down1, down2;
-};
-
-static struct scale scale_of(int32_t k)
-{
-    int32_t half = k / 2, rest = k - half;
-    struct scale s = {power_of_two(half), power_of_two(rest),
-                      power_of_two(-half), power_of_two(-rest)};
-    return s;
-}
-
 /* n = v * 2^k; 1 where that is no integer, else 0. */
-static inline int scaled(int64_t *n, double v, const struct scale *s)
+static inline int scaled(int64_t *n, double v, const struct incode_scale *s)
 {
     *n = (int64_t)(v * s->up1 * s->up2);
     return (double)*n * s->down1 * s->down2 != v;
@@ -37,7 +18,7 @@ static inline int scaled(int64_t *n, double v, const struct scale *s)
 /* Inlined for each count, so that the loops are straight code. */
 static inline __attribute__((always_inline)) bool
 differences(int64_t d[][3], const double *const p[], int count,
-            const double origin[3], const struct scale *s)
+            const double origin[3], const struct incode_scale *s)
 {
     double tail[4][3];
     int bad = 0, inexact = 0;
@@ -67,13 +48,9 @@ differences(int64_t d[][3], const double *const p[], int count,
 bool incode_fixed_differences(int64_t d[][3], const double *const p[],
                               int count, const double origin[3], double most)
 {
-    uint64_t bits;
-    memcpy(&bits, &most, sizeof bits);
-    int32_t e = (int32_t)(bits >> 52);
-    if (e > 2044)
-        return false; /* near overflow, where the two-sum could fail */
-    /* All are below 2^(e-1022), denormals (e = 0) too: below 2^61 by 2^k. */
-    struct scale s = scale_of(1083 - (e == 0 ? 1 : e));
+    struct incode_scale s;
+    if (!incode_scale_init(&s, most))
+        return false; /* where the two-sum could fail, too */
     switch (count) {
     case 2:
         return differences(d, p, 2, origin, &s);
@@ -146,26 +123,55 @@ static void words_of(words2 r, int64_t a)
     r[1] = (uint32_t)((uint64_t)a >> 32);
 }
 
+/* r += a b or r -= a b */
+static void accumulate_product(words4 r, int64_t a, int64_t b, bool subtract)
+{
+    words2 p, q;
+    words4 t;
+    words_of(p, a);
+    words_of(q, b);
+    product(t, p, 2, q, 2);
+    accumulate(r, t, 4, subtract);
+}
+
 static void minor3_portable(words6 r, const int64_t a[3], const int64_t b[3],
                             const int64_t c[3])
 {
-    words2 p, q;
-    words4 t, minor;
-    words6 term;
     memset(r, 0, sizeof(words6));
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
-        words_of(p, b[u]);
-        words_of(q, c[v]);
-        product(minor, p, 2, q, 2);
-        words_of(p, c[u]);
-        words_of(q, b[v]);
-        product(t, p, 2, q, 2);
-        accumulate(minor, t, 4, true);
-        words_of(p, a[k]);
-        product(term, minor, 4, p, 2);
+        words2 w;
+        words4 minor = {0};
+        words6 term;
+        accumulate_product(minor, b[u], c[v], false);
+        accumulate_product(minor, c[u], b[v], true);
+        words_of(w, a[k]);
+        product(term, minor, 4, w, 2);
         accumulate(r, term, 6, false);
     }
+}
+
+int incode_fixed_compare_norm(const int64_t d[2][3])
+{
+    words4 difference = {0};
+    for (int k = 0; k < 3; k++) {
+        accumulate_product(difference, d[0][k], d[0][k], false);
+        accumulate_product(difference, d[1][k], d[1][k], true);
+    }
+    return words_sign(difference, 4);
+}
+
+bool incode_fixed_parallel(const int64_t d[2][3])
+{
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        words4 minor = {0};
+        accumulate_product(minor, d[0][u], d[1][v], false);
+        accumulate_product(minor, d[1][u], d[0][v], true);
+        if (words_sign(minor, 4) != 0)
+            return false;
+    }
+    return true;
 }
 
 int incode_fixed_orient3d_portable(const int64_t d[3][3])
@@ -181,15 +187,11 @@ int incode_fixed_in_sphere_portable(const int64_t d[4][3], int swapped[4])
         {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
     uint32_t det[10] = {0};
     for (int i = 0; i < 4; i++) {
-        words4 lift = {0}, square;
+        words4 lift = {0};
         words6 minor;
         uint32_t term[10];
-        for (int k = 0; k < 3; k++) {
-            words2 w;
-            words_of(w, d[i][k]);
-            product(square, w, 2, w, 2);
-            accumulate(lift, square, 4, false);
-        }
+        for (int k = 0; k < 3; k++)
+            accumulate_product(lift, d[i][k], d[i][k], false);
         minor3_portable(minor, d[rest[i][0]], d[rest[i][1]], d[rest[i][2]]);
         swapped[i] = words_sign(minor, 6);
         product(term, lift, 4, minor, 6);

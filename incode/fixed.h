@@ -30,8 +30,14 @@ int incode_fixed_orient3d(const int64_t d[3][3]);
  * i-th point: the symbolic perturbation asks for it. */
 int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4]);
 
-/* The same from 32-bit words alone, for processors without a 128-bit product;
- * on the others they are there for comparison. */
+/* Sign of |d[0]|^2 - |d[1]|^2, exact for |d[i][j]| <= 2^61. */
+int incode_fixed_compare_norm(const int64_t d[2][3]);
+
+/* Whether d[0] x d[1] = 0, exact for |d[i][j]| <= 2^61. */
+bool incode_fixed_parallel(const int64_t d[2][3]);
+
+/* The first two from 32-bit words alone, for processors without a 128-bit
+ * product; on the others they are there for comparison. */
 int incode_fixed_orient3d_portable(const int64_t d[3][3]);
 int incode_fixed_in_sphere_portable(const int64_t d[4][3], int swapped[4]);
 

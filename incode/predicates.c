@@ -1,9 +1,15 @@
 #include "predicates.h"
 
-#include <float.h>
-
 #include "exact.h"
 #include "fixed.h"
+#include "pair.h"
+
+/* Each sign comes from the first stage that is sure of it:
+ *   the rounded determinant and a bound on its error (static filter);
+ *   integers of one common scale (fixed.h), which also settle true zeros;
+ *   numbers of two doubles and a bound on their error (pair.h);
+ *   the polynomial itself, without rounding (exact.h).
+ * Stack: below INCODE_EXACT_STACK + 1024 bytes. */
 
 /* Static filters of Devillers and Pion: the sign of the rounded determinant is
  * right where it exceeds these times the largest differences, as long as no
@@ -50,6 +56,9 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     int64_t n[3][3];
     if (incode_fixed_differences(n, p + 1, 3, a, most))
         return incode_fixed_orient3d((const int64_t(*)[3])n);
+    int sign;
+    if (incode_pair_orient3d(p, most, &sign))
+        return sign;
     return incode_exact_orient3d(p);
 }
 
@@ -101,10 +110,12 @@ static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
                            double most)
 {
     int64_t n[4][3];
-    int swapped[4], m[2];
+    int swapped[4], m[2], sign;
     bool fixed = incode_fixed_differences(n, p, 4, p[4], most);
-    int sign = fixed ? incode_fixed_in_sphere((const int64_t(*)[3])n, swapped)
-                     : incode_exact_in_sphere(p);
+    if (fixed)
+        sign = incode_fixed_in_sphere((const int64_t(*)[3])n, swapped);
+    else if (!incode_pair_in_sphere(p, most, &sign))
+        sign = incode_exact_in_sphere(p);
     tally->exact_in_sphere++;
     if (sign != 0)
         return sign;
@@ -150,28 +161,57 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
     return in_sphere_exact(tally, p, most);
 }
 
+/* Differences of two points from the third, as rounded, and the largest. */
+static double differences2(double a[3], double b[3], const double *const p[2],
+                           const double origin[3])
+{
+    double most = 0;
+    for (int k = 0; k < 3; k++) {
+        a[k] = p[0][k] - origin[k];
+        b[k] = p[1][k] - origin[k];
+        most = larger(most, larger(magnitude(a[k]), magnitude(b[k])));
+    }
+    return most;
+}
+
+/* Eight roundings at most stand between a sum of products and the exact one;
+ * above the least sum here underflow is nothing beside them. */
+static const double rounding_bound = 8 * 0x1p-53;
+static const double least_sum = 1e-290, most_sum = 1e290;
+
 int incode_compare_distance(const double p[3], const double a[3],
                             const double b[3])
 {
     const double *q[3] = {p, a, b};
+    double u[3], v[3], most = differences2(u, v, q + 1, p);
+    double s = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
+    double t = v[0] * v[0] + v[1] * v[1] + v[2] * v[2], sum = s + t;
+    if (sum > least_sum && sum < most_sum) {
+        if (s - t > rounding_bound * sum)
+            return 1;
+        if (t - s > rounding_bound * sum)
+            return -1;
+    }
+    int64_t n[2][3];
+    if (incode_fixed_differences(n, q + 1, 2, p, most))
+        return incode_fixed_compare_norm((const int64_t(*)[3])n);
     return incode_exact_compare_distance(q);
 }
 
 bool incode_collinear(const double a[3], const double b[3], const double c[3])
 {
     const double *q[3] = {a, b, c};
+    double u[3], v[3], most = differences2(u, v, q + 1, a);
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        double s = u[i] * v[j], t = v[i] * u[j];
+        double sum = magnitude(s) + magnitude(t);
+        if (sum > least_sum && sum < most_sum &&
+            magnitude(s - t) > rounding_bound * sum)
+            return false;
+    }
+    int64_t n[2][3];
+    if (incode_fixed_differences(n, q + 1, 2, a, most))
+        return incode_fixed_parallel((const int64_t(*)[3])n);
     return incode_exact_collinear(q);
-}
-
-const char *incode_arithmetic_fault(void)
-{
-    volatile double one = 1.0, tiny = 0x1p-53, odd = 0x1.0000002p0;
-    volatile double square = -0x1.0000004p0, least = DBL_MIN, half = 0.5;
-    volatile double sum = one + tiny, contracted = odd * odd + square;
-    if (sum != one || contracted != 0.0)
-        return "arithmetic is not plain IEEE double";
-    volatile double denormal = least * half;
-    if (denormal == 0.0 || denormal + denormal != least)
-        return "denormals are flushed to zero";
-    return 0;
 }

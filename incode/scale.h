@@ -1,0 +1,48 @@
+/* Multiplication by a power of two that brings numbers near 2^61, whatever
+ * their exponents: exact, but for what falls below the least double on the way
+ * down.
+ *
+ * Memory: none.  Work: constant.
+ *
+ *     struct incode_scale s;
+ *     if (incode_scale_init(&s, most)) y = x * s.up1 * s.up2;
+ */
+#ifndef INCODE_SCALE_H
+#define INCODE_SCALE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+/* Two factors each way, since their product may leave the range of doubles. */
+struct incode_scale {
+    double up1, up2, down1, down2;
+};
+
+static inline double incode_power_of_two(int32_t e)
+{
+    uint64_t bits = (uint64_t)(e + 1023) << 52;
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* Scales what is at most `most` >= 0 to less than 2^61.  False near overflow:
+ * from 2^1022 on. */
+static inline bool incode_scale_init(struct incode_scale *s, double most)
+{
+    uint64_t bits;
+    memcpy(&bits, &most, sizeof bits);
+    int32_t e = (int32_t)(bits >> 52);
+    if (e > 2044)
+        return false;
+    /* most < 2^(e-1022); denormals (e = 0) are below 2^-1022. */
+    int32_t k = 1083 - (e == 0 ? 1 : e), half = k / 2;
+    s->up1 = incode_power_of_two(half);
+    s->up2 = incode_power_of_two(k - half);
+    s->down1 = incode_power_of_two(-half);
+    s->down2 = incode_power_of_two(half - k);
+    return true;
+}
+
+#endif
