@@ -14,8 +14,9 @@
 
 /* Kinds: uniform (the unit cube), bubbles (spheres of points, dense shells),
  * bluntfin (a curvilinear grid like NASA's Blunt Fin), sphere (the unit
- * sphere's surface), grid (a cubic lattice), hub (one point amid n-1 on a
- * sphere).  HOST_USAGE for another kind or fewer than 4 points. */
+ * sphere's surface), grid (a cubic lattice), rotated (the same out of its
+ * axes), hub (one point amid n-1 on a sphere).  HOST_USAGE for another kind or
+ * fewer than 4 points. */
 int host_gen(const char *kind, uint64_t n, uint64_t seed,
              struct host_points *points, struct host_error *error);
 
