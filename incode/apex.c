@@ -146,7 +146,7 @@ static bool is_regular(const struct face *f)
 /* Of the sphere, only the closed cap beyond the face matters: where an extreme
  * point of the sphere lies on the known side, the rim of the face's circle is
  * the extreme. */
-static bool cap_fits(const struct incode_gather *g,
+static bool cap_fits(const double rlo[3], const double rhi[3],
                      const struct incode_sphere *s, const struct face *f,
                      double radius, double wide)
 {
@@ -167,17 +167,17 @@ static bool cap_fits(const struct incode_gather *g,
             hi = c0[d] + rim;
         if (level - radius * n[d] < 0)
             lo = c0[d] - rim;
-        if (!(hi + wide < g->rhi[d] && lo - wide > g->rlo[d]))
+        if (!(hi + wide < rhi[d] && lo - wide > rlo[d]))
             return false;
     }
     return true;
 }
 
-/* Whether the closed cap of the sphere beyond the face lies strictly inside
- * the gathered box.  Conservative: everything is widened by 1e-6 of the
+/* Whether the closed cap of the sphere beyond the face lies strictly inside a
+ * box that was scanned.  Conservative: everything is widened by 1e-6 of the
  * sphere's size, and an ill-conditioned sphere is never accepted. */
-static bool cap_is_gathered(const struct incode_gather *g,
-                            const struct incode_sphere *s, const struct face *f)
+static bool cap_is_within(const double rlo[3], const double rhi[3],
+                          const struct incode_sphere *s, const struct face *f)
 {
     if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) || !is_regular(f))
         return false;
@@ -186,9 +186,9 @@ static bool cap_is_gathered(const struct incode_gather *g,
     double wide = length * 1e-6 + 12 * INCODE_SPHERE_EPS * s->pm;
     bool fits = true;
     for (int d = 0; d < 3; d++)
-        fits = fits && s->m[d] + length + wide < g->rhi[d] * two &&
-               s->m[d] - length - wide > g->rlo[d] * two;
-    return fits || cap_fits(g, s, f, length / two, wide / two);
+        fits = fits && s->m[d] + length + wide < rhi[d] * two &&
+               s->m[d] - length - wide > rlo[d] * two;
+    return fits || cap_fits(rlo, rhi, s, f, length / two, wide / two);
 }
 
 struct near {
@@ -240,23 +240,26 @@ static void consider(struct near *n, uint32_t i)
     incode_sphere_apex(&n->sphere, n->face.b, n->face.c, r);
 }
 
-static void tournament(struct near *n)
+/* The points [from, to) against the best so far; without one, the nearest by
+ * Delaunay distance goes first. */
+static void contest(struct near *n, uint32_t from, uint32_t to)
 {
     struct incode_gather *g = &n->t->gather;
-    if (is_regular(&n->face)) {
-        uint32_t first =
-            incode_gather_first(g, n->sphere.n, n->face.m, n->face.nn);
+    n->t->stats.candidates += to - from;
+    if (n->best == INCODE_GATHER_NONE && is_regular(&n->face)) {
+        uint32_t first = incode_gather_first(g, from, to, n->sphere.n,
+                                             n->face.m, n->face.nn);
         if (first != INCODE_GATHER_NONE)
             consider(n, first);
     }
     if (n->best == INCODE_GATHER_NONE) {
         /* Nothing clearly beyond the face: look at all. */
-        for (uint32_t k = 0; k < g->near; k++)
+        for (uint32_t k = from; k < to; k++)
             consider(n, g->at[k]);
         return;
     }
     uint16_t inside[INCODE_NEAR_ALL];
-    uint32_t count = incode_gather_inside(g, &n->sphere, inside);
+    uint32_t count = incode_gather_inside(g, from, to, &n->sphere, inside);
     for (uint32_t k = 0; k < count; k++)
         consider(n, inside[k]);
 }
@@ -281,10 +284,15 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     incode_gather_relative(g, c, n.face.c);
     incode_sphere_plane(&n.sphere, n.face.b, n.face.c);
     set_face(&n.face, &n.sphere);
-    t->stats.candidates += g->near;
-    tournament(&n);
+    contest(&n, 0, g->inner);
     if (n.best != INCODE_GATHER_NONE &&
-        cap_is_gathered(g, &n.sphere, &n.face)) {
+        cap_is_within(g->inner_lo, g->inner_hi, &n.sphere, &n.face)) {
+        *apex = n.best;
+        return INCODE_NEAR_FOUND;
+    }
+    contest(&n, INCODE_OUTER, g->outer);
+    if (n.best != INCODE_GATHER_NONE &&
+        cap_is_within(g->rlo, g->rhi, &n.sphere, &n.face)) {
         *apex = n.best;
         return INCODE_NEAR_FOUND;
     }

@@ -10,7 +10,9 @@
 void incode_gather_reset(struct incode_gather *g)
 {
     g->leaf = INCODE_NONE;
-    g->near = g->around = g->count = 0;
+    g->around = g->count = 0;
+    g->inner = 0;
+    g->outer = INCODE_OUTER;
 }
 
 /* ---- around a leaf ---- */
@@ -81,15 +83,15 @@ enum incode_gathered incode_gather_around(struct incode_gather *g,
 
 /* ---- around a vertex ---- */
 
-/* w and l from index `first` on, and padding that no scan mistakes for a point:
- * two vectors' worth, with l infinite. */
-static void set_lengths(struct incode_gather *g, uint32_t first)
+/* w and l of points [first, end), and padding that no scan mistakes for a
+ * point: up to two vectors, with l infinite. */
+static void set_lengths(struct incode_gather *g, uint32_t first, uint32_t end)
 {
     incode_vi lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     incode_vf zero = incode_vf_all(0), infinite = incode_vf_all(INFINITE);
-    for (uint32_t i = first & ~15U; i < g->near + INCODE_VF_LANES;
+    for (uint32_t i = first & ~15U; i < end + INCODE_VF_LANES;
          i += INCODE_VF_LANES) {
-        int32_t n = (int32_t)(g->near - i);
+        int32_t n = (int32_t)(end - i);
         incode_vi in =
             lane < (incode_vi){n, n, n, n, n, n, n, n, n, n, n, n, n, n, n, n};
         incode_vf x = incode_vf_select(in, incode_vf_load(g->x + i), zero),
@@ -107,36 +109,76 @@ static void set_lengths(struct incode_gather *g, uint32_t first)
     }
 }
 
-/* Packs what lies in lo..hi; false: too many. */
+struct span {
+    incode_vd lo[3], hi[3];
+};
+
+INCODE_INLINE uint32_t within(const struct span *span, incode_vd x, incode_vd y,
+                              incode_vd z)
+{
+    return incode_vd_mask((x >= span->lo[0]) & (x <= span->hi[0]) &
+                          (y >= span->lo[1]) & (y <= span->hi[1]) &
+                          (z >= span->lo[2]) & (z <= span->hi[2]));
+}
+
+INCODE_INLINE void pack(struct incode_gather *g, uint32_t to, uint32_t in,
+                        incode_vd x, incode_vd y, incode_vd z, uint32_t at)
+{
+    incode_vd_pack_float(g->x + to, in, x);
+    incode_vd_pack_float(g->y + to, in, y);
+    incode_vd_pack_float(g->z + to, in, z);
+    incode_pack_count(g->at + to, in, at);
+}
+
+/* Packs what lies in the inner box and what lies in the outer alone; false:
+ * too many. */
 static bool select_near(struct incode_gather *g)
 {
-    incode_vd scale = incode_vd_all(g->scale), p0[3], lo[3], hi[3];
+    incode_vd scale = incode_vd_all(g->scale), p0[3];
+    struct span outer, inner;
     for (int d = 0; d < 3; d++) {
         p0[d] = incode_vd_all(g->p0[d]);
-        lo[d] = incode_vd_all(g->lo[d]);
-        hi[d] = incode_vd_all(g->hi[d]);
+        outer.lo[d] = incode_vd_all(g->lo[d]);
+        outer.hi[d] = incode_vd_all(g->hi[d]);
+        inner.lo[d] = incode_vd_all(g->inner_lo[d]);
+        inner.hi[d] = incode_vd_all(g->inner_hi[d]);
     }
-    uint32_t n = 0;
+    uint32_t n = 0, m = INCODE_OUTER;
     for (uint32_t i = 0; i < g->around; i += INCODE_VD_LANES) {
         incode_vd x = incode_vd_load(g->p[0] + i),
                   y = incode_vd_load(g->p[1] + i),
                   z = incode_vd_load(g->p[2] + i);
-        uint32_t in =
-            incode_vd_mask((x >= lo[0]) & (x <= hi[0]) & (y >= lo[1]) &
-                           (y <= hi[1]) & (z >= lo[2]) & (z <= hi[2]));
+        uint32_t in = within(&outer, x, y, z), near;
         if (g->around - i < INCODE_VD_LANES)
             in &= (UINT32_C(1) << (g->around - i)) - 1;
-        incode_vd_pack_float(g->x + n, in, (x - p0[0]) * scale);
-        incode_vd_pack_float(g->y + n, in, (y - p0[1]) * scale);
-        incode_vd_pack_float(g->z + n, in, (z - p0[2]) * scale);
-        incode_pack_count(g->at + n, in, i);
-        n += (uint32_t)__builtin_popcount(in);
-        if (n > INCODE_NEAR_POINTS - INCODE_AROUND_EXTRA)
+        near = in & within(&inner, x, y, z);
+        in ^= near;
+        x = (x - p0[0]) * scale;
+        y = (y - p0[1]) * scale;
+        z = (z - p0[2]) * scale;
+        pack(g, n, near, x, y, z, i);
+        pack(g, m, in, x, y, z, i);
+        n += (uint32_t)__builtin_popcount(near);
+        m += (uint32_t)__builtin_popcount(in);
+        if (n > INCODE_INNER_POINTS ||
+            m > INCODE_OUTER_END - INCODE_AROUND_EXTRA)
             return false;
     }
-    g->near = n;
-    set_lengths(g, 0);
+    g->inner = n;
+    g->outer = m;
+    set_lengths(g, 0, n);
+    set_lengths(g, INCODE_OUTER, m);
     return true;
+}
+
+#define INNER_SHARE 0.69 /* of the radius: a third of the points */
+
+/* One side of a box: the wall at `wall` of its direction `sign`, relative. */
+static double side(const struct incode_gather *g, int d, double wall,
+                   double end, double sign)
+{
+    bool beyond = sign > 0 ? wall >= end : wall <= end;
+    return beyond ? sign * __builtin_inf() : (wall - g->p0[d]) * g->scale;
 }
 
 static void set_box(struct incode_gather *g, double radius,
@@ -146,14 +188,18 @@ static void set_box(struct incode_gather *g, double radius,
     g->scale = incode_scale_for(radius);
     for (int d = 0; d < 3; d++) {
         double lo = g->p0[d] - radius, hi = g->p0[d] + radius;
+        double short_lo = g->p0[d] - radius * INNER_SHARE;
+        double short_hi = g->p0[d] + radius * INNER_SHARE;
         lo = lo > g->around_lo[d] ? lo : g->around_lo[d];
         hi = hi < g->around_hi[d] ? hi : g->around_hi[d];
+        short_lo = short_lo > lo ? short_lo : lo;
+        short_hi = short_hi < hi ? short_hi : hi;
         g->lo[d] = lo;
         g->hi[d] = hi;
-        g->rlo[d] =
-            lo <= domain_lo[d] ? -__builtin_inf() : (lo - g->p0[d]) * g->scale;
-        g->rhi[d] =
-            hi >= domain_hi[d] ? __builtin_inf() : (hi - g->p0[d]) * g->scale;
+        g->inner_lo[d] = short_lo;
+        g->inner_hi[d] = short_hi;
+        g->rlo[d] = side(g, d, lo, domain_lo[d], -1);
+        g->rhi[d] = side(g, d, hi, domain_hi[d], 1);
     }
 }
 
@@ -168,6 +214,10 @@ void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
     while (!select_near(g)) {
         radius *= 0.8;
         set_box(g, radius, domain_lo, domain_hi);
+    }
+    for (int d = 0; d < 3; d++) {
+        g->inner_lo[d] = side(g, d, g->inner_lo[d], domain_lo[d], -1);
+        g->inner_hi[d] = side(g, d, g->inner_hi[d], domain_hi[d], 1);
     }
     g->self = incode_gather_find(g, vertex);
 }
@@ -191,7 +241,7 @@ uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
                               const double p[3])
 {
     if (g->count == INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA ||
-        g->near == INCODE_NEAR_POINTS)
+        g->outer == INCODE_OUTER_END)
         return INCODE_GATHER_NONE;
     uint32_t i = g->count++;
     double r[3];
@@ -199,12 +249,12 @@ uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
     for (int d = 0; d < 3; d++)
         g->p[d][i] = p[d];
     incode_gather_relative(g, i, r);
-    uint32_t k = g->near++;
+    uint32_t k = g->outer++;
     g->x[k] = (float)r[0];
     g->y[k] = (float)r[1];
     g->z[k] = (float)r[2];
     g->at[k] = i;
-    set_lengths(g, k);
+    set_lengths(g, k, g->outer);
     return i;
 }
 
@@ -230,17 +280,18 @@ INCODE_INLINE void best_of(struct lanes *best, const struct incode_gather *g,
         c[0], x,
         incode_vf_fma(c[1], y,
                       incode_vf_fma(c[2], z, c[3] * incode_vf_load(g->w + i))));
-    incode_vi better = (below > slack * incode_vf_load(g->l + i)) &
-                       (above * best->bottom < best->top * below);
+    incode_vm better = incode_vf_less(slack * incode_vf_load(g->l + i), below) &
+                       incode_vf_less(above * best->bottom, best->top * below);
     int32_t k = (int32_t)i;
     incode_vi here = {k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k};
-    best->top = incode_vf_select(better, above, best->top);
-    best->bottom = incode_vf_select(better, below, best->bottom);
-    best->which = (better & here) | (~better & best->which);
+    best->top = incode_vf_pick(better, above, best->top);
+    best->bottom = incode_vf_pick(better, below, best->bottom);
+    best->which = incode_vi_pick(better, here, best->which);
 }
 
-uint32_t incode_gather_first(const struct incode_gather *g, const double n[3],
-                             const double m[3], double nn)
+uint32_t incode_gather_first(const struct incode_gather *g, uint32_t from,
+                             uint32_t to, const double n[3], const double m[3],
+                             double nn)
 {
     incode_vf normal[3], centre[4];
     double extent = incode_max_norm(n);
@@ -256,14 +307,14 @@ uint32_t incode_gather_first(const struct incode_gather *g, const double n[3],
     a.bottom = b.bottom = incode_vf_all(0x1p-40F);
     a.which = b.which = (incode_vi){-1, -1, -1, -1, -1, -1, -1, -1,
                                     -1, -1, -1, -1, -1, -1, -1, -1};
-    for (uint32_t i = 0; i < g->near; i += 2 * INCODE_VF_LANES) {
+    for (uint32_t i = from; i < to; i += 2 * INCODE_VF_LANES) {
         best_of(&a, g, i, normal, centre, slack);
         best_of(&b, g, i + INCODE_VF_LANES, normal, centre, slack);
     }
-    incode_vi better = a.top * b.bottom < b.top * a.bottom;
-    incode_vf top = incode_vf_select(better, a.top, b.top);
-    incode_vf bottom = incode_vf_select(better, a.bottom, b.bottom);
-    incode_vi which = (better & a.which) | (~better & b.which);
+    incode_vm better = incode_vf_less(a.top * b.bottom, b.top * a.bottom);
+    incode_vf top = incode_vf_pick(better, a.top, b.top);
+    incode_vf bottom = incode_vf_pick(better, a.bottom, b.bottom);
+    incode_vi which = incode_vi_pick(better, a.which, b.which);
     uint32_t found = ~incode_vf_mask(which) & 0xffff;
     if (found == 0)
         return INCODE_GATHER_NONE;
@@ -276,8 +327,8 @@ static float float_up(double a)
     return (float)a * (1 + 0x1p-22F);
 }
 
-uint32_t incode_gather_inside(const struct incode_gather *g,
-                              const struct incode_sphere *s,
+uint32_t incode_gather_inside(const struct incode_gather *g, uint32_t from,
+                              uint32_t to, const struct incode_sphere *s,
                               uint16_t out[INCODE_NEAR_ALL])
 {
     /* One power of two for all coefficients keeps them in range. */
@@ -294,21 +345,24 @@ uint32_t incode_gather_inside(const struct incode_gather *g,
               mw = incode_vf_all((float)(square * scale) + 1e-37F),
               ml = incode_vf_all(float_up(slack * scale) + 1e-37F),
               tiny = incode_vf_all(-1e-34F);
-    uint64_t words[(INCODE_NEAR_ALL + 63) / 64] = {0};
-    for (uint32_t i = 0; i < g->near; i += INCODE_VF_LANES) {
+    uint64_t words[INCODE_NEAR_ALL / 64 + 1];
+    words[from / 64] = 0;
+    for (uint32_t i = from; i < to; i += INCODE_VF_LANES) {
         incode_vf value = incode_vf_fma(mx, incode_vf_load(g->x + i),
                                         my * incode_vf_load(g->y + i)) +
                           incode_vf_fma(mz, incode_vf_load(g->z + i),
                                         mw * incode_vf_load(g->w + i));
         value = incode_vf_fma(ml, incode_vf_load(g->l + i), value);
-        uint64_t in = ~incode_vf_mask(value < tiny) & 0xffff;
+        uint64_t in = ~incode_vm_bits(incode_vf_less(value, tiny)) & 0xffff;
+        if (i % 64 == 0)
+            words[i / 64] = 0;
         words[i / 64] |= in << (i % 64);
     }
     uint32_t count = 0;
-    for (uint32_t i = 0; i < g->near; i += 64) {
+    for (uint32_t i = from; i < to; i += 64) {
         uint64_t word = words[i / 64];
-        if (g->near - i < 64)
-            word &= (UINT64_C(1) << (g->near - i)) - 1;
+        if (to - i < 64)
+            word &= (UINT64_C(1) << (to - i)) - 1;
         for (; word != 0; word &= word - 1)
             out[count++] = (uint16_t)g->at[i + (uint32_t)__builtin_ctzll(word)];
     }

@@ -10,8 +10,8 @@
  *
  *     incode_gather_around(&g, &walker, leaf, lo, hi, radius);
  *     incode_gather_centre(&g, v, p, radius, domain_lo, domain_hi);
- *     i = incode_gather_first(&g, n, m, nn);       nearest by Delaunay distance
- *     count = incode_gather_inside(&g, &sphere, out);     what may be inside
+ *     i = incode_gather_first(&g, 0, g.inner, n, m, nn);   first by distance
+ *     count = incode_gather_inside(&g, 0, g.inner, &sphere, out);
  */
 #ifndef INCODE_GATHER_H
 #define INCODE_GATHER_H
@@ -26,21 +26,24 @@ enum {
     INCODE_AROUND_EXTRA = 64,   /* far vertices */
     INCODE_AROUND_ALL =
         INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA + INCODE_LEAF_POINTS,
-    INCODE_NEAR_POINTS = 384, /* around a vertex, far vertices included */
-    INCODE_NEAR_ALL = INCODE_NEAR_POINTS + 32,
+    INCODE_INNER_POINTS = 96, /* around a vertex: the inner box, at most */
+    INCODE_OUTER = 128,       /* where the outer points begin */
+    INCODE_OUTER_END = 448,   /* and end, far vertices included */
+    INCODE_NEAR_ALL = INCODE_OUTER_END + 32,
     INCODE_GATHER_NONE = 0xffff
 };
 
 struct incode_gather {
     /* Around the vertex: relative to p0 and scaled; w = |p|^2, l = |x| + |y| +
-     * |z|; at: the point's index below. */
+     * |z|; at: the point's index below.  First those of the inner box, from
+     * INCODE_OUTER on the others: most faces need the first alone. */
     alignas(64) float x[INCODE_NEAR_ALL];
     alignas(64) float y[INCODE_NEAR_ALL];
     alignas(64) float z[INCODE_NEAR_ALL];
     alignas(64) float w[INCODE_NEAR_ALL];
     alignas(64) float l[INCODE_NEAR_ALL];
     alignas(64) uint32_t at[INCODE_NEAR_ALL];
-    uint32_t near;
+    uint32_t inner, outer; /* where each of the two ends */
     /* Around the leaf, then the far vertices: absolute. */
     alignas(64) double p[3][INCODE_AROUND_ALL];
     alignas(64) uint32_t id[INCODE_AROUND_ALL];
@@ -53,6 +56,7 @@ struct incode_gather {
     double lo[3], hi[3];   /* absolute: every point within is at hand */
     double rlo[3], rhi[3]; /* the same, relative; infinite where the domain
                               ends before */
+    double inner_lo[3], inner_hi[3]; /* the inner box, likewise relative */
     struct incode_query query;
 };
 
@@ -93,16 +97,18 @@ static inline void incode_gather_relative(const struct incode_gather *g,
         r[d] = (g->p[d][i] - g->p0[d]) * g->scale;
 }
 
-/* Of the points near the vertex and clearly on the positive side of the plane
- * with normal n, the one with the least (nn w - m . p) / (n . p), or about it;
- * INCODE_GATHER_NONE: there is none.  m / nn is twice the circumcentre. */
-uint32_t incode_gather_first(const struct incode_gather *g, const double n[3],
-                             const double m[3], double nn);
+/* Of points [from, to) around the vertex, those clearly on the positive side of
+ * the plane with normal n: the one with the least (nn w - m . p) / (n . p), or
+ * about it; INCODE_GATHER_NONE: there is none.  m / nn is twice the
+ * circumcentre.  from: 0 or INCODE_OUTER. */
+uint32_t incode_gather_first(const struct incode_gather *g, uint32_t from,
+                             uint32_t to, const double n[3], const double m[3],
+                             double nn);
 
-/* The points near the vertex that are not certainly outside the sphere; returns
- * how many. */
-uint32_t incode_gather_inside(const struct incode_gather *g,
-                              const struct incode_sphere *s,
+/* The points [from, to) around the vertex that are not certainly outside the
+ * sphere; returns how many. */
+uint32_t incode_gather_inside(const struct incode_gather *g, uint32_t from,
+                              uint32_t to, const struct incode_sphere *s,
                               uint16_t out[INCODE_NEAR_ALL]);
 
 #endif

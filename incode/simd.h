@@ -71,6 +71,52 @@ INCODE_INLINE uint32_t incode_vf_mask(incode_vi m)
 #endif
 }
 
+/* Masks of 16 lanes as the processor likes them: bits, or lanes of 0 and -1. */
+#ifdef __AVX512DQ__
+typedef __mmask16 incode_vm;
+#else
+typedef incode_vi incode_vm;
+#endif
+
+INCODE_INLINE incode_vm incode_vf_less(incode_vf a, incode_vf b)
+{
+#ifdef __AVX512DQ__
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ);
+#else
+    return a < b;
+#endif
+}
+
+INCODE_INLINE incode_vf incode_vf_pick(incode_vm m, incode_vf a, incode_vf b)
+{
+#ifdef __AVX512DQ__
+    return (incode_vf)_mm512_mask_blend_ps(m, (__m512)b, (__m512)a);
+#else
+    return (incode_vf)((m & (incode_vi)a) | (~m & (incode_vi)b));
+#endif
+}
+
+INCODE_INLINE incode_vi incode_vi_pick(incode_vm m, incode_vi a, incode_vi b)
+{
+#ifdef __AVX512DQ__
+    return (incode_vi)_mm512_mask_blend_epi32(m, (__m512i)b, (__m512i)a);
+#else
+    return (m & a) | (~m & b);
+#endif
+}
+
+INCODE_INLINE uint32_t incode_vm_bits(incode_vm m)
+{
+#ifdef __AVX512DQ__
+    return m;
+#else
+    uint32_t bits = 0;
+    for (int i = 0; i < INCODE_VF_LANES; i++)
+        bits |= (uint32_t)(m[i] & 1) << i;
+    return bits;
+#endif
+}
+
 /* m ? a : b in each lane. */
 INCODE_INLINE incode_vd incode_vd_select(incode_vl m, incode_vd a, incode_vd b)
 {

@@ -241,7 +241,7 @@ static enum incode_outcome star_gather(struct incode_triangulator *t,
     const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
                          f->page.brick.z[slot]};
     incode_gather_centre(g, v, p, g->radius, t->setup.lo, t->setup.hi);
-    learn_spread(t, g->near);
+    learn_spread(t, g->inner + g->outer - INCODE_OUTER);
     return INCODE_OK;
 }
 
