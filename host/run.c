@@ -8,7 +8,7 @@
 
 #include "../node/node.h"
 #include "../transport/drivers/tcp.h"
-#include "hull.h"
+#include "facets.h"
 #include "report.h"
 #include "stats.h"
 #include "write.h"
