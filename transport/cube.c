@@ -101,9 +101,9 @@ static struct link_config link_config_of(const struct cube_config *config,
     c.epoch = config->epoch;
     c.node = config->self;
     c.port = (uint8_t)d;
-    c.peer_node = host      ? 0
-                  : to_host ? CUBE_HOST
-                            : (uint16_t)(config->self ^ 1u << d);
+    c.peer_node = (uint16_t)(host      ? 0
+                             : to_host ? CUBE_HOST
+                                       : config->self ^ 1u << d);
     c.peer_port = host ? config->dimension : to_host ? 0 : (uint8_t)d;
     c.window = (host || to_host) && config->host_window != 0
                    ? config->host_window

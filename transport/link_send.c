@@ -4,7 +4,7 @@
 
 #include "check.h"
 
-enum { BACKOFF_MAX = 10 };
+enum { BACKOFF_MAX = 5 };
 
 static unsigned in_flight(const struct link *link)
 {
@@ -225,10 +225,13 @@ static void stage(struct link *link, unsigned kind, unsigned flags,
     if (kind == LINK_HELLO) {
         /* What a new session would have. */
         header.credit = (uint8_t)(link->config.window - r->complete);
-        out->bytes[out->end++] = 0;
     } else {
         r->reported = (uint16_t)(r->next + link_credit(link));
         r->unreported = 0;
+    }
+    if (out->end == 0) {
+        /* Noise on a line at rest must not take the next frame with it. */
+        out->bytes[out->end++] = 0;
     }
     LINK_ASSERT(link->buffer_bytes - out->end >=
                 FRAME_ENCODED(size) + FRAME_SLACK);
@@ -386,7 +389,7 @@ static bool flush(struct link *link)
 static bool staging_room(const struct link *link)
 {
     return link->buffer_bytes - link->out.end >=
-           FRAME_ENCODED(link->config.frame_payload) + FRAME_SLACK;
+           FRAME_ENCODED(link->config.frame_payload) + FRAME_SLACK + 1;
 }
 
 /* One frame more, the most urgent; false: nothing to say. */
