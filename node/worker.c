@@ -293,8 +293,10 @@ unsigned node_worker_work(struct node_worker *worker)
 /* Who has the page. */
 static uint16_t keeper(const struct node_worker *w, uint32_t page)
 {
-    return w->setup.holders == 0 ? (uint16_t)CUBE_HOST
-                                 : (uint16_t)(1 + page % w->setup.holders);
+    if (w->setup.holders == 0) {
+        return CUBE_HOST;
+    }
+    return (uint16_t)(1 + page % w->setup.holders);
 }
 
 /* Sends for wanted pages, one message for each node that has some. */
