@@ -64,6 +64,8 @@ static void remember_plane(struct incode_triangulator *t,
 
 /* ---- the search of the whole set ---- */
 
+/* The box of the next look: only points that are clearly beyond the face count
+ * there, so that those in its plane need not be told apart in vain. */
 static void set_box(struct incode_triangulator *t, struct incode_search *s)
 {
     struct incode_query *q = &s->query;
@@ -73,8 +75,18 @@ static void set_box(struct incode_triangulator *t, struct incode_search *s)
         q->hi[d] = q->pv[d] + s->radius;
         all = all && q->lo[d] <= t->setup.lo[d] && q->hi[d] >= t->setup.hi[d];
     }
-    q->boxed = !all && q->best == INCODE_NONE;
-    s->final = !q->boxed;
+    q->boxed = !all;
+    q->timid = true;
+    q->cursor = 0;
+}
+
+/* The last look: every point that the best so far does not clearly beat, or
+ * every point if there is none. */
+static void set_final(struct incode_search *s)
+{
+    struct incode_query *q = &s->query;
+    s->final = true;
+    q->boxed = q->done = q->timid = false;
     q->cursor = 0;
 }
 
@@ -94,6 +106,7 @@ void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,
     q->best = INCODE_NONE;
     incode_query_face(q);
     s->radius = radius;
+    s->final = false;
     set_box(t, s);
 }
 
@@ -110,6 +123,10 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
             if (q->best == INCODE_NONE)
                 remember_plane(t, q);
             return INCODE_OK;
+        }
+        if (q->best != INCODE_NONE || !q->boxed) {
+            set_final(s);
+            continue;
         }
         q->done = true;
         memcpy(q->done_lo, q->lo, sizeof q->lo);
@@ -240,28 +257,56 @@ static void consider(struct near *n, uint32_t i)
     incode_sphere_apex(&n->sphere, n->face.b, n->face.c, r);
 }
 
-/* The points [from, to) against the best so far; without one, the nearest by
- * Delaunay distance goes first. */
+/* The first of points [from, to) by approximate Delaunay distance, if it is
+ * certain to be beyond the face. */
+static void propose(struct near *n, uint32_t from, uint32_t to)
+{
+    if (!is_regular(&n->face))
+        return;
+    uint32_t first = incode_gather_first(&n->t->gather, from, to, n->sphere.n,
+                                         n->face.m, n->face.nn);
+    n->t->stats.candidates += to - from;
+    if (first != INCODE_GATHER_NONE)
+        consider(n, first);
+}
+
+/* The points [from, to) against the best so far. */
 static void contest(struct near *n, uint32_t from, uint32_t to)
 {
-    struct incode_gather *g = &n->t->gather;
-    n->t->stats.candidates += to - from;
-    if (n->best == INCODE_GATHER_NONE && is_regular(&n->face)) {
-        uint32_t first = incode_gather_first(g, from, to, n->sphere.n,
-                                             n->face.m, n->face.nn);
-        if (first != INCODE_GATHER_NONE)
-            consider(n, first);
-    }
-    if (n->best == INCODE_GATHER_NONE) {
-        /* Nothing clearly beyond the face: look at all. */
-        for (uint32_t k = from; k < to; k++)
-            consider(n, g->at[k]);
-        return;
-    }
     uint16_t inside[INCODE_NEAR_ALL];
-    uint32_t count = incode_gather_inside(g, from, to, &n->sphere, inside);
+    uint32_t count =
+        incode_gather_inside(&n->t->gather, from, to, &n->sphere, inside);
     for (uint32_t k = 0; k < count; k++)
         consider(n, inside[k]);
+}
+
+static bool is_certain(const struct near *n, const double rlo[3],
+                       const double rhi[3])
+{
+    return n->best != INCODE_GATHER_NONE &&
+           cap_is_within(rlo, rhi, &n->sphere, &n->face);
+}
+
+static enum incode_near contest_all(struct near *n)
+{
+    const struct incode_gather *g = &n->t->gather;
+    propose(n, 0, g->inner);
+    bool inner = n->best != INCODE_GATHER_NONE;
+    if (inner)
+        contest(n, 0, g->inner);
+    if (is_certain(n, g->inner_lo, g->inner_hi))
+        return INCODE_NEAR_FOUND;
+    if (!inner)
+        propose(n, INCODE_OUTER, g->outer);
+    if (n->best != INCODE_GATHER_NONE) {
+        if (!inner)
+            contest(n, 0, g->inner);
+        contest(n, INCODE_OUTER, g->outer);
+    } else if (on_hull(n->t, n->pv, n->pb, n->pc)) {
+        return INCODE_NEAR_HULL;
+    }
+    return is_certain(n, g->rlo, g->rhi) ? INCODE_NEAR_FOUND
+                                         : INCODE_NEAR_SEARCH;
 }
 
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
@@ -284,29 +329,19 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     incode_gather_relative(g, c, n.face.c);
     incode_sphere_plane(&n.sphere, n.face.b, n.face.c);
     set_face(&n.face, &n.sphere);
-    contest(&n, 0, g->inner);
-    if (n.best != INCODE_GATHER_NONE &&
-        cap_is_within(g->inner_lo, g->inner_hi, &n.sphere, &n.face)) {
-        *apex = n.best;
-        return INCODE_NEAR_FOUND;
-    }
-    contest(&n, INCODE_OUTER, g->outer);
-    if (n.best != INCODE_GATHER_NONE &&
-        cap_is_within(g->rlo, g->rhi, &n.sphere, &n.face)) {
-        *apex = n.best;
-        return INCODE_NEAR_FOUND;
-    }
-    if (n.best == INCODE_GATHER_NONE && on_hull(t, n.pv, n.pb, n.pc))
-        return INCODE_NEAR_HULL;
+    enum incode_near r = contest_all(&n);
+    *apex = n.best;
+    if (r != INCODE_NEAR_SEARCH)
+        return r;
     const uint32_t f[3] = {g->vertex, g->id[b], g->id[c]};
     incode_search_begin(t, s, f, n.pv, n.pb, n.pc, g->radius * 4);
+    if (n.best == INCODE_GATHER_NONE)
+        return INCODE_NEAR_SEARCH;
     struct incode_query *q = &s->query;
+    set_final(s);
+    incode_query_consider(q, &t->stats.tally, g->id[n.best], n.store[3]);
     q->done = true;
     memcpy(q->done_lo, g->lo, sizeof g->lo);
     memcpy(q->done_hi, g->hi, sizeof g->hi);
-    if (n.best != INCODE_GATHER_NONE) {
-        incode_query_consider(q, &t->stats.tally, g->id[n.best], n.store[3]);
-        set_box(t, s);
-    }
     return INCODE_NEAR_SEARCH;
 }

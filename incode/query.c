@@ -296,7 +296,8 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     }
     incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
     incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
-    incode_vl out = plane + (plane_error * eps + tiny) < zero;
+    incode_vd margin = plane_error * eps + tiny;
+    incode_vl out = q->timid ? ~(plane > margin) : plane + margin < zero;
     if (s->has_apex) {
         value -= incode_vd_all(s->det) * square;
         value_error += incode_vd_all(s->pdet) * square;

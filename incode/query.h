@@ -31,6 +31,7 @@ enum incode_walk { INCODE_WALK_DONE, INCODE_WALK_WAIT, INCODE_WALK_STOP };
 struct incode_query {
     enum incode_question question;
     bool boxed;          /* only what meets [lo, hi] */
+    bool timid;          /* APEX: only points clearly beyond the face */
     bool done;           /* not what lies within [done_lo, done_hi] */
     double lo[3], hi[3]; /* absolute coordinates */
     double done_lo[3], done_hi[3];
