@@ -66,10 +66,10 @@ check 'cluster/no node outlives the host' "alive:$alive" test -z "$alive"
 
 start
 sleep 0.1
-kill -INT $host
+kill -TERM $host
 wait $host
 status=$?
-check 'cluster/an interrupt leaves no output' "exit $status" \
+check 'cluster/a terminated run leaves no output' "exit $status" \
     test ! -e "$scratch/out.npy" -a $status != 0
 
 # The writable memory of each node, as the kernel has it.
