@@ -57,6 +57,12 @@ static void term_of(struct term *t, double value)
     t->sign = (bits >> 63) != 0 ? -1 : 1;
 }
 
+/* Of a coordinate. */
+static int32_t bits_of(const struct term *t)
+{
+    return 32 * t->limbs - __builtin_clz(t->m[t->limbs - 1]);
+}
+
 /* The determinants depend on differences alone: where all those from the last
  * point are doubles, they take the points' place and that point becomes 0,
  * which leaves a fifth of the monomials.  False where they are not. */
@@ -90,13 +96,14 @@ static void problem_init(struct problem *s, const double *const p[],
             term_of(t, translated ? moved[i][k] : p[i][k]);
             if (t->sign == 0)
                 continue;
+            int32_t end = t->e + bits_of(t);
             least = t->e < least ? t->e : least;
-            most = t->e > most ? t->e : most;
+            most = end > most ? end : most;
         }
     }
     s->limbs = 2;
-    if (most >= least)
-        s->limbs = (degree * (most - least + 53) + 10) / 32 + 2;
+    if (most > least)
+        s->limbs = (degree * (most - least) + 10) / 32 + 2;
     INCODE_ASSERT(s->limbs <= LIMBS_MAX);
     memset(s->limb, 0, (size_t)s->limbs * sizeof s->limb[0]);
     for (int32_t i = 0; i < points; i++) {
