@@ -5,37 +5,46 @@
 #include "check.h"
 #include "pages.h"
 
+static uint32_t power_below(uint32_t n)
+{
+    uint32_t power = 1;
+    while (power <= n / 2)
+        power *= 2;
+    return power;
+}
+
 size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks)
 {
-    return capacity * (sizeof(struct incode_afl_node) + sizeof(uint32_t)) +
-           bricks * (sizeof(struct incode_touched) + sizeof(uint32_t));
+    size_t heads = (size_t)power_below(capacity) + power_below(bricks);
+    return capacity * sizeof(struct incode_afl_node) +
+           bricks * sizeof(struct incode_touched) + heads * sizeof(uint32_t);
 }
 
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
                      uint32_t bricks)
 {
-    INCODE_ASSERT((capacity & (capacity - 1)) == 0 && capacity > 0);
-    INCODE_ASSERT((bricks & (bricks - 1)) == 0 && bricks > 0);
+    INCODE_ASSERT(capacity > 0 && bricks > 0);
     memset(afl, 0, sizeof *afl);
     afl->touched = memory;
     afl->nodes = (struct incode_afl_node *)(void *)(afl->touched + bricks);
     afl->heads = (uint32_t *)(void *)(afl->nodes + capacity);
-    afl->touched_heads = afl->heads + capacity;
     afl->capacity = capacity;
-    afl->mask = capacity - 1;
+    afl->mask = power_below(capacity) - 1;
+    afl->touched_heads = afl->heads + afl->mask + 1;
     afl->touched_capacity = bricks;
-    afl->touched_mask = bricks - 1;
+    afl->touched_mask = power_below(bricks) - 1;
     incode_afl_clear(afl);
 }
 
 void incode_afl_clear(struct incode_afl *afl)
 {
-    for (uint32_t i = 0; i < afl->capacity; i++) {
+    for (uint32_t i = 0; i <= afl->mask; i++)
         afl->heads[i] = INCODE_AFL_NIL;
+    for (uint32_t i = 0; i < afl->capacity; i++)
         afl->nodes[i].next = i + 1 < afl->capacity ? i + 1 : INCODE_AFL_NIL;
-    }
-    for (uint32_t i = 0; i < afl->touched_capacity; i++) {
+    for (uint32_t i = 0; i <= afl->touched_mask; i++)
         afl->touched_heads[i] = INCODE_AFL_NIL;
+    for (uint32_t i = 0; i < afl->touched_capacity; i++) {
         afl->touched[i].brick = INCODE_NONE;
         afl->touched[i].next =
             i + 1 < afl->touched_capacity ? i + 1 : INCODE_AFL_NIL;

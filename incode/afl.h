@@ -37,7 +37,7 @@ struct incode_afl {
     uint32_t *heads;
     struct incode_touched *touched;
     uint32_t *touched_heads;
-    uint32_t capacity, mask, free, count, count_max;
+    uint32_t capacity, mask, free, count, count_max; /* of faces */
     uint32_t touched_capacity, touched_mask, touched_free, touched_count,
         touched_max;
     uint32_t hubs; /* hub bits ever set */
@@ -50,7 +50,7 @@ static inline bool incode_touched_used(const struct incode_touched *entry)
     return entry->brick != UINT32_MAX;
 }
 
-/* capacity, bricks: powers of two. */
+/* Bytes for so many faces and touched bricks. */
 size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks);
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
                      uint32_t bricks);

@@ -25,9 +25,8 @@ bool incode_fetch_point(struct incode_triangulator *t, uint32_t v, double p[3],
 
 /* ---- hull planes ---- */
 
-/* Whether the face lies on a hull plane already certified, facing out. */
-static bool on_hull(struct incode_triangulator *t, const double pv[3],
-                    const double pb[3], const double pc[3])
+bool incode_hull_known(struct incode_triangulator *t, const double pv[3],
+                       const double pb[3], const double pc[3])
 {
     struct incode_tally *tally = &t->stats.tally;
     for (uint32_t i = 0; i < t->plane_count; i++) {
@@ -41,6 +40,19 @@ static bool on_hull(struct incode_triangulator *t, const double pv[3],
     return false;
 }
 
+void incode_hull_remember(struct incode_triangulator *t,
+                          const struct incode_query *q, const double below[3])
+{
+    struct incode_hull_plane *h = &t->planes[t->plane_next];
+    memcpy(h->p[0], q->pv, sizeof q->pv);
+    memcpy(h->p[1], q->pb, sizeof q->pb);
+    memcpy(h->p[2], q->pc, sizeof q->pc);
+    memcpy(h->below, below, sizeof h->below);
+    t->plane_next = (t->plane_next + 1) % INCODE_HULL_PLANES;
+    if (t->plane_count < INCODE_HULL_PLANES)
+        t->plane_count++;
+}
+
 /* Remembers a certified hull facet, if some gathered point is below it. */
 static void remember_plane(struct incode_triangulator *t,
                            const struct incode_query *q)
@@ -48,17 +60,10 @@ static void remember_plane(struct incode_triangulator *t,
     const struct incode_gather *g = &t->gather;
     for (uint32_t i = 0; i < g->count; i++) {
         double p[3] = {g->p[0][i], g->p[1][i], g->p[2][i]};
-        if (incode_orient3d(&t->stats.tally, q->pv, q->pb, q->pc, p) >= 0)
-            continue;
-        struct incode_hull_plane *h = &t->planes[t->plane_next];
-        memcpy(h->p[0], q->pv, sizeof q->pv);
-        memcpy(h->p[1], q->pb, sizeof q->pb);
-        memcpy(h->p[2], q->pc, sizeof q->pc);
-        memcpy(h->below, p, sizeof p);
-        t->plane_next = (t->plane_next + 1) % INCODE_HULL_PLANES;
-        if (t->plane_count < INCODE_HULL_PLANES)
-            t->plane_count++;
-        return;
+        if (incode_orient3d(&t->stats.tally, q->pv, q->pb, q->pc, p) < 0) {
+            incode_hull_remember(t, q, p);
+            return;
+        }
     }
 }
 
@@ -107,7 +112,19 @@ void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,
     incode_query_face(q);
     s->radius = radius;
     s->final = false;
+    s->looked = 0;
     set_box(t, s);
+}
+
+void incode_count_candidates(struct incode_triangulator *t, uint64_t looked)
+{
+    uint64_t n = looked < 2 ? 2 : looked;
+    uint32_t octave = 63 - (uint32_t)__builtin_clzll(n);
+    uint32_t half = 2 * octave + (uint32_t)(n >> (octave - 1) & 1);
+    uint32_t last = sizeof t->stats.candidates_histogram /
+                        sizeof t->stats.candidates_histogram[0] -
+                    1;
+    t->stats.candidates_histogram[half < last ? half : last]++;
 }
 
 enum incode_outcome incode_search_run(struct incode_triangulator *t,
@@ -115,11 +132,14 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
 {
     struct incode_query *q = &s->query;
     for (;;) {
+        uint64_t before = t->stats.candidates;
         enum incode_walk r =
             incode_walk(&t->walker, q, incode_visit_points, NULL);
+        s->looked += t->stats.candidates - before;
         if (r == INCODE_WALK_WAIT)
             return INCODE_WAIT;
         if (s->final) {
+            incode_count_candidates(t, s->looked);
             if (q->best == INCODE_NONE)
                 remember_plane(t, q);
             return INCODE_OK;
@@ -265,7 +285,6 @@ static void propose(struct near *n, uint32_t from, uint32_t to)
         return;
     uint32_t first = incode_gather_first(&n->t->gather, from, to, n->sphere.n,
                                          n->face.m, n->face.nn);
-    n->t->stats.candidates += to - from;
     if (first != INCODE_GATHER_NONE)
         consider(n, first);
 }
@@ -274,6 +293,7 @@ static void propose(struct near *n, uint32_t from, uint32_t to)
 static void contest(struct near *n, uint32_t from, uint32_t to)
 {
     uint16_t inside[INCODE_NEAR_ALL];
+    n->t->stats.candidates += to - from;
     uint32_t count =
         incode_gather_inside(&n->t->gather, from, to, &n->sphere, inside);
     for (uint32_t k = 0; k < count; k++)
@@ -302,7 +322,7 @@ static enum incode_near contest_all(struct near *n)
         if (!inner)
             contest(n, 0, g->inner);
         contest(n, INCODE_OUTER, g->outer);
-    } else if (on_hull(n->t, n->pv, n->pb, n->pc)) {
+    } else if (incode_hull_known(n->t, n->pv, n->pb, n->pc)) {
         return INCODE_NEAR_HULL;
     }
     return is_certain(n, g->rlo, g->rhi) ? INCODE_NEAR_FOUND
@@ -329,12 +349,17 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     incode_gather_relative(g, c, n.face.c);
     incode_sphere_plane(&n.sphere, n.face.b, n.face.c);
     set_face(&n.face, &n.sphere);
+    uint64_t before = t->stats.candidates;
     enum incode_near r = contest_all(&n);
+    uint64_t looked = t->stats.candidates - before;
     *apex = n.best;
-    if (r != INCODE_NEAR_SEARCH)
+    if (r != INCODE_NEAR_SEARCH) {
+        incode_count_candidates(t, looked);
         return r;
+    }
     const uint32_t f[3] = {g->vertex, g->id[b], g->id[c]};
     incode_search_begin(t, s, f, n.pv, n.pb, n.pc, g->radius * 4);
+    s->looked = looked;
     if (n.best == INCODE_GATHER_NONE)
         return INCODE_NEAR_SEARCH;
     struct incode_query *q = &s->query;

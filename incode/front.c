@@ -188,6 +188,8 @@ bool incode_front_room(struct incode_triangulator *t)
     }
     if (has_room(t))
         return true;
+    if (t->unspill_pending) /* what returns must be whole before it moves */
+        return false;
     uint32_t from = spill_position(t);
     if (from >= t->spill_from) {
         t->fault = "the active face list of one brick does not fit; give the "

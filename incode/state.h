@@ -9,6 +9,7 @@
 #define INCODE_STATE_H
 
 #include "afl.h"
+#include "cells.h"
 #include "gather.h"
 #include "query.h"
 #include "triangulator.h"
@@ -28,6 +29,7 @@ struct incode_search {
     struct incode_query query;
     double radius;
     bool final;
+    uint64_t looked; /* candidates so far */
 };
 
 enum incode_task_kind {
@@ -58,6 +60,9 @@ struct incode_task {
     uint64_t born;
     struct incode_search search;
     struct incode_seed seed;
+    struct incode_cells cells; /* index `grid` */
+    uint32_t sweep_left; /* index `naive`: bricks still to be seen, from */
+    uint32_t sweep;      /* this one on */
 };
 
 struct incode_star_face {
@@ -110,10 +115,8 @@ struct incode_triangulator {
 
     uint32_t room_faces, room_bricks; /* kept free before a star */
     uint32_t built_max;
-    double spread;        /* gather radius in units of the leaf's extent */
-    uint32_t face_cursor; /* facewise: where the last face was found */
-    uint32_t face_current[3];
-    bool face_busy;
+    double spread;  /* gather radius in units of the leaf's extent */
+    uint32_t sweep; /* index `naive`: the brick last looked at */
     struct incode_task tasks[INCODE_TASKS];
     struct incode_hull_plane planes[INCODE_HULL_PLANES];
     uint32_t plane_count, plane_next;
@@ -123,8 +126,9 @@ struct incode_triangulator {
 
 enum incode_outcome {
     INCODE_OK,
-    INCODE_WAIT, /* task->page is missing */
-    INCODE_AGAIN /* unfinished, come back without waiting */
+    INCODE_WAIT,  /* task->page is missing */
+    INCODE_AGAIN, /* unfinished, begin anew without waiting */
+    INCODE_MORE   /* unfinished, go on with the task without waiting */
 };
 
 /* ---- front.c ---- */
@@ -198,25 +202,36 @@ enum incode_near {
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
                                   uint32_t c, uint32_t *apex,
                                   struct incode_search *s);
+/* Whether the face lies on a hull plane already certified, facing out. */
+bool incode_hull_known(struct incode_triangulator *t, const double pv[3],
+                       const double pb[3], const double pc[3]);
+/* Remembers a hull facet; below: a point strictly on its known side. */
+void incode_hull_remember(struct incode_triangulator *t,
+                          const struct incode_query *q, const double below[3]);
 /* The coordinates of a vertex; false: *page is missing. */
 bool incode_fetch_point(struct incode_triangulator *t, uint32_t v, double p[3],
                         uint32_t *page);
+
+/* Notes a MakeTetra that is over: how many candidates it looked at. */
+void incode_count_candidates(struct incode_triangulator *t, uint64_t looked);
 
 /* ---- star.c, seed.c ---- */
 
 /* Closes the star of task->v as far as it goes. */
 enum incode_outcome incode_star_close(struct incode_triangulator *t,
                                       struct incode_task *task);
-/* Takes in a tetrahedron of positive orientation that is not beside an open
- * face: its vertex f[0] has been reached by none. */
-void incode_star_first(struct incode_triangulator *t, const uint32_t f[4],
-                       const double *const p[4]);
+/* Takes in one tetrahedron f of positive orientation, by itself; `through`: the
+ * face (f[0], f[1], f[2]) was open and is taken out of the list. */
+void incode_star_take(struct incode_triangulator *t, const uint32_t f[4],
+                      const double *const p[4], bool through);
 /* Builds a first tetrahedron at task->v, which none has reached. */
 enum incode_outcome incode_seed_run(struct incode_triangulator *t,
                                     struct incode_task *task);
 
 /* ---- facewise.c ---- */
 
-enum incode_step incode_facewise_step(struct incode_triangulator *t);
+/* Builds the tetrahedron beside one open face of task->v. */
+enum incode_outcome incode_face_pursue(struct incode_triangulator *t,
+                                       struct incode_task *task);
 
 #endif

@@ -11,7 +11,8 @@ enum {
     FRAMES_MIN = 48,
     FACES_MIN = 4096,
     BRICKS_MIN = 512,
-    FRAMES_MAX = INCODE_NO_FRAME - 1
+    FRAMES_MAX = INCODE_NO_FRAME - 1,
+    FETCH_AHEAD = 32 /* bricks */
 };
 
 static size_t round_up(size_t bytes)
@@ -19,16 +20,9 @@ static size_t round_up(size_t bytes)
     return (bytes + 63) & ~(size_t)63;
 }
 
-static uint32_t power_below(size_t n)
-{
-    uint32_t power = 1;
-    while (2 * (size_t)power <= n && power < UINT32_C(1) << 30)
-        power *= 2;
-    return power;
-}
-
-/* The active face list takes about a quarter of what the control block leaves,
- * the bricks a sixteenth, page frames the rest. */
+/* The active face list takes three eighths of what the control block leaves (a
+ * front of a million points' region), the bricks a sixteenth, page frames the
+ * rest. */
 static bool fill_map(struct incode_map *map, size_t bytes)
 {
     memset(map, 0, sizeof *map);
@@ -40,15 +34,17 @@ static bool fill_map(struct incode_map *map, size_t bytes)
     size_t rest = bytes - map->control;
     size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
     size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
-    map->afl_faces = power_below(rest / 4 / face);
-    map->brick_entries = power_below(rest / 16 / brick);
+    map->afl_faces = rest * 3 / 8 / face;
+    map->brick_entries = rest / 16 / brick;
     if (map->afl_faces < FACES_MIN)
         map->afl_faces = FACES_MIN;
     if (map->brick_entries < BRICKS_MIN)
         map->brick_entries = BRICKS_MIN;
-    map->afl = map->afl_faces * face;
+    size_t both = incode_afl_bytes((uint32_t)map->afl_faces,
+                                   (uint32_t)map->brick_entries);
     map->bricks = map->brick_entries * brick;
-    size_t used = map->control + round_up(map->afl + map->bricks);
+    map->afl = both - map->bricks;
+    size_t used = map->control + round_up(both);
     if (bytes < used)
         return false;
     size_t frames = (bytes - used) / sizeof(struct incode_frame);
@@ -165,7 +161,6 @@ int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
     }
     if (last) {
         t->unspill_pending = false;
-        t->spill_from++;
         if (t->spill_from == t->setup.bricks)
             t->spilled_any = false;
     }
@@ -189,19 +184,27 @@ static enum incode_step run(struct incode_triangulator *t,
     size_t port_room = t->ports.emit_room(t->ports.context);
     if (t->built_max > port_room)
         t->built_max = (uint32_t)port_room;
-    enum incode_outcome r = seed || task->kind == INCODE_TASK_SEED
-                                ? incode_seed_run(t, task)
-                                : incode_star_close(t, task);
+    enum incode_outcome r;
+    if (seed || task->kind == INCODE_TASK_SEED)
+        r = incode_seed_run(t, task);
+    else if (t->setup.index == INCODE_KD)
+        r = incode_star_close(t, task);
+    else
+        r = incode_face_pursue(t, task);
     t->stats.vertices += fresh;
     task->retries++;
     struct incode_touched *entry =
         incode_afl_touch(&t->afl, v / INCODE_BRICK_POINTS);
-    if (r == INCODE_WAIT) {
-        t->stats.vertices_waited += fresh;
-        t->stats.page_faults++;
+    if (r == INCODE_WAIT || r == INCODE_MORE) {
         entry->waiting |= bit_of(v);
         if (task->born == 0)
             task->born = ++t->clock;
+        if (r == INCODE_MORE) {
+            task->page = INCODE_NONE;
+            return INCODE_WORKED;
+        }
+        t->stats.vertices_waited += fresh;
+        t->stats.page_faults++;
         /* Without credit for its page the task can only be tried again. */
         return incode_pager_loading(&t->pager, task->page) ? INCODE_WORKED
                                                            : INCODE_WAITING;
@@ -274,16 +277,28 @@ static void drop_spilled_tasks(struct incode_triangulator *t)
 
 /* ---- order of work ---- */
 
-static enum incode_step fetch_spilled(struct incode_triangulator *t)
+/* Asks for the nearest spilled brick.  From then on its toggles stay in memory
+ * and add to those that return; it is not worked on before all are there. */
+static void fetch_spilled(struct incode_triangulator *t)
 {
-    if (t->unspill_pending)
-        return INCODE_WAITING;
-    if (!incode_front_flush(t))
-        return INCODE_WAITING;
+    if (t->unspill_pending || !incode_front_flush(t))
+        return;
     uint32_t brick = (t->job.first + t->spill_from) % t->setup.bricks;
+    if (!t->ports.unspill(t->ports.context, brick))
+        return;
     t->unspill_brick = brick;
-    t->unspill_pending = t->ports.unspill(t->ports.context, brick);
-    return INCODE_WAITING;
+    t->unspill_pending = true;
+    t->spill_from++;
+}
+
+/* Brings spilled bricks back before they are needed while there is room. */
+static void fetch_ahead(struct incode_triangulator *t)
+{
+    if (t->spill_from < t->setup.bricks && t->spill_cursor == INCODE_NONE &&
+        t->spill_from - t->current < FETCH_AHEAD &&
+        t->afl.count < t->afl.capacity / 2 &&
+        t->afl.touched_count < t->afl.touched_capacity / 2)
+        fetch_spilled(t);
 }
 
 /* Asks for the pages of bricks that will be worked on next, and of what lies
@@ -364,13 +379,19 @@ static enum incode_step work_on_current(struct incode_triangulator *t)
     return run_new(t, brick * INCODE_BRICK_POINTS + slot, true);
 }
 
+static bool is_returning(const struct incode_triangulator *t, uint32_t brick)
+{
+    return t->unspill_pending && t->unspill_brick == brick;
+}
+
 /* The next vertex with open faces in the window of own bricks. */
 static bool next_own(struct incode_triangulator *t, uint32_t *v)
 {
     uint32_t own = t->job.last - t->job.first;
     for (uint32_t i = 0; i < t->window; i++) {
         uint32_t position = t->current + i;
-        if (position >= own || position >= t->spill_from)
+        if (position >= own || position >= t->spill_from ||
+            is_returning(t, t->job.first + position))
             return false;
         struct incode_touched *entry =
             incode_afl_find(&t->afl, t->job.first + position);
@@ -394,7 +415,8 @@ static bool next_foreign(struct incode_triangulator *t, uint32_t *v)
     for (uint32_t i = 0; i < t->afl.touched_capacity; i++) {
         const struct incode_touched *entry = &t->afl.touched[i];
         if (!incode_touched_used(entry) || entry->faces == 0 ||
-            (entry->pending & ~entry->waiting) == 0)
+            (entry->pending & ~entry->waiting) == 0 ||
+            is_returning(t, entry->brick))
             continue;
         uint32_t order = incode_position(t, entry->brick);
         order = order >= t->current ? order - t->current
@@ -436,17 +458,22 @@ static enum incode_step work(struct incode_triangulator *t, bool waiting)
         t->foreign = true;
     if (!t->foreign) {
         if (t->current >= t->spill_from)
-            return fetch_spilled(t);
+            fetch_spilled(t);
+        if (is_returning(t, t->job.first + t->current))
+            return INCODE_WAITING;
         if (next_own(t, &v))
             return run_new(t, v, false);
         return work_on_current(t);
     }
     if (t->afl.count > 0 && next_foreign(t, &v))
         return run_new(t, v, false);
-    if (waiting)
+    if (waiting || t->unspill_pending)
         return INCODE_WAITING;
     INCODE_ASSERT(t->afl.count == 0);
-    return t->spilled_any ? fetch_spilled(t) : finish(t);
+    if (!t->spilled_any)
+        return finish(t);
+    fetch_spilled(t);
+    return INCODE_WAITING;
 }
 
 enum { EMIT_ROOM_MIN = 8 }; /* tetrahedra */
@@ -462,8 +489,6 @@ static bool any_task(const struct incode_triangulator *t)
 static enum incode_step step(struct incode_triangulator *t)
 {
     bool alone;
-    if (t->unspill_pending)
-        return INCODE_WAITING;
     if (!incode_front_room(t)) {
         drop_spilled_tasks(t);
         return t->spill_cursor != INCODE_NONE ? INCODE_WORKED : INCODE_WAITING;
@@ -476,6 +501,7 @@ static enum incode_step step(struct incode_triangulator *t)
     if (alone)
         return INCODE_WAITING;
     look_ahead(t);
+    fetch_ahead(t);
     return work(t, any_task(t));
 }
 
