@@ -160,6 +160,14 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
     return count >= 32 ? mask : mask & ((UINT32_C(1) << count) - 1);
 }
 
+uint32_t incode_query_boxes(const struct incode_query *q,
+                            const double *const lo[3],
+                            const double *const hi[3], unsigned count)
+{
+    struct boxes boxes = {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
+    return passing(q, &boxes, count);
+}
+
 /* ---- the walk ---- */
 
 struct walk {
@@ -304,6 +312,16 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
         out |= value + (value_error * eps + tiny) < zero;
     }
     return ~incode_vd_mask(out) & 0xff;
+}
+
+uint32_t incode_query_lanes(const struct incode_query *q,
+                            const double *const axis[3])
+{
+    struct lane_points points;
+    for (int d = 0; d < 3; d++)
+        points.r[d] = (incode_vd_load(axis[d]) - incode_vd_all(q->pv[d])) *
+                      incode_vd_all(q->scale);
+    return apex_lanes(q, &points);
 }
 
 static void point_of(double p[3], const struct incode_frame *frame,

@@ -73,6 +73,17 @@ void incode_query_face(struct incode_query *q);
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
                            uint32_t id, const double p[3]);
 
+/* Which of up to 32 boxes the question concerns, one bit each.  lo, hi: arrays
+ * aligned to 64 bytes, filled up to a multiple of 8. */
+uint32_t incode_query_boxes(const struct incode_query *q,
+                            const double *const lo[3],
+                            const double *const hi[3], unsigned count);
+
+/* Which of 8 points, in arrays aligned to 64 bytes, an APEX query must
+ * consider, one bit each. */
+uint32_t incode_query_lanes(const struct incode_query *q,
+                            const double *const axis[3]);
+
 /* Visits the points of the leaves for APEX, NEAREST and CIRCLE. */
 incode_visit incode_visit_points;
 

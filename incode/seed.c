@@ -111,7 +111,7 @@ static void settle(struct incode_triangulator *t, struct incode_task *task,
     INCODE_ASSERT(incode_orient3d(&t->stats.tally, pv, s->pu, s->pw, s->pa) >
                   0);
     t->stats.seeds++;
-    incode_star_first(t, f, p);
+    incode_star_take(t, f, p, false);
     task->kind = INCODE_TASK_IDLE;
 }
 

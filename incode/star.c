@@ -369,8 +369,8 @@ static enum incode_outcome advance(struct incode_triangulator *t,
                                                                  : r;
 }
 
-void incode_star_first(struct incode_triangulator *t, const uint32_t f[4],
-                       const double *const p[4])
+void incode_star_take(struct incode_triangulator *t, const uint32_t f[4],
+                      const double *const p[4], bool through)
 {
     static const uint16_t far[4] = {INCODE_GATHER_NONE, INCODE_GATHER_NONE,
                                     INCODE_GATHER_NONE, INCODE_GATHER_NONE};
@@ -378,9 +378,9 @@ void incode_star_first(struct incode_triangulator *t, const uint32_t f[4],
     star->v = f[0];
     star->faces = star->built = star->kept = 0;
     star->more = true;
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3 && !through; i++)
         incode_front_reached(t, f[i]);
-    star_build(t, f, p, far, false);
+    star_build(t, f, p, far, through);
     put_back(t);
     star_emit(t);
 }
