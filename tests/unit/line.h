@@ -1,7 +1,7 @@
 /* Wires in virtual time for tests: a rate, a latency, the room of a driver's
  * buffer, and all that goes wrong with bytes, drawn from a seed.
  *
- * Memory: LINE_BYTES a direction.  Work: linear in the bytes.
+ * Memory: 17 times LINE_BYTES a direction.  Work: linear in the bytes.
  *
  *     line_wire(&wire, &now_us, &line, seed);
  *     config.pipe = line_pipe(&wire.ends[0]);
@@ -16,7 +16,9 @@
 
 #include "../../transport/link.h"
 
-enum { LINE_BYTES = 1 << 17 };
+#ifndef LINE_BYTES
+#define LINE_BYTES (1u << 17)
+#endif
 
 struct line_quality {
     double bytes_per_s; /* 0: as many as there are */
@@ -140,6 +142,8 @@ static inline int line_send(void *context, const uint8_t *bytes, size_t size)
     }
     uint64_t held = line_held(line), room = line->quality.room;
     size_t most = held < room ? (size_t)(room - held) : 0;
+    size_t place = LINE_BYTES - (size_t)(line->end - line->begin);
+    most = most < place ? most : place;
     most = size < most ? size : most;
     for (size_t i = 0; i < most; i++) {
         line_spoil(line, bytes[i]);
