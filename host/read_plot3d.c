@@ -123,13 +123,13 @@ int host_read_plot3d(const struct host_source *source, struct host_mesh *mesh,
                      struct host_error *error)
 {
     for (unsigned bits = 0; bits < 32; bits++) {
-        /* Without iblank and with marks first: of two variants that fit, the
-         * commoner. */
+        /* Of two variants that fit, marks are the better evidence, and
+         * iblank is the rarer. */
         struct variant v = {.big = (bits & 1) != 0,
-                            .marks = (bits & 2) == 0,
-                            .blocks = (bits & 4) != 0,
-                            .type = (bits & 8) != 0 ? HOST_F64 : HOST_F32,
-                            .iblank = (bits & 16) != 0};
+                            .blocks = (bits & 2) != 0,
+                            .type = (bits & 4) != 0 ? HOST_F64 : HOST_F32,
+                            .iblank = (bits & 8) != 0,
+                            .marks = (bits & 16) == 0};
         if (walk(source, v, NULL, error)) {
             (void)walk(source, v, mesh->points, error);
             return error->code;

@@ -18,7 +18,7 @@ struct vtk {
     bool binary, points_done, cells_done;
     uint64_t dimension[3];
     double origin[3], spacing[3];
-    bool has_dimension;
+    bool is_image, has_dimension;
     double *axis[3]; /* of a rectilinear grid */
     uint64_t axis_count[3];
     uint64_t cells;
@@ -175,7 +175,7 @@ static int implied_points(struct vtk *vtk, struct host_error *error)
     if (vtk->axis[0] != NULL && vtk->axis[1] != NULL && vtk->axis[2] != NULL) {
         return append_grid(vtk, vtk->axis_count, error);
     }
-    if (vtk->has_dimension && vtk->axis[0] == NULL) {
+    if (vtk->is_image && vtk->has_dimension) {
         return append_grid(vtk, vtk->dimension, error);
     }
     return host_source_fail(vtk->source, error,
@@ -261,7 +261,8 @@ static int skip_section(struct vtk *vtk, const char *word,
         }
         for (; count > 0; count--) {
             if (!host_scan_skip_blank_lines(&vtk->scan)) {
-                return damaged(vtk, error, "the file is cut short");
+                return damaged(vtk, error,
+                               "the file is cut short; get it whole");
             }
             host_scan_word(&vtk->scan, name, sizeof name);
             if (host_scan_unsigned(&vtk->scan, UINT32_MAX, &size, error) != 0 ||
@@ -321,7 +322,8 @@ static int take_section(struct vtk *vtk, bool *done, struct host_error *error)
     char word[64];
     host_scan_word(s, word, sizeof word);
     if (strcasecmp(word, "DATASET") == 0) {
-        host_scan_word(s, word, sizeof word); /* its kind: known by the rest */
+        host_scan_word(s, word, sizeof word);
+        vtk->is_image = strcasecmp(word, "STRUCTURED_POINTS") == 0;
         return 0;
     }
     if (strcasecmp(word, "FIELD") != 0 && strcasecmp(word, "METADATA") != 0) {

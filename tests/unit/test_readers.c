@@ -1,0 +1,705 @@
+/* Every format of points: written and read back, or made here byte by byte;
+ * every kind of wrong input: refused with its place. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cmocka.h>
+
+#include "../../host/gen.h"
+#include "../../host/points.h"
+#include "../../host/source.h"
+#include "reference.h"
+
+/* A file's bytes, put together piece by piece. */
+struct bytes {
+    uint8_t data[1 << 16];
+    size_t n;
+};
+
+static void put(struct bytes *b, const void *data, size_t n)
+{
+    assert_true(b->n + n <= sizeof b->data);
+    memcpy(b->data + b->n, data, n);
+    b->n += n;
+}
+
+static void put_text(struct bytes *b, const char *text)
+{
+    put(b, text, strlen(text));
+}
+
+static void put_word(struct bytes *b, uint64_t value, size_t size, bool big)
+{
+    for (size_t i = 0; i < size; i++) {
+        uint8_t byte = (uint8_t)(value >> (8 * (big ? size - 1 - i : i)));
+        put(b, &byte, 1);
+    }
+}
+
+static void put_number(struct bytes *b, double value, bool wide, bool big)
+{
+    uint64_t bits;
+    float single = (float)value;
+    uint32_t low;
+    memcpy(&bits, &value, sizeof bits);
+    memcpy(&low, &single, sizeof low);
+    put_word(b, wide ? bits : low, wide ? 8 : 4, big);
+}
+
+static double value_of(uint64_t i)
+{
+    return (double)i * 0.5 - 3; /* exact in single precision */
+}
+
+static void put_values(struct bytes *b, uint64_t n, bool wide, bool big)
+{
+    for (uint64_t i = 0; i < n; i++) {
+        put_number(b, value_of(i), wide, big);
+    }
+}
+
+static void put_base64(struct bytes *b, const uint8_t *from, size_t n)
+{
+    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                "abcdefghijklmnopqrstuvwxyz0123456789+/";
+    for (size_t i = 0; i < n; i += 3) {
+        uint32_t bits = 0;
+        for (size_t k = 0; k < 3; k++) {
+            bits = bits << 8 | (i + k < n ? from[i + k] : 0u);
+        }
+        for (size_t k = 0; k < 4; k++) {
+            char c = i + k > n ? '=' : digit[bits >> (18 - 6 * k) & 63];
+            put(b, &c, 1);
+        }
+    }
+}
+
+/* Expects n points with the values of value_of, row by row. */
+static void expect_rows(const char *path, const struct bytes *b, uint64_t n)
+{
+    struct host_points points;
+    struct host_error error = {0};
+    if (host_points_parse(path, b->data, b->n, &points, &error) != 0) {
+        fail_msg("%s", error.text);
+    }
+    assert_int_equal(points.count, n);
+    for (uint64_t i = 0; i < 3 * n; i++) {
+        assert_true(points.xyz[i] == value_of(i));
+    }
+    host_points_free(&points);
+}
+
+/* Every shorter file is refused, or (the end of a text may go) the same. */
+static void expect_cuts_refused(const char *path, const struct bytes *b,
+                                size_t from)
+{
+    for (size_t n = from; n < b->n; n++) {
+        struct host_points points;
+        struct host_error error = {0};
+        assert_int_equal(host_points_parse(path, b->data, n, &points, &error),
+                         HOST_INPUT);
+        assert_non_null(strstr(error.text, path));
+        assert_non_null(strstr(error.text, "; "));
+    }
+}
+
+static void refused(const char *path, const char *text, const char *expected)
+{
+    struct host_points points;
+    struct host_error error = {0};
+    assert_int_equal(
+        host_points_parse(path, text, strlen(text), &points, &error),
+        HOST_INPUT);
+    assert_null(points.xyz);
+    if (strstr(error.text, expected) == NULL) {
+        fail_msg("expected '%s' in '%s'", expected, error.text);
+    }
+    assert_null(strchr(error.text, '\n'));
+    assert_non_null(strstr(error.text, "; "));
+}
+
+/* --- Text ------------------------------------------------------------- */
+
+static void numbers_are_correctly_rounded(void **unused)
+{
+    (void)unused;
+    static const char *const hard[] = {
+        "0",
+        "-0",
+        "1",
+        "+1.5",
+        ".5",
+        "5.",
+        "1e3",
+        "1E-3",
+        "1e22",
+        "1e23",
+        "9007199254740993",
+        "9007199254740992.9999999999",
+        "1e-19",
+        "123456789012345678",
+        "12345678901234567890",
+        "4.9e-324",
+        "2e-324",
+        "1.7976931348623157e308",
+        "2.2250738585072014e-308",
+        "2.2250738585072011e-308",
+        "0.1",
+        "0.30000000000000004",
+        "179769313486231570000000000000000000000000000000000000000000000000000",
+        "0.000000000000000000000000000000000000000000000000000000000000000012",
+        "6929495644600919.5",
+        "3.518437208883201171875e13",
+        "1448997445238699e0",
+        "9214843084008499",
+        "0.500000000000000166533453"};
+    struct bytes *b = calloc(1, sizeof *b);
+    assert_non_null(b);
+    uint64_t state = 1;
+    for (int i = 0; i < 200000; i++) {
+        char text[128];
+        if (i < (int)(sizeof hard / sizeof *hard)) {
+            strcpy(text, hard[i]);
+        } else {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            uint64_t m = state >> (state & 63);
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            int places = (int)(state >> 59);
+            (void)snprintf(text, sizeof text,
+                           i % 3 == 0 ? "%llu.%llue%d" : "-%llu.%llu",
+                           (unsigned long long)(m >> 20),
+                           (unsigned long long)(m & 0xfffff), places - 16);
+            if (i % 5 == 0) {
+                (void)snprintf(text, sizeof text, "%llue-%d",
+                               (unsigned long long)m, places);
+            }
+        }
+        double expected = strtod(text, NULL);
+        b->n = 0;
+        put_text(b, text);
+        put_text(b, " 1 2");
+        struct host_points points;
+        struct host_error error = {0};
+        assert_int_equal(
+            host_points_parse("a.xyz", b->data, b->n, &points, &error), 0);
+        if (memcmp(points.xyz, &expected, sizeof expected) != 0) {
+            fail_msg("%s: %.17g, not %.17g", text, points.xyz[0], expected);
+        }
+        host_points_free(&points);
+    }
+    free(b);
+}
+
+static void text_in_all_its_habits(void **unused)
+{
+    (void)unused;
+    struct bytes b = {.n = 0};
+    put_text(&b, "\xef\xbb\xbf# a comment\r\n\r\n-3 -2.5\t-2 # behind\r\n"
+                 "  -1.5,-1 , -.5\n\n\n0;.5e0;1D0");
+    expect_rows("a.xyz", &b, 3);
+    expect_rows("-", &b, 3);
+    expect_rows("A.TXT", &b, 3);
+    b.n = 0;
+    put_text(&b, "x,\"y [m]\",z\n-3,-2.5,-2\n");
+    expect_rows("a.csv", &b, 1);
+    b.n = 0;
+    put_text(&b, "# made by hand\n3 3 1 1\n1 -3 -2.5 -2 7 1\n"
+                 "2 -1.5 -1 -.5 7 1\n 3 0 .5 1 7 1\n# end\n");
+    expect_rows("a.node", &b, 3);
+    b.n = 0;
+    put_text(&b, "NOFF # with normals\n2 1 0\n-3 -2.5 -2 0 0 1\n"
+                 "-1.5 -1 -.5 0 0 1\n3 0 1 0\n");
+    expect_rows("a.off", &b, 2);
+}
+
+static void text_faults_have_their_place(void **unused)
+{
+    (void)unused;
+    refused("a.xyz", "1 2 3\n4 5 six\n", "a.xyz:2:5: 'six' is no number; ");
+    refused("a.xyz", "1 2 3\n4 5 6x\n", "a.xyz:2:5: '6x' is no number; ");
+    refused("a.xyz", "1 2 3\n\n4 nan 6\n", "a.xyz:3:3: NaN");
+    refused("a.xyz", "1 2 3\n4 -NaN 6\n", "a.xyz:2:3: NaN");
+    refused("a.xyz", "1 inf 3\n", "a.xyz:1:3: infinity");
+    refused("a.xyz", "1 -Infinity 3\n", "a.xyz:1:3: infinity");
+    refused("a.xyz", "1 1e999 3\n", "a.xyz:1:3: the number is too large");
+    refused("a.xyz", "1 2\n", "a.xyz:1:4: 2 columns");
+    refused("a.xyz", "1\n", "a.xyz:1:2: 1 column");
+    refused("a.xyz", "1 2 3 4\n", "a.xyz:1:7: more than 3 columns");
+    refused("a.xyz", "0x1p3 2 3\n", "a.xyz:1:1: '0x1p3' is no number");
+    refused("a.xyz", "1e 2 3\n", "a.xyz:1:1: '1e' is no number");
+    refused("a.xyz", "1 2 - 3\n", "a.xyz:1:5: '-' is no number");
+    refused("a.xyz", "x y z\n1 2 3\n", "a.xyz:1:1: 'x' is no number");
+    refused("a.csv", "x,y,z\n1,2,q\n", "a.csv:2:5: 'q' is no number");
+    refused("a.xyz", "# nothing\n", "holds no point");
+    refused("a.xyz", "", "is empty");
+    refused("-", "1 2 x\n", "stdin:1:5: 'x'");
+    refused("a.pdf", "1 2 3\n", "no format of points");
+    refused("a", "1 2 3\n", "no format of points");
+    refused("a.node", "2 3 0 0\n1 1 2 3\n", "a.node:3:1: the file ends");
+    refused("a.node", "2 2 0 0\n1 1 2\n", "not 3 dimensions");
+    refused("a.node", "2 3 0 0\n1 1 2 3\n3 1 2 3\n", "a.node:3:2: points");
+    refused("a.node", "2 3 0 0\n1 1 2\n", "a.node:2:6: the line ends");
+    refused("a.off", "2 0 0\n", "the first word is not OFF");
+    refused("a.off", "OFF\n2 0 0\n1 2 3\n", "a.off:4:1: the file ends");
+    refused("a.off", "OFF BINARY\n", "binary OFF");
+}
+
+/* --- Binary ----------------------------------------------------------- */
+
+static void ply_of_every_coding(void **unused)
+{
+    (void)unused;
+    static const char *const codings[] = {"ascii", "binary_little_endian",
+                                          "binary_big_endian"};
+    for (int coding = 0; coding < 3; coding++) {
+        for (int wide = 0; wide < 2; wide++) {
+            struct bytes b = {.n = 0};
+            put_text(&b, "ply\nformat ");
+            put_text(&b, codings[coding]);
+            put_text(&b, " 1.0\ncomment made here\n"
+                         "element thing 2\nproperty list uchar int of\n"
+                         "element vertex 4\nproperty uchar red\nproperty ");
+            put_text(&b, wide != 0 ? "double x\nproperty double y\nproperty "
+                                     "double z\nproperty short s\n"
+                                   : "float x\nproperty float y\nproperty "
+                                     "float32 z\nproperty int16 s\n");
+            put_text(&b, "element face 1\nproperty list uchar int v\n"
+                         "end_header\n");
+            bool big = coding == 2;
+            if (coding == 0) {
+                put_text(&b, "2 7 8\n0\n9 -3 -2.5 -2 1\n9 -1.5 -1 -.5 1\n"
+                             "9 0 .5 1 1\n9 1.5 2 2.5 ");
+                expect_cuts_refused("a.ply", &b, 0);
+                put_text(&b, "1\n3 0 1 2\n");
+                expect_rows("a.ply", &b, 4);
+                continue;
+            }
+            put_word(&b, 2, 1, big);
+            put_word(&b, 7, 4, big);
+            put_word(&b, 8, 4, big);
+            put_word(&b, 0, 1, big);
+            for (uint64_t i = 0; i < 12; i++) {
+                if (i % 3 == 0) {
+                    put_word(&b, 200, 1, big);
+                }
+                put_number(&b, value_of(i), wide != 0, big);
+                if (i % 3 == 2) {
+                    put_word(&b, 1, 2, big);
+                }
+            }
+            expect_rows("a.ply", &b, 4);
+            expect_cuts_refused("a.ply", &b, 0);
+        }
+    }
+    refused("a.ply", "plx\n", "a.ply:1:1: the first line is not 'ply'");
+    refused("a.ply",
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+            "end_header\n1\n",
+            "not all of x, y and z");
+    refused("a.ply",
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+            "property float y\nproperty float z\nend_header\n1 2 q\n",
+            "a.ply:8:5: 'q' is no number");
+}
+
+static void npy_of_every_kind(void **unused)
+{
+    (void)unused;
+    for (int bits = 0; bits < 16; bits++) {
+        bool big = (bits & 1) != 0, wide = (bits & 2) != 0;
+        bool fortran = (bits & 4) != 0;
+        int version = (bits & 8) != 0 ? 2 : 1;
+        struct bytes b = {.n = 0};
+        char header[128];
+        (void)snprintf(header, sizeof header,
+                       "{'descr': '%cf%d', 'fortran_order': %s, 'shape': (5, "
+                       "3), }%*s\n",
+                       big ? '>' : '<', wide ? 8 : 4,
+                       fortran ? "True" : "False", 20, "");
+        put(&b, "\x93NUMPY", 6);
+        put_word(&b, (uint64_t)version, 1, false);
+        put_word(&b, 0, 1, false);
+        put_word(&b, strlen(header), version == 1 ? 2 : 4, false);
+        put_text(&b, header);
+        for (uint64_t i = 0; i < 15; i++) {
+            uint64_t at = fortran ? i % 5 * 3 + i / 5 : i;
+            put_number(&b, value_of(at), wide, big);
+        }
+        expect_rows("a.npy", &b, 5);
+        expect_cuts_refused("a.npy", &b, 0);
+        put_word(&b, 0, 1, false);
+        struct host_points points;
+        struct host_error error = {0};
+        assert_int_equal(
+            host_points_parse("a.npy", b.data, b.n, &points, &error),
+            HOST_INPUT);
+    }
+}
+
+static void binary_nan_is_named(void **unused)
+{
+    (void)unused;
+    struct bytes b = {.n = 0};
+    put_text(&b, "ply\nformat binary_little_endian 1.0\nelement vertex 4\n"
+                 "property float x\nproperty float y\nproperty float z\n"
+                 "end_header\n");
+    size_t start = b.n;
+    put_values(&b, 12, false, false);
+    b.n = start + 4 * 7;
+    put_number(&b, NAN, false, false);
+    b.n = start + 48;
+    struct host_points points;
+    struct host_error error = {0};
+    assert_int_equal(host_points_parse("a.ply", b.data, b.n, &points, &error),
+                     HOST_INPUT);
+    assert_non_null(
+        strstr(error.text, "a.ply: point 2 (counted from 0): y is NaN; "));
+}
+
+static void plot3d_of_every_variant(void **unused)
+{
+    (void)unused;
+    for (int bits = 0; bits < 32; bits++) {
+        bool big = (bits & 1) != 0, marks = (bits & 2) != 0;
+        bool wide = (bits & 4) != 0, iblank = (bits & 16) != 0;
+        uint64_t blocks = (bits & 8) != 0 ? 2 : 1;
+        struct bytes b = {.n = 0};
+        if (blocks == 2) {
+            if (marks) {
+                put_word(&b, 4, 4, big);
+            }
+            put_word(&b, blocks, 4, big);
+            if (marks) {
+                put_word(&b, 4, 4, big);
+            }
+        }
+        if (marks) {
+            put_word(&b, 12 * blocks, 4, big);
+        }
+        for (uint64_t k = 0; k < blocks; k++) {
+            put_word(&b, 2, 4, big);
+            put_word(&b, 3, 4, big);
+            put_word(&b, 2 + k, 4, big);
+        }
+        if (marks) {
+            put_word(&b, 12 * blocks, 4, big);
+        }
+        uint64_t first = 0;
+        for (uint64_t k = 0; k < blocks; k++) {
+            uint64_t n = 6 * (2 + k);
+            uint64_t length = n * ((wide ? 24u : 12u) + (iblank ? 4u : 0u));
+            if (marks) {
+                put_word(&b, length, 4, big);
+            }
+            for (uint64_t i = 0; i < 3 * n; i++) {
+                put_number(&b, value_of(3 * (first + i % n) + i / n), wide,
+                           big);
+            }
+            for (uint64_t i = 0; iblank && i < n; i++) {
+                put_word(&b, 1, 4, big);
+            }
+            if (marks) {
+                put_word(&b, length, 4, big);
+            }
+            first += n;
+        }
+        expect_rows("a.p3d", &b, first);
+        expect_rows("a.x", &b, first);
+        /* Cut by whole words it may be another variant. */
+        expect_cuts_refused("a.bin", &b, b.n - 3);
+    }
+}
+
+static void vtk_legacy(void **unused)
+{
+    (void)unused;
+    struct bytes b = {.n = 0};
+    put_text(&b, "# vtk DataFile Version 3.0\ntitle # with a hash\nASCII\n"
+                 "DATASET POLYDATA\nPOINTS 3 float\n-3 -2.5 -2 -1.5 -1\n"
+                 "-.5 0 .5 1\nVERTICES 1 2\n1 0\n");
+    expect_rows("a.vtk", &b, 3);
+    for (int wide = 0; wide < 2; wide++) {
+        b.n = 0;
+        put_text(&b, "# vtk DataFile Version 5.1\ntitle\nBINARY\n"
+                     "FIELD FieldData 1\nTIME 1 1 double\n");
+        put_number(&b, 7, true, true);
+        put_text(&b, "\nDATASET STRUCTURED_GRID\nDIMENSIONS 2 2 1\nPOINTS 4 ");
+        put_text(&b, wide != 0 ? "double\n" : "float\n");
+        put_values(&b, 12, wide != 0, true);
+        expect_rows("a.vtk", &b, 4);
+        expect_cuts_refused("a.vtk", &b, 0);
+    }
+    struct host_points points;
+    struct host_error error = {0};
+    const char *grid = "# vtk DataFile Version 2.0\nt\nASCII\n"
+                       "DATASET RECTILINEAR_GRID\nDIMENSIONS 3 2 1\n"
+                       "X_COORDINATES 3 float\n0 1 3\nY_COORDINATES 2 float\n"
+                       "5 6\nZ_COORDINATES 1 float\n9\nPOINT_DATA 6\n";
+    assert_int_equal(
+        host_points_parse("a.vtk", grid, strlen(grid), &points, &error), 0);
+    const double last[3] = {3, 6, 9};
+    assert_int_equal(points.count, 6);
+    assert_memory_equal(points.xyz + 15, last, sizeof last);
+    host_points_free(&points);
+    const char *image = "# vtk DataFile Version 2.0\nt\nASCII\n"
+                        "DATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\n"
+                        "ORIGIN 1 2 3\nSPACING .5 1 2\nPOINT_DATA 8\n";
+    const double corner[3] = {1.5, 3, 5};
+    assert_int_equal(
+        host_points_parse("a.vtk", image, strlen(image), &points, &error), 0);
+    assert_int_equal(points.count, 8);
+    assert_memory_equal(points.xyz + 21, corner, sizeof corner);
+    host_points_free(&points);
+    refused("a.vtk", "vtk\n", "a.vtk:1:1: the first line is not");
+    refused("a.vtk",
+            "# vtk DataFile Version 2.0\nt\nASCII\nDATASET POLYDATA\n"
+            "POINTS 2 float\n1 2 3\n4 five 6\n",
+            "a.vtk:7:3: 'five' is no number");
+    refused("a.vtk",
+            "# vtk DataFile Version 2.0\nt\nASCII\n"
+            "DATASET STRUCTURED_POINTS\nDIMENSIONS 99999 99999 99999\n",
+            "more than 2^26");
+}
+
+/* One VTK XML file with its points coded in one of five ways. */
+static void put_xml(struct bytes *b, int way, bool wide_header, bool packed,
+                    bool big)
+{
+    struct bytes raw = {.n = 0}, head = {.n = 0};
+    put_values(&raw, 12, true, big);
+    size_t word = wide_header ? 8 : 4;
+    put_text(b, "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" "
+                "version=\"1.0\" byte_order=\"");
+    put_text(b, big ? "BigEndian" : "LittleEndian");
+    put_text(b, wide_header ? "\" header_type=\"UInt64\"" : "\"");
+    put_text(b, packed ? " compressor=\"vtkZLibDataCompressor\">" : ">");
+    put_text(b, "\n<PolyData>\n<Piece NumberOfPoints=\"4\" "
+                "NumberOfVerts=\"0\">\n<PointData><DataArray "
+                "type=\"Float64\" Name=\"p\" format=\"ascii\">1 2 3 "
+                "4</DataArray></PointData>\n<Points><DataArray "
+                "type=\"Float64\" NumberOfComponents=\"3\" format=\"");
+    if (packed) { /* two blocks: 64 bytes and 32 */
+        uint8_t out[2][256];
+        uLongf n[2] = {256, 256};
+        assert_int_equal(compress(out[0], &n[0], raw.data, 64), Z_OK);
+        assert_int_equal(compress(out[1], &n[1], raw.data + 64, 32), Z_OK);
+        put_word(&head, 2, word, big);
+        put_word(&head, 64, word, big);
+        put_word(&head, 32, word, big);
+        put_word(&head, n[0], word, big);
+        put_word(&head, n[1], word, big);
+        raw.n = 0;
+        put(&raw, out[0], n[0]);
+        put(&raw, out[1], n[1]);
+    } else {
+        put_word(&head, 96, word, big);
+    }
+    static const char after[] =
+        "</DataArray></Points>\n</Piece>\n</PolyData>\n";
+    static const char empty[] = "/></Points>\n</Piece>\n</PolyData>\n";
+    if (way == 0) {
+        put_text(b, "ascii\">\n-3 -2.5 -2 -1.5 -1 -.5 0 .5 1 1.5 2 2.5\n");
+        put_text(b, after);
+    } else if (way == 1 || way == 2) {
+        put_text(b, "binary\">\n  ");
+        if (way == 2 && !packed) { /* header and data in one */
+            put(&head, raw.data, raw.n);
+            raw.n = 0;
+        }
+        put_base64(b, head.data, head.n);
+        put_base64(b, raw.data, raw.n);
+        put_text(b, "\n");
+        put_text(b, after);
+    } else {
+        put_text(b, "appended\" offset=\"3\"");
+        put_text(b, empty);
+        put_text(b, way == 3 ? "<AppendedData encoding=\"raw\">\n _xyz"
+                             : "<AppendedData encoding=\"base64\">\n _xyz");
+        if (way == 3) {
+            put(b, head.data, head.n);
+            put(b, raw.data, raw.n);
+        } else {
+            put_base64(b, head.data, head.n);
+            put_base64(b, raw.data, raw.n);
+        }
+        put_text(b, "</AppendedData>\n");
+    }
+    put_text(b, "</VTKFile>\n");
+}
+
+static void vtk_xml_of_every_coding(void **unused)
+{
+    (void)unused;
+    for (int way = 0; way < 5; way++) {
+        for (int bits = 0; bits < 8; bits++) {
+            struct bytes b = {.n = 0};
+            put_xml(&b, way, (bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0);
+            expect_rows("a.vtp", &b, 4);
+            expect_rows("a.vtu", &b, 4);
+            expect_rows("a.vts", &b, 4);
+            size_t tail = way < 3 ? 3 : 30; /* blanks; or past the data */
+            b.n -= tail;
+            expect_cuts_refused("a.vtu", &b, b.n > 40 ? b.n - 40 : 0);
+        }
+    }
+    refused("a.vtu",
+            "<VTKFile>\n<Piece NumberOfPoints=\"1\"><Points>\n"
+            "<DataArray type=\"Float32\" format=\"ascii\">\n1 2\nq "
+            "</DataArray></Points></Piece></VTKFile>",
+            "a.vtu:5:1: 'q' is no number");
+    refused("a.vtu", "<VTKFile>\n<Piece>\n</VTKFile>\n", "a.vtu:3: mismatch");
+    refused("a.vtu", "<VTKFile compressor=\"vtkLZ4DataCompressor\">\n",
+            "a.vtu:1: a compressor");
+}
+
+/* --- Files ------------------------------------------------------------ */
+
+static void written_and_read_back(void **unused)
+{
+    (void)unused;
+    static const char *const extensions[] = {
+        "xyz", "txt", "csv", "node", "ply", "off", "npy", "vtk", "vtu", "vtp"};
+    struct host_points points, again;
+    struct host_error error = {0};
+    assert_int_equal(host_gen("uniform", 1000, 2, &points, &error), 0);
+    points.xyz[0] = 4.9e-324;
+    points.xyz[1] = -1.7976931348623157e308;
+    points.xyz[2] = -0.0;
+    points.xyz[3] = 123456789012;
+    for (size_t i = 0; i < sizeof extensions / sizeof *extensions; i++) {
+        char path[64];
+        (void)snprintf(path, sizeof path, "/tmp/incode-test-%ld.%s",
+                       (long)getpid(), extensions[i]);
+        points.base = i % 2;
+        assert_int_equal(host_points_write(path, &points, &error), 0);
+        assert_int_equal(host_points_read(path, &again, &error), 0);
+        assert_int_equal(again.count, points.count);
+        assert_memory_equal(again.xyz, points.xyz, 24 * points.count);
+        assert_int_equal(again.base, i == 3 ? 1 : 0);
+        host_points_free(&again);
+        assert_int_equal(unlink(path), 0);
+    }
+    assert_int_equal(host_points_write("/tmp/a.stl", &points, &error),
+                     HOST_USAGE);
+    host_points_free(&points);
+}
+
+static void packed_files(void **unused)
+{
+    (void)unused;
+    const char *text = "-3 -2.5 -2\n-1.5 -1 -.5\n";
+    struct bytes b = {.n = 0};
+    for (int member = 0; member < 2; member++) {
+        z_stream z;
+        memset(&z, 0, sizeof z);
+        assert_int_equal(deflateInit2(&z, 6, Z_DEFLATED, 15 + 16, 8, 0), Z_OK);
+        z.next_in = (z_const Bytef *)(uintptr_t)(text + 11 * member);
+        z.avail_in = member == 0 ? 11 : (uInt)strlen(text) - 11;
+        z.next_out = b.data + b.n;
+        z.avail_out = 1000;
+        assert_int_equal(deflate(&z, Z_FINISH), Z_STREAM_END);
+        b.n += z.total_out;
+        (void)deflateEnd(&z);
+    }
+    expect_rows("a.xyz.gz", &b, 2);
+    struct host_points points;
+    struct host_error error = {0};
+    b.n -= 3;
+    assert_int_equal(
+        host_points_parse("a.xyz.gz", b.data, b.n, &points, &error),
+        HOST_INPUT);
+    assert_non_null(strstr(error.text, "cut short"));
+    refused("a.xyz.gz", "1 2 3\n4 5 6\n", "damaged");
+    b.n = 0;
+}
+
+static void files_that_are_not_there(void **unused)
+{
+    (void)unused;
+    struct host_points points;
+    struct host_error error = {0};
+    assert_int_equal(host_points_read("/nowhere/a.xyz", &points, &error),
+                     HOST_INPUT);
+    assert_non_null(strstr(error.text, "/nowhere/a.xyz: cannot be opened"));
+    error = (struct host_error){0};
+    char name[64];
+    (void)snprintf(name, sizeof name, "/tmp/incode-dir-%ld.xyz",
+                   (long)getpid());
+    (void)unlink(name);
+    assert_int_equal(host_points_read("/tmp/.", &points, &error), HOST_INPUT);
+    error = (struct host_error){0};
+    const struct host_points one = {.xyz = (double[3]){1, 2, 3}, .count = 1};
+    assert_int_equal(host_points_write("/nowhere/a.xyz", &one, &error),
+                     HOST_INPUT);
+    assert_non_null(strstr(error.text, "cannot be written"));
+    error = (struct host_error){0};
+    if (access("/dev/full", W_OK) == 0) {
+        assert_int_equal(symlink("/dev/full", name), 0);
+        assert_int_equal(host_points_write(name, &one, &error), HOST_INPUT);
+        assert_non_null(strstr(error.text, "writing failed"));
+        assert_int_equal(unlink(name), 0);
+    }
+}
+
+/* Real files in more than one form hold the same points. */
+static void real_data(void **unused)
+{
+    (void)unused;
+    struct host_points points;
+    struct host_error error = {0};
+    if (!reference_data("bluntfin.xyz.gz", &points)) {
+        print_message("bluntfin.xyz.gz: not there\n");
+        skip();
+    }
+    assert_int_equal(points.count, 40960);
+    /* as the original: big-endian single precision PLOT3D, 40 x 32 x 32 */
+    size_t bytes = 12 + 12 * 40960;
+    struct bytes b = {.n = 0};
+    uint8_t *file = malloc(bytes + 64);
+    assert_non_null(file);
+    put_word(&b, 40, 4, true);
+    put_word(&b, 32, 4, true);
+    put_word(&b, 32, 4, true);
+    memcpy(file, b.data, 12);
+    for (uint64_t i = 0; i < 3 * 40960; i++) {
+        b.n = 0;
+        put_number(&b, points.xyz[3 * (i % 40960) + i / 40960], false, true);
+        memcpy(file + 12 + 4 * i, b.data, 4);
+    }
+    struct host_points again;
+    assert_int_equal(
+        host_points_parse("bluntfinxyz.bin", file, bytes, &again, &error), 0);
+    assert_int_equal(again.count, points.count);
+    assert_memory_equal(again.xyz, points.xyz, 24 * points.count);
+    free(file);
+    host_points_free(&again);
+    host_points_free(&points);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(numbers_are_correctly_rounded),
+        cmocka_unit_test(text_in_all_its_habits),
+        cmocka_unit_test(text_faults_have_their_place),
+        cmocka_unit_test(ply_of_every_coding),
+        cmocka_unit_test(npy_of_every_kind),
+        cmocka_unit_test(binary_nan_is_named),
+        cmocka_unit_test(plot3d_of_every_variant),
+        cmocka_unit_test(vtk_legacy),
+        cmocka_unit_test(vtk_xml_of_every_coding),
+        cmocka_unit_test(written_and_read_back),
+        cmocka_unit_test(packed_files),
+        cmocka_unit_test(files_that_are_not_there),
+        cmocka_unit_test(real_data),
+    };
+    return cmocka_run_group_tests_name("readers", tests, NULL, NULL);
+}
