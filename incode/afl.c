@@ -50,7 +50,8 @@ void incode_afl_clear(struct incode_afl *afl)
             i + 1 < afl->touched_capacity ? i + 1 : INCODE_AFL_NIL;
     }
     afl->free = afl->touched_free = 0;
-    afl->count = afl->touched_count = afl->hubs = 0;
+    afl->count = afl->touched_count = 0;
+    afl->crowded = INCODE_NONE;
 }
 
 static uint32_t *touched_head(const struct incode_afl *afl, uint32_t brick)
@@ -121,7 +122,7 @@ static void unlink_node(struct incode_afl *afl, uint32_t *link)
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                            uint32_t c)
 {
-    uint32_t *link = head_of(afl, key);
+    uint32_t *link = head_of(afl, key), passed = 0;
     while (*link != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[*link];
         if (node->key == key && node->b == c && node->c == b) {
@@ -130,8 +131,11 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
             return true;
         }
         INCODE_ASSERT(node->key != key || node->b != b || node->c != c);
+        passed += node->key == key;
         link = &node->next;
     }
+    if (passed >= INCODE_AFL_CROWD && afl->crowded == INCODE_NONE)
+        afl->crowded = key;
     return false;
 }
 

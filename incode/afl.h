@@ -21,11 +21,9 @@ struct incode_touched {
     uint64_t reached; /* a tetrahedron has this vertex */
     uint64_t pending; /* its list may hold faces */
     uint64_t waiting; /* a task waits for a page on its behalf */
-    uint64_t hub;     /* open faces at it go to its neighbours' lists */
     uint32_t brick;
     uint32_t faces; /* in the lists of its vertices */
     uint32_t next;
-    uint32_t spare;
 };
 
 struct incode_afl_node {
@@ -40,10 +38,12 @@ struct incode_afl {
     uint32_t capacity, mask, free, count, count_max; /* of faces */
     uint32_t touched_capacity, touched_mask, touched_free, touched_count,
         touched_max;
-    uint32_t hubs; /* hub bits ever set */
+    uint32_t crowded; /* a vertex with a long list, or INCODE_NONE */
 };
 
 #define INCODE_AFL_NIL UINT32_MAX
+
+enum { INCODE_AFL_CROWD = 224 }; /* faces: a long list */
 
 static inline bool incode_touched_used(const struct incode_touched *entry)
 {

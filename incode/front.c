@@ -10,11 +10,18 @@
 
 static bool is_hub(const struct incode_triangulator *t, uint32_t v)
 {
-    if (t->afl.hubs == 0)
-        return false;
-    const struct incode_touched *entry =
-        incode_afl_find(&t->afl, v / INCODE_BRICK_POINTS);
-    return entry != NULL && (entry->hub >> (v % INCODE_BRICK_POINTS) & 1) != 0;
+    for (uint32_t i = 0; i < t->hub_count; i++)
+        if (t->hubs[i] == v)
+            return true;
+    return false;
+}
+
+bool incode_front_has_hub(const struct incode_triangulator *t, uint32_t brick)
+{
+    for (uint32_t i = 0; i < t->hub_count; i++)
+        if (t->hubs[i] / INCODE_BRICK_POINTS == brick)
+            return true;
+    return false;
 }
 
 /* Does the triangle's box meet the region's?  A function of the face alone, so
@@ -33,25 +40,29 @@ static bool in_region(const struct incode_triangulator *t,
     return true;
 }
 
-bool incode_front_key_slow(const struct incode_triangulator *t,
-                           const uint32_t f[3], const double *const p[3],
-                           unsigned *turn)
+static unsigned key_of(const struct incode_triangulator *t, const uint32_t f[3])
 {
-    int best = -1, best_class = 4;
-    bool any_own = false;
-    for (int i = 0; i < 3; i++) {
+    unsigned best = 0;
+    int best_class = 4;
+    for (unsigned i = 0; i < 3; i++) {
         bool own = incode_own(t, f[i]), hub = is_hub(t, f[i]);
         int class = (own && !hub) ? 0 : !hub ? 1 : 2;
-        any_own = any_own || own;
         if (class < best_class || (class == best_class && f[i] < f[best])) {
             best = i;
             best_class = class;
         }
     }
-    if (!any_own &&
+    return best;
+}
+
+bool incode_front_key_slow(const struct incode_triangulator *t,
+                           const uint32_t f[3], const double *const p[3],
+                           unsigned *turn)
+{
+    if (!incode_own(t, f[0]) && !incode_own(t, f[1]) && !incode_own(t, f[2]) &&
         (t->setup.face_rule != INCODE_FACE_PAPER || !in_region(t, p)))
         return false;
-    *turn = (unsigned)best;
+    *turn = key_of(t, f);
     return true;
 }
 
@@ -102,12 +113,56 @@ void incode_front_reached(struct incode_triangulator *t, uint32_t v)
     entry->reached |= UINT64_C(1) << (v % INCODE_BRICK_POINTS);
 }
 
-void incode_front_make_hub(struct incode_triangulator *t, uint32_t v)
+/* ---- hubs ---- */
+
+/* Puts the open face (v, b, c) into the list where it belongs now. */
+static void list_again(struct incode_triangulator *t, uint32_t v, uint32_t b,
+                       uint32_t c)
 {
-    struct incode_touched *entry =
-        incode_afl_touch(&t->afl, v / INCODE_BRICK_POINTS);
-    entry->hub |= UINT64_C(1) << (v % INCODE_BRICK_POINTS);
-    t->afl.hubs++;
+    const uint32_t f[3] = {v, b, c};
+    unsigned turn = key_of(t, f);
+    const uint32_t g[3] = {f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]};
+    incode_front_toggle(t, g);
+}
+
+/* Makes the vertex with a crowded list a hub; false: there is none. */
+static bool find_hub(struct incode_triangulator *t)
+{
+    uint32_t v = t->afl.crowded;
+    if (v == INCODE_NONE)
+        return false;
+    uint32_t brick = v / INCODE_BRICK_POINTS;
+    if (t->unspill_pending && t->unspill_brick == brick)
+        return false; /* some of its list is still on its way */
+    t->afl.crowded = INCODE_NONE;
+    if (is_hub(t, v) || is_spilled(t, brick) || t->hub_count == INCODE_HUBS)
+        return false;
+    t->hubs[t->hub_count++] = t->draining = v;
+    return true;
+}
+
+bool incode_front_drain(struct incode_triangulator *t)
+{
+    if (t->draining == INCODE_NONE && !find_hub(t))
+        return false;
+    /* Faces of three hubs stay: too few to fill the array. */
+    enum { FACES = 128 };
+    uint32_t v = t->draining, pairs[FACES][2], stay = 0;
+    bool more;
+    uint32_t n = incode_afl_take(&t->afl, v, pairs, FACES, &more);
+    for (uint32_t i = 0; i < n; i++) {
+        const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
+        if (key_of(t, f) == 0)
+            memcpy(pairs[stay++], f + 1, sizeof pairs[0]);
+        else
+            list_again(t, f[0], f[1], f[2]);
+    }
+    INCODE_ASSERT(stay < FACES);
+    for (uint32_t i = 0; i < stay; i++)
+        list_again(t, v, pairs[i][0], pairs[i][1]);
+    if (!more)
+        t->draining = INCODE_NONE;
+    return true;
 }
 
 /* ---- spilling ---- */
@@ -142,8 +197,12 @@ static bool evict_brick(struct incode_triangulator *t,
                 return false;
             uint32_t n = incode_afl_take(&t->afl, v, pairs, 8, &more);
             for (uint32_t i = 0; i < n; i++) {
-                const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
-                spill_one(t, f);
+                if (v == t->draining) {
+                    list_again(t, v, pairs[i][0], pairs[i][1]);
+                } else {
+                    const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
+                    spill_one(t, f);
+                }
             }
         }
     }

@@ -65,27 +65,6 @@ static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c)
     return false;
 }
 
-/* Too many open faces at one vertex: from now on they wait at its neighbours,
- * so that the front at it stays as short as the work around it. */
-static void spread_hub(struct incode_triangulator *t)
-{
-    struct incode_star *star = &t->star;
-    struct incode_touched *entry =
-        incode_afl_touch(&t->afl, star->v / INCODE_BRICK_POINTS);
-    if ((entry->hub >> (star->v % INCODE_BRICK_POINTS) & 1) == 0)
-        incode_front_make_hub(t, star->v);
-    uint32_t n = star->faces;
-    star->faces = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        const uint32_t v[3] = {star->v, star->b[i], star->c[i]};
-        unsigned turn;
-        if (!incode_front_key(t, v, NULL, &turn))
-            INCODE_ASSERT(false);
-        const uint32_t f[3] = {v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]};
-        incode_front_toggle(t, f);
-    }
-}
-
 static void toggle_here(struct incode_triangulator *t, uint32_t b, uint32_t c,
                         uint16_t ib, uint16_t ic)
 {
@@ -403,8 +382,8 @@ enum incode_outcome incode_star_close(struct incode_triangulator *t,
             break;
         }
         r = advance(t, task);
-        if (star->faces > INCODE_STAR_FACES - 4)
-            spread_hub(t);
+        if (r == INCODE_OK && star->faces > INCODE_STAR_FACES - 4)
+            r = INCODE_AGAIN; /* the list will find it crowded */
     }
     put_back(t);
     star_emit(t);

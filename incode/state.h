@@ -21,6 +21,7 @@ enum {
     INCODE_SPILL_FACES = 1024,
     INCODE_SPILL_BUILT = 128, /* tetrahedra a step while faces are spilled */
     INCODE_HULL_PLANES = 8,
+    INCODE_HUBS = 32,
     INCODE_PATIENCE = 8 /* retries before a task runs alone */
 };
 
@@ -113,6 +114,9 @@ struct incode_triangulator {
     bool unspill_pending, spilled_any;
     uint32_t unspill_brick;
 
+    uint32_t hubs[INCODE_HUBS], hub_count;
+    uint32_t draining; /* a hub whose list is not yet empty, or INCODE_NONE */
+
     uint32_t room_faces, room_bricks; /* kept free before a star */
     uint32_t built_max;
     double spread;  /* gather radius in units of the leaf's extent */
@@ -162,7 +166,7 @@ static inline bool incode_front_key(const struct incode_triangulator *t,
                                     const uint32_t f[3],
                                     const double *const p[3], unsigned *turn)
 {
-    if (t->afl.hubs != 0 || !incode_own(t, f[0]) || !incode_own(t, f[1]) ||
+    if (t->hub_count != 0 || !incode_own(t, f[0]) || !incode_own(t, f[1]) ||
         !incode_own(t, f[2]))
         return incode_front_key_slow(t, f, p, turn);
     unsigned least = f[1] < f[0];
@@ -179,8 +183,13 @@ void incode_front_reached(struct incode_triangulator *t, uint32_t v);
 bool incode_front_room(struct incode_triangulator *t);
 /* Sends what waits in the spill buffer; false: no room at the port. */
 bool incode_front_flush(struct incode_triangulator *t);
-/* Makes a vertex a hub: its open faces go to its neighbours' lists. */
-void incode_front_make_hub(struct incode_triangulator *t, uint32_t v);
+/* Where a vertex has too many open faces, makes it a hub and moves some of them
+ * to its neighbours' lists, so that the front at it stays as short as the work
+ * around it; nothing else may run before all are moved.  False: there is
+ * nothing to do.  Needs the room of a star. */
+bool incode_front_drain(struct incode_triangulator *t);
+/* Whether a vertex of the brick is a hub. */
+bool incode_front_has_hub(const struct incode_triangulator *t, uint32_t brick);
 
 /* ---- apex.c ---- */
 

@@ -125,6 +125,8 @@ void incode_triangulator_start(struct incode_triangulator *t,
     t->spill_count = 0;
     t->spilled_any = t->unspill_pending = false;
     t->foreign = t->finished = false;
+    t->hub_count = 0;
+    t->draining = INCODE_NONE;
     memset(t->tasks, 0, sizeof t->tasks);
     t->fault = NULL;
 }
@@ -214,8 +216,7 @@ static enum incode_step run(struct incode_triangulator *t,
         INCODE_ASSERT(task->kind == INCODE_TASK_IDLE || t->fault != NULL);
     task->kind = INCODE_TASK_IDLE;
     task->born = 0;
-    if (!incode_own(t, v) && entry->faces == 0 && entry->waiting == 0 &&
-        entry->hub == 0)
+    if (!incode_own(t, v) && entry->faces == 0 && entry->waiting == 0)
         incode_afl_drop(&t->afl, entry->brick);
     return INCODE_WORKED;
 }
@@ -351,8 +352,7 @@ static void look_ahead(struct incode_triangulator *t)
 static enum incode_step pass_brick(struct incode_triangulator *t)
 {
     uint32_t brick = t->job.first + t->current;
-    struct incode_touched *entry = incode_afl_find(&t->afl, brick);
-    if (entry == NULL || entry->hub == 0) {
+    if (!incode_front_has_hub(t, brick)) {
         t->ports.commit(t->ports.context, brick);
         incode_afl_drop(&t->afl, brick);
     }
@@ -437,15 +437,14 @@ static bool next_foreign(struct incode_triangulator *t, uint32_t *v)
 /* Everything is closed: the hubs' bricks are complete, too. */
 static enum incode_step finish(struct incode_triangulator *t)
 {
-    for (uint32_t i = 0; i < t->afl.touched_capacity; i++) {
-        const struct incode_touched *entry = &t->afl.touched[i];
-        if (!incode_touched_used(entry))
-            continue;
-        uint32_t brick = entry->brick;
-        if (incode_own_brick(t, brick))
+    while (t->hub_count > 0) {
+        uint32_t brick = t->hubs[--t->hub_count] / INCODE_BRICK_POINTS;
+        if (incode_own_brick(t, brick) && !incode_front_has_hub(t, brick))
             t->ports.commit(t->ports.context, brick);
-        incode_afl_drop(&t->afl, brick);
     }
+    for (uint32_t i = 0; i < t->afl.touched_capacity; i++)
+        if (incode_touched_used(&t->afl.touched[i]))
+            incode_afl_drop(&t->afl, t->afl.touched[i].brick);
     INCODE_ASSERT(t->afl.count == 0 && t->afl.touched_count == 0);
     t->finished = true;
     return INCODE_FINISHED;
@@ -495,6 +494,8 @@ static enum incode_step step(struct incode_triangulator *t)
     }
     if (t->ports.emit_room(t->ports.context) < EMIT_ROOM_MIN)
         return INCODE_WAITING;
+    if (incode_front_drain(t))
+        return INCODE_WORKED;
     struct incode_task *task = ready_task(t, &alone);
     if (task != NULL)
         return run(t, task, false);
