@@ -5,6 +5,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#ifdef __FAST_MATH__
+#error "-ffast-math changes what is exact here; compile without it"
+#endif
+
 /* Every operand is volatile, so that the machine computes and not the
  * compiler; every test is one that a single fault of its kind fails. */
 
@@ -71,10 +75,10 @@ const char *incode_arithmetic_fault(void)
         return "words are not little-endian; use a little-endian machine";
     if (!rounds_to_even())
         return "doubles are not rounded to nearest even; set that mode";
-    if (fuses())
-        return "products are fused into sums; compile with -ffp-contract=off";
     if (keeps_excess())
         return "doubles keep excess precision; compile with -mfpmath=sse";
+    if (fuses())
+        return "products are fused into sums; compile with -ffp-contract=off";
     if (flushes())
         return "denormals are flushed to zero; clear FTZ and DAZ";
     return NULL;

@@ -116,6 +116,7 @@ static void problem_init(struct problem *s, const double *const p[],
 static void term_product(struct term *r, const struct term *a,
                          const struct term *b)
 {
+    INCODE_ASSERT(a->limbs > 0 && b->limbs > 0);
     INCODE_ASSERT(a->limbs + b->limbs <= TERM_LIMBS);
     for (int32_t j = 0; j < b->limbs; j++) {
         uint64_t carry = 0;

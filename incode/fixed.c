@@ -4,6 +4,7 @@
 
 #include "scale.h"
 
+/* cppcheck-suppress shiftNegativeLHS */
 _Static_assert((-1 >> 1) == -1, "shifts of negative numbers keep the sign");
 
 /* ---- from doubles to integers ---- */
@@ -337,7 +338,7 @@ int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4])
     for (int i = 0; i < 4; i++) {
         for (int k = 0; k < 3; k++) {
             ones |= (uint64_t)d[i][k];
-            bits |= (uint64_t)(d[i][k] ^ d[i][k] >> 63);
+            bits |= (uint64_t)(d[i][k] < 0 ? ~d[i][k] : d[i][k]);
         }
     }
     if (ones == 0)

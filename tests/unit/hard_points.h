@@ -45,14 +45,14 @@ static uint64_t hard_bits(uint64_t *seed)
     return *seed * 0x9e3779b97f4a7c15u >> 11; /* 53 of them */
 }
 
-static int hard_below(uint64_t *seed, int n)
-{
-    return (int)(hard_bits(seed) >> 24) % n;
-}
-
 static double hard_unit(uint64_t *seed)
 {
     return (double)hard_bits(seed) * 0x1p-53;
+}
+
+static int hard_below(uint64_t *seed, int n)
+{
+    return (int)(hard_unit(seed) * n);
 }
 
 static double hard_sign(uint64_t *seed)

@@ -14,6 +14,7 @@
 #endif
 
 #include "../../incode/predicates.h"
+#include "emulated.h"
 
 /* The same source once more, with products fused into sums. */
 #ifdef __FMA__
@@ -25,6 +26,7 @@
 #endif
 #define incode_arithmetic_fault fused_arithmetic_fault
 const char *fused_arithmetic_fault(void);
+/* NOLINTNEXTLINE(bugprone-suspicious-include) */
 #include "../../incode/arithmetic.c"
 #undef incode_arithmetic_fault
 #ifdef __clang__
@@ -33,6 +35,32 @@ const char *fused_arithmetic_fault(void);
 #pragma GCC pop_options
 #endif
 #endif
+
+/* And once with the 80-bit registers of old x86. */
+#if defined(__x86_64__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC target("fpmath=387")
+#define EXTENDED 1
+#define incode_arithmetic_fault extended_arithmetic_fault
+#define rounds_to_even extended_rounds_to_even
+#define fuses extended_fuses
+#define keeps_excess extended_keeps_excess
+#define flushes extended_flushes
+#define little_endian extended_little_endian
+const char *extended_arithmetic_fault(void);
+/* NOLINTNEXTLINE(bugprone-suspicious-include) */
+#include "../../incode/arithmetic.c"
+#undef incode_arithmetic_fault
+#pragma GCC pop_options
+#endif
+
+static void need_processor(void)
+{
+    if (emulated()) {
+        print_message("valgrind's processor does not know it\n");
+        skip();
+    }
+}
 
 static void names(const char *fault, const char *word)
 {
@@ -55,7 +83,19 @@ static void test_fused(void **state)
 #ifdef __FMA__
     names(fused_arithmetic_fault(), "fused");
 #else
-    print_message("SKIP test_fused: compiled for a machine without it\n");
+    print_message("compiled for a machine without it\n");
+    skip();
+#endif
+}
+
+static void test_extended(void **state)
+{
+    (void)state;
+    need_processor();
+#ifdef EXTENDED
+    names(extended_arithmetic_fault(), "excess");
+#else
+    print_message("no 80-bit registers here\n");
     skip();
 #endif
 }
@@ -64,6 +104,7 @@ static void test_rounding(void **state)
 {
     static const int modes[] = {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
     (void)state;
+    need_processor();
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         assert_int_equal(fesetround(modes[i]), 0);
         const char *fault = incode_arithmetic_fault();
@@ -76,6 +117,7 @@ static void test_rounding(void **state)
 static void test_flushed(void **state)
 {
     (void)state;
+    need_processor();
 #ifdef __SSE2__
     static const unsigned flags[] = {0x8000 /* FTZ */, 0x0040 /* DAZ */,
                                      0x8040};
@@ -88,7 +130,7 @@ static void test_flushed(void **state)
     }
     assert_null(incode_arithmetic_fault());
 #else
-    print_message("SKIP test_flushed: no flags to set on this processor\n");
+    print_message("no flags to set on this processor\n");
     skip();
 #endif
 }
@@ -96,9 +138,8 @@ static void test_flushed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sound_here),
-        cmocka_unit_test(test_fused),
-        cmocka_unit_test(test_rounding),
+        cmocka_unit_test(test_sound_here), cmocka_unit_test(test_fused),
+        cmocka_unit_test(test_extended),   cmocka_unit_test(test_rounding),
         cmocka_unit_test(test_flushed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
