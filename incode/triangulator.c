@@ -304,13 +304,13 @@ static void fetch_ahead(struct incode_triangulator *t)
 
 /* Asks for the pages of bricks that will be worked on next, and of what lies
  * around them. */
-static bool nothing(struct incode_walker *walker, struct incode_query *q,
-                    const struct incode_frame *frame, uint32_t brick,
-                    uint32_t leaves, void *context)
+static bool count_brick(struct incode_walker *walker, struct incode_query *q,
+                        const struct incode_frame *frame, uint32_t brick,
+                        uint32_t leaves, void *context)
 {
+    uint32_t *left = context;
     (void)walker, (void)q, (void)frame, (void)brick, (void)leaves;
-    (void)context;
-    return true;
+    return --*left > 0;
 }
 
 static void look_ahead(struct incode_triangulator *t)
@@ -343,7 +343,9 @@ static void look_ahead(struct incode_triangulator *t)
         q.lo[d] -= extent * t->spread;
         q.hi[d] += extent * t->spread;
     }
-    if (incode_walk(&t->walker, &q, nothing, NULL) == INCODE_WALK_DONE)
+    /* No more than a share of the frames: it would push out what is at work. */
+    uint32_t left = (uint32_t)t->map.frame_count / 8;
+    if (incode_walk(&t->walker, &q, count_brick, &left) != INCODE_WALK_WAIT)
         t->ahead++;
 }
 
