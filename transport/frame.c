@@ -248,15 +248,19 @@ size_t frame_encode(uint8_t *out, const struct frame_header *header,
 
 /* --- decoding ------------------------------------------------------------- */
 
-/* memcpy, cheaper for the short runs of data with many zeros; `spare` bytes
- * may be read and written from both. */
+enum { BLOCK = 16 };
+
+/* memcpy in blocks, cheaper than a call for runs of at most 254 bytes; `spare`
+ * bytes, at least `run`, may be read and written. */
 static inline void copy_run(uint8_t *out, const uint8_t *in, size_t run,
                             size_t spare)
 {
-    if (run <= 16 && spare >= 16) {
-        memcpy(out, in, 16);
-    } else {
-        memcpy(out, in, run);
+    size_t i = 0;
+    for (; i < run && spare - i >= BLOCK; i += BLOCK) {
+        memcpy(out + i, in + i, BLOCK);
+    }
+    for (; i < run; i++) {
+        out[i] = in[i];
     }
 }
 

@@ -20,9 +20,9 @@ static struct link_config complete(const struct link_config *config)
     c.message_max = (uint16_t)or_default(c.message_max, LINK_MESSAGE_MAX);
     c.frame_payload = (uint16_t)or_default(c.frame_payload, c.message_max);
     c.staging = (uint16_t)or_default(c.staging, staging);
-    c.timeout_min_us = or_default(c.timeout_min_us, 20000);
+    c.timeout_min_us = or_default(c.timeout_min_us, 100000);
     c.timeout_max_us = or_default(c.timeout_max_us, 1000000);
-    c.ack_delay_us = or_default(c.ack_delay_us, 1000);
+    c.ack_delay_us = or_default(c.ack_delay_us, 5000);
     c.hello_us = or_default(c.hello_us, 50000);
     c.keep_alive_us = or_default(c.keep_alive_us, 500000);
     c.silence_us = or_default(c.silence_us, 3000000);

@@ -91,10 +91,9 @@ struct link_statistics {
     uint64_t pipe_closed;      /* times the pipe broke */
     uint64_t starved;          /* polls with frames to send and no credit */
     uint64_t stalled;          /* polls in which the pipe did not take all */
-    uint32_t send_high_water;  /* slots */
-    uint32_t receive_high_water;                         /* slots */
-    uint32_t rtt_us, rtt_min_us, rtt_max_us, timeout_us; /* smoothed; extremes;
-                                                   retransmission timer now */
+    uint32_t send_high_water, receive_high_water; /* slots */
+    uint32_t rtt_us, rtt_min_us, rtt_max_us;      /* smoothed; extremes */
+    uint32_t timeout_us;                          /* retransmission timer */
 };
 
 /* Zero means the default for all but pipe, epoch and window. */
@@ -105,16 +104,16 @@ struct link_config {
     uint8_t port;
     uint8_t peer_port; /* and who must be at the other */
     uint16_t peer_node;
-    uint16_t window;        /* frames a direction, 1 .. LINK_WINDOW_MAX */
-    uint16_t message_max;   /* bytes; default LINK_MESSAGE_MAX */
-    uint16_t frame_payload; /* bytes; default: a message a frame */
-    uint16_t staging;       /* frames; default min(window, 8) */
-    uint32_t timeout_min_us, timeout_max_us; /* retransmission;
-                                                20 ms and 1 s */
-    uint32_t ack_delay_us;                   /* of acknowledgements; 1 ms */
-    uint32_t hello_us;                       /* between greetings; 50 ms */
-    uint32_t keep_alive_us; /* a frame at least so often; 500 ms */
-    uint32_t silence_us;    /* then the peer counts as silent; 3 s */
+    uint16_t window;         /* frames a direction, 1 .. LINK_WINDOW_MAX */
+    uint16_t message_max;    /* bytes; default LINK_MESSAGE_MAX */
+    uint16_t frame_payload;  /* bytes; default: a message a frame */
+    uint16_t staging;        /* frames; default min(window, 8) */
+    uint32_t timeout_min_us; /* retransmission: 100 ms, */
+    uint32_t timeout_max_us; /* and 1 s; a slow line wants less */
+    uint32_t ack_delay_us;   /* of acknowledgements; 5 ms */
+    uint32_t hello_us;       /* between greetings; 50 ms */
+    uint32_t keep_alive_us;  /* a frame at least so often; 500 ms */
+    uint32_t silence_us;     /* then the peer counts as silent; 3 s */
 };
 
 struct link_message {
