@@ -1,3 +1,4 @@
+#include <float.h>
 #include <string.h>
 
 #include "check.h"
@@ -110,7 +111,8 @@ void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,
     memcpy(q->pc, pc, sizeof q->pc);
     q->best = INCODE_NONE;
     incode_query_face(q);
-    s->radius = radius;
+    /* A radius that vanished among denormals could not grow again. */
+    s->radius = radius > DBL_MIN ? radius : DBL_MIN;
     s->final = false;
     s->looked = 0;
     set_box(t, s);
