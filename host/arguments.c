@@ -22,6 +22,7 @@ enum {
     KEY_VERIFY,
     KEY_NO_PROGRESS,
     KEY_TABLE,
+    KEY_MAP,
     KEY_WINDOW,
     KEY_SHUFFLE_SEED,
     KEY_HOST_STALL,
@@ -67,6 +68,7 @@ static const struct argp_option options_of_run[] = {
     {"stats", KEY_STATS, "FILE", 0, "Write statistics as JSON; - is stdout", 2},
     {"table", KEY_TABLE, NULL, 0,
      "Run on one node too, and print the columns of the paper's Table 2", 2},
+    {"map", KEY_MAP, NULL, 0, "Print the memory map of a node", 2},
     {"quiet", 'q', NULL, 0, "Print nothing but errors", 2},
     {"no-progress", KEY_NO_PROGRESS, NULL, 0,
      "No line of progress on a terminal", 2},
@@ -295,6 +297,9 @@ static error_t parse_report(int key, char *value, struct argp_state *state,
         return 0;
     case KEY_TABLE:
         o->table = true;
+        return 0;
+    case KEY_MAP:
+        o->map = true;
         return 0;
     case 'q':
         o->quiet = true;

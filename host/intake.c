@@ -177,6 +177,9 @@ int host_intake(struct host_service *service,
         service->ready += !report->ready;
         report->ready = true;
         return 0;
+    case NODE_HERE:
+        service->here++;
+        return 0;
     case NODE_PAGE_REQUEST:
         return take_requests(service, message, error);
     case NODE_RESULT:

@@ -79,6 +79,47 @@ static void node_lines(FILE *file, const struct host_run_result *r)
                        : " (a sanitizer build: not held by the kernel)");
 }
 
+static void map_line(FILE *file, uint64_t bytes, const char *what,
+                     uint64_t count, const char *unit)
+{
+    fprintf(file, "%12llu  %s", (unsigned long long)bytes, what);
+    if (count > 0) {
+        fprintf(file, " (%llu %s)", (unsigned long long)count, unit);
+    }
+    fputc('\n', file);
+}
+
+void host_report_map(FILE *file, const struct host_run_result *result)
+{
+    const struct node_map *m = &result->node[0].map.map;
+    unsigned links = 1;
+    while (1u << (links - 1) < result->nodes) {
+        links++;
+    }
+    fprintf(file, "\nMemory map of node 0, bytes of %llu\n",
+            (unsigned long long)result->memory);
+    map_line(file, HOST_STACK_BYTES, "stack", 0, "");
+    map_line(file, m->fixed - HOST_STACK_BYTES, ".data, .bss", 0, "");
+    map_line(file, m->node, "node program", 0, "");
+    map_line(file, m->cube, "windows of links", links * m->window,
+             "frames each way");
+    map_line(file, m->outbox, "results and spilled faces on their way out", 0,
+             "");
+    map_line(file, m->control, "triangulator, its gathered points and tasks", 0,
+             "");
+    map_line(file, m->afl, "active face list", m->afl_faces, "faces");
+    map_line(file, m->bricks, "open bricks", m->brick_entries, "entries");
+    map_line(file, m->frames, "page frames", m->frame_count,
+             "pages of 1536 bytes and their boxes");
+    uint64_t used = m->fixed + m->node + m->cube + m->outbox + m->control +
+                    m->afl + m->bricks + m->frames;
+    map_line(file, result->memory - used, "left over", 0, "");
+    fprintf(file,
+            "Outside it, in the kernel: %d and %d bytes of buffers for each "
+            "end of a wire.\n",
+            result->socket_send_bytes, result->socket_receive_bytes);
+}
+
 void host_report_run(FILE *file, const struct host_run_options *options,
                      const struct host_run_result *result,
                      const struct host_run_result *alone)
@@ -110,6 +151,9 @@ void host_report_run(FILE *file, const struct host_run_options *options,
         table_row(file, r, alone);
         table_notes(file);
         node_lines(file, r);
+    }
+    if (options->map) {
+        host_report_map(file, r);
     }
 }
 

@@ -18,6 +18,9 @@ void host_report_run(FILE *file, const struct host_run_options *options,
                      const struct host_run_result *result,
                      const struct host_run_result *alone);
 
+/* How the tables of node 0 fill its memory. */
+void host_report_map(FILE *file, const struct host_run_result *result);
+
 /* Tables 2 and 4 of the paper on this machine, for 1 to nodes_max nodes. */
 int host_bench_paper(const struct host_run_options *options, unsigned nodes_max,
                      struct host_error *error);

@@ -32,7 +32,7 @@ struct host_run_options {
     unsigned nodes; /* 0: what suits this machine */
     uint64_t memory;
     const char *stats; /* a file for the statistics, or NULL */
-    bool verify, quiet, progress, table;
+    bool verify, quiet, progress, table, map;
     /* For tests. */
     unsigned window;
     uint64_t shuffle_seed;

@@ -14,7 +14,7 @@
 enum {
     WINDOW_DEFAULT = 32,
     CHECK_EVERY_US = 20000, /* looks after the nodes' lives */
-    BRING_UP_US_MAX = 10000000,
+    BRING_UP_US_MAX = 9000000,
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
     CREDITS_SHARED = 128
@@ -271,8 +271,9 @@ static int round_trip(struct host_service *s, struct host_error *error)
     }
     if (s->started) {
         bool pages = pages_wait(s);
+        uint64_t begun = pages ? host_now_us() : 0;
         moved += serve(s, error);
-        s->pages_us += pages ? host_now_us() - now : 0;
+        s->pages_us += pages ? host_now_us() - begun : 0;
     }
     if (error->code != 0 || check(s, now, error) != 0) {
         return error->code;
@@ -296,17 +297,21 @@ int host_service_start(struct host_service *service, struct host_error *error)
     if (make_cube(service, error) != 0) {
         return error->code;
     }
-    while (cube_link_state(service->cube, 0) != LINK_UP) {
+    bool called = false;
+    while (service->here < service->cluster->nodes) {
+        called = called ||
+                 cube_write(service->cube, CUBE_ALL, NODE_CALL, NULL, 0) == 0;
         if (round_trip(service, error) != 0) {
             return error->code;
         }
         if (host_now_us() - start > BRING_UP_US_MAX ||
             cube_link_state(service->cube, 0) == LINK_REFUSED) {
             return host_fail(error, HOST_CUBE,
-                             "node 0 link %u: does not answer as it should; "
-                             "is incode-node of this version, and the machine "
+                             "node 0 link %u: %u of %u nodes answer; is "
+                             "incode-node of this version, and the machine "
                              "not too busy?",
-                             service->cluster->dimension);
+                             service->cluster->dimension, service->here,
+                             service->cluster->nodes);
         }
     }
     return 0;

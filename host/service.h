@@ -79,13 +79,14 @@ struct host_service {
     struct host_progress progress;
     struct host_wire *wire;
     bool setup_due, started, finished;
-    unsigned ready, done; /* nodes that have their setup; that finished */
-    unsigned turn;        /* the node to be served next */
+    unsigned here, ready, done; /* nodes that are up; that have their setup;
+                                   that finished */
+    unsigned turn;              /* the node to be served next */
     uint64_t random, check_us;
 };
 
-/* Brings up the cube on the cluster's wire and waits until every node has its
- * memory map reported: the start-up. */
+/* Brings up the cube on the cluster's wire, and waits until every node has
+ * answered: the start-up. */
 int host_service_start(struct host_service *service, struct host_error *error);
 
 /* Hands out the setup and the jobs, and returns when every brick is committed

@@ -33,6 +33,7 @@ enum node_message_type {
     NODE_UNSPILL,   /* struct node_spill_header, then faces */
     NODE_REPORT,    /* nothing: asks a holder for NODE_FINISHED */
     NODE_STOP,      /* nothing: the run is over */
+    NODE_CALL,      /* nothing, to all: asks for NODE_HERE */
     /* To the host. */
     NODE_READY = 32,      /* struct node_ready_message */
     NODE_PAGE_REQUEST,    /* uint32 page numbers; also to a holder */
@@ -40,7 +41,8 @@ enum node_message_type {
     NODE_SPILL,           /* struct node_spill_header, then faces */
     NODE_UNSPILL_REQUEST, /* struct node_spill_header */
     NODE_FINISHED,        /* struct node_finished_message */
-    NODE_FAULT            /* text without a final 0 */
+    NODE_FAULT,           /* text without a final 0 */
+    NODE_HERE /* nothing: the node is up, and so is its way to the host */
 };
 
 enum node_role {

@@ -13,12 +13,13 @@ struct node {
     struct cube *cube;
     uint8_t *role_memory;
     size_t role_bytes, cube_bytes;
+    uint16_t window;
     bool set_up, stopping, closing;
     enum node_role role;
     struct node_worker worker;
     struct node_holder holder;
     uint32_t job_epoch;
-    bool owes_ready, owes_report;
+    bool owes_here, owes_ready, owes_report;
     const char *fault;
     bool fault_sent;
     uint64_t now_us, stop_us;
@@ -78,6 +79,7 @@ struct node *node_start(const struct node_board *board, const char **why)
     memset(node, 0, sizeof *node);
     node->board = board;
     node->cube_bytes = cube;
+    node->window = config.window;
     node->role_memory = memory + own + cube;
     node->role_bytes = board->arena_bytes - own - cube;
     node->cube = cube_init(memory + own, cube, &config);
@@ -146,6 +148,9 @@ static void take_message(struct node *n, const struct cube_message *message)
     case NODE_REPORT:
         n->owes_report = true;
         break;
+    case NODE_CALL:
+        n->owes_here = true;
+        break;
     case NODE_STOP:
         n->stopping = true;
         n->stop_us = n->now_us;
@@ -166,6 +171,7 @@ static void fill_map(const struct node *n, struct node_map *map)
     map->arena = (uint32_t)n->board->arena_bytes;
     map->memory = map->fixed + map->arena;
     map->cube = (uint32_t)n->cube_bytes;
+    map->window = n->window;
     map->node = (uint32_t)up64(sizeof *n);
     if (n->role == NODE_HOLDS) {
         map->frame_count = n->holder.frame_count;
@@ -304,6 +310,9 @@ enum node_event node_step(struct node *node)
         if (!node->fault_sent) {
             send_fault(node);
         }
+    } else if (node->owes_here) {
+        node->owes_here =
+            cube_write(node->cube, CUBE_HOST, NODE_HERE, NULL, 0) != 0;
     } else if (node->set_up && node->owes_ready) {
         node->owes_ready = !send_ready(node);
     } else if (node->set_up) {
