@@ -166,6 +166,7 @@ static double first_radius(const struct incode_triangulator *t,
         }
     }
     double radius = extent * t->spread;
+    radius = radius > 0x1p-1070 ? radius : 0x1p-1070; /* it must grow by 4s */
     return radius < 0x1p1000 ? radius : 0x1p1000;
 }
 
