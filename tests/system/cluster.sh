@@ -4,7 +4,7 @@
 . tests/system/lib.sh
 
 points=$scratch/points.npy
-"$INCODE" gen uniform 100000 --seed 2 -o "$points" 2> /dev/null
+"$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null
 "$INCODE" run "$points" -q --strategy sequential --nodes 1 \
     -o "$scratch/first.npy" 2> "$scratch/errors"
 check 'cluster/one node' "$(last "$scratch/errors")" \

@@ -4,8 +4,8 @@
 . tests/system/lib.sh
 
 while read -r set file points _ tetrahedra digest; do
-    if [ -n "$(no_set "$file")" ]; then
-        skip "digests/$set" "$(no_set "$file")"
+    if [ -n "$(no_set "$file" "$points")" ]; then
+        skip "digests/$set" "$(no_set "$file" "$points")"
         continue
     fi
     for memory in 512K 4M; do

@@ -55,6 +55,9 @@ list_sets() {
 # A failed run may say more than its last line; the stat of a run by its name.
 stat_of() { jq -r ".$2" "$1"; }
 
+# The program, ended where it would hang.
+incode() { timeout -k 5 "${SECONDS_MAX:-120}" "$INCODE" "$@"; }
+
 # --- runs ----------------------------------------------------------------------
 
 # Whether a run stopped because its memory is below what its index states.
@@ -69,12 +72,12 @@ triangulates() {
     local first=$scratch/first.$set.npy
     shift 4
     rm -f "$out" "$stats"
-    "$INCODE" run "$file" -q --stats "$stats" -o "$out" "$@" 2> "$errors"
+    incode run "$file" -q --stats "$stats" -o "$out" "$@" 2> "$errors"
     status=$?
     if [ $status = 2 ] && needs_memory "$errors"; then
         local need
         need=$(sed -n 's/.*needs at least \([0-9]*[KMG]*\).*/\1/p' "$errors")
-        "$INCODE" run "$file" -q --stats "$stats" -o "$out" "$@" \
+        incode run "$file" -q --stats "$stats" -o "$out" "$@" \
             --memory "$need" 2> "$errors"
         status=$?
     fi
@@ -110,7 +113,7 @@ refuses() {
         fail "$name" "$(wc -l < "$errors") lines, not one: $(last "$errors")"
     elif ! grep -qE "^incode: ..*: ..*; " "$errors"; then
         fail "$name" "not WHERE: WHAT; NEXT: $(last "$errors")"
-    elif ! grep -qE "$pattern" "$errors"; then
+    elif ! grep -qE -e "$pattern" "$errors"; then
         fail "$name" "no '$pattern' in: $(last "$errors")"
     elif [ -n "$(ls -A "$scratch/left")" ]; then
         fail "$name" "it left $(ls -A "$scratch/left" | tr '\n' ' ')"
@@ -119,5 +122,11 @@ refuses() {
     fi
 }
 
-# Why a set of the index cannot be used here, or nothing.
-no_set() { [ -r "$INCODE_DATA/$1" ] || echo "no $INCODE_DATA/$1"; }
+# no_set FILE POINTS: why a set of the index is not used here, or nothing.
+no_set() {
+    if [ ! -r "$INCODE_DATA/$1" ]; then
+        echo "there is no $INCODE_DATA/$1"
+    elif [ "$2" -gt "${POINTS_MAX:-1000000000}" ]; then
+        echo "$2 points; ${POINTS_WHY:-} no more than $POINTS_MAX"
+    fi
+}

@@ -14,7 +14,7 @@ runs() {
     local points=$1 out=$2
     shift 2
     rm -f "$out" "$scratch/stats.json"
-    "$INCODE" run "$points" -q --nodes 8 --strategy spatial \
+    incode run "$points" -q --nodes 8 --strategy spatial \
         --stats "$scratch/stats.json" -o "$out" "$@" 2> "$scratch/errors"
 }
 
@@ -59,8 +59,8 @@ mirrored() { # NAME FILE.xyz
 while read -r set file points _ tetrahedra digest; do
     [ "$tetrahedra" = 0 ] && continue
     [ "$points" -ge 20000 ] && continue
-    if [ -n "$(no_set "$file")" ]; then
-        skip "transforms/$set" "$(no_set "$file")"
+    if [ -n "$(no_set "$file" "$points")" ]; then
+        skip "transforms/$set" "$(no_set "$file" "$points")"
         continue
     fi
     plain=$scratch/$set.xyz
@@ -75,9 +75,9 @@ done < <(list_sets)
 
 # Integers, so that even the smallest denormal and its multiples are exact.
 for set in deg_cgal_grid5 deg_cgal_lp500 deg_octahedron; do
-    read -r _ file _ _ _ digest < <(list_sets | grep "^$set ")
-    if [ -n "$(no_set "$file")" ]; then
-        skip "transforms/$set at the ends" "$(no_set "$file")"
+    read -r _ file points _ _ digest < <(list_sets | grep "^$set ")
+    if [ -n "$(no_set "$file" "$points")" ]; then
+        skip "transforms/$set at the ends" "$(no_set "$file" "$points")"
         continue
     fi
     for exponent in 1000 -1074; do
@@ -89,8 +89,8 @@ done
 # The mix: one set times 2^1000 and the same times 2^-1074, in one input.
 for set in deg_cgal_grid5 deg_cgal_lp500; do
     file=$INCODE_DATA/$set.xyz
-    if [ -n "$(no_set "$set.xyz")" ]; then
-        skip "transforms/$set mixed" "$(no_set "$set.xyz")"
+    if [ -n "$(no_set "$set.xyz" 0)" ]; then
+        skip "transforms/$set mixed" "$(no_set "$set.xyz" 0)"
         continue
     fi
     { "$TOOL" scale 1000 < "$file"; "$TOOL" scale -1074 < "$file"; } \
@@ -98,7 +98,7 @@ for set in deg_cgal_grid5 deg_cgal_lp500; do
     runs "$scratch/mix.xyz" "$scratch/mix.npy" --verify
     check "transforms/$set times 2^1000 and 2^-1074 mixed" \
         "$(last "$scratch/errors")" test $? = 0
-    "$INCODE" run "$scratch/mix.xyz" -q --strategy sequential --nodes 1 \
+    incode run "$scratch/mix.xyz" -q --strategy sequential --nodes 1 \
         -o "$scratch/mix1.npy" 2> "$scratch/errors"
     check "transforms/$set mixed, on one node" "$(last "$scratch/errors")" \
         cmp -s "$scratch/mix.npy" "$scratch/mix1.npy"

@@ -7,8 +7,8 @@ naive_max=${NAIVE_MAX:-15000}
 
 while read -r set file points _ tetrahedra digest; do
     [ "$tetrahedra" = 0 ] && continue
-    if [ -n "$(no_set "$file")" ]; then
-        skip "product/$set" "$(no_set "$file")"
+    if [ -n "$(no_set "$file" "$points")" ]; then
+        skip "product/$set" "$(no_set "$file" "$points")"
         continue
     fi
     for index in kd grid naive; do
