@@ -275,10 +275,18 @@ static unsigned serve_role(struct node *n)
     return moved;
 }
 
+/* Whether a neighbour needs this node no more: it has said farewell, or is
+ * gone. */
+static bool parted(const struct node *n, unsigned d)
+{
+    enum link_state state = cube_link_state(n->cube, d);
+    return state == LINK_CLOSED || state == LINK_DOWN ||
+           cube_link_statistics(n->cube, d)->pipe_closed > 0;
+}
+
 /* The farewell is passed on to other nodes first, then said on each link. */
 static bool may_stop(struct node *n)
 {
-    unsigned links = cube_links(n->cube);
     uint64_t end = n->stop_us + FAREWELL_US;
     if (!n->stopping) {
         return false;
@@ -287,9 +295,8 @@ static bool may_stop(struct node *n)
         cube_close(n->cube, end);
         n->closing = true;
     }
-    for (unsigned d = 0; d < links && n->now_us < end; d++) {
-        enum link_state state = cube_link_state(n->cube, d);
-        if (!n->closing || (state != LINK_CLOSED && state != LINK_DOWN)) {
+    for (unsigned d = 0; d < cube_links(n->cube) && n->now_us < end; d++) {
+        if (!n->closing || !parted(n, d)) {
             return false;
         }
     }
