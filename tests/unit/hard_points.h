@@ -27,8 +27,8 @@ enum hard_family {
     HARD_ENDS,       /* 2^1000 mixed with 2^-1074 */
     HARD_LARGEST,    /* near +-DBL_MAX */
     HARD_DENORMAL,   /* multiples of 2^-1074 */
-    HARD_UP,         /* one of the first seven times 2^500 */
-    HARD_DOWN,       /* one of the first seven times 2^-500 */
+    HARD_UP,         /* the first seven where products begin to overflow */
+    HARD_DOWN,       /* the first seven where products begin to underflow */
     HARD_FAMILIES
 };
 
@@ -138,6 +138,17 @@ static double hard_coordinate(uint64_t *seed, enum hard_family family)
     }
 }
 
+/* 2^500 or 2^-500, or where products of 5, 3 or 2 leave the range, or where
+ * the filters' guards are. */
+static double hard_edge(uint64_t *seed, int up)
+{
+    static const int ups[5] = {500, 204, 340, 511, 338};
+    static const int downs[5] = {-500, -214, -358, -537, -194};
+    int at = hard_below(seed, 5);
+    int off = at == 0 ? 0 : hard_below(seed, 17) - 8;
+    return ldexp(1, off + (up ? ups[at] : downs[at]));
+}
+
 static void hard_each(uint64_t *seed, enum hard_family family, double p[5][3])
 {
     for (int i = 0; i < 5; i++) {
@@ -187,7 +198,7 @@ static void hard_points(uint64_t *seed, enum hard_family family, double p[5][3])
     case HARD_UP:
     case HARD_DOWN:
         hard_points(seed, (enum hard_family)hard_below(seed, HARD_SPREAD), p);
-        scale = family == HARD_UP ? 0x1p500 : 0x1p-500;
+        scale = hard_edge(seed, family == HARD_UP);
         for (int i = 0; i < 15; i++)
             p[i / 3][i % 3] *= scale;
         break;
