@@ -57,6 +57,9 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     double r[3];
     relative(r, q, p);
     incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
+    double half = 0.5 / q->sphere.det;
+    for (int d = 0; d < 3; d++)
+        q->centre[d] = q->sphere.m[d] * half;
 }
 
 /* ---- which of up to 32 boxes a question concerns ---- */
@@ -111,7 +114,7 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
         if (!s->has_apex)
             continue;
         incode_vd m = incode_vd_all(s->m[d]);
-        incode_vd peak = m / (det + det);
+        incode_vd peak = incode_vd_all(q->centre[d]);
         incode_vd top = incode_vd_max(incode_vd_min(peak, hi), lo);
         incode_vd best =
             incode_vd_max((m - det * lo) * lo, (m - det * hi) * hi);

@@ -40,6 +40,7 @@ struct incode_query {
     double scale;               /* relative = (p - pv) * scale */
     double rb[3], rc[3];        /* b and c, relative */
     struct incode_sphere sphere;
+    double centre[3];           /* of the sphere: where its value peaks */
     double limit;  /* NEAREST, CIRCLE: squared, relative */
     uint32_t best; /* vertex number, or INCODE_NONE */
     double best_p[3];
