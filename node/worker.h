@@ -18,7 +18,7 @@
 #include "result.h"
 
 enum {
-    NODE_STEPS = 16,          /* triangulator's steps between looks at links */
+    NODE_STEPS = 32,          /* triangulator's steps between looks at links */
     NODE_WANTED_MAX = 64,     /* pages asked for and not yet sent for */
     NODE_IN_FLIGHT_MAX = 256, /* pages sent for and not yet there */
     NODE_RESULT_SLOTS_MIN = 4,
