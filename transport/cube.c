@@ -29,7 +29,7 @@ struct cube {
     bool again;         /* a message waits only for that turn to pass */
 };
 
-/* --- which way ------------------------------------------------------------ */
+/* --- which way ----------------------------------------------------------- */
 
 static bool is_host(const struct cube *cube)
 {
@@ -88,7 +88,7 @@ static uint32_t ways_of(const struct cube *cube, unsigned source, unsigned dest)
     return dest == CUBE_ALL ? ways_to_all(cube, source) : way_to(cube, dest);
 }
 
-/* --- memory --------------------------------------------------------------- */
+/* --- memory -------------------------------------------------------------- */
 
 static struct link_config link_config_of(const struct cube_config *config,
                                          unsigned d)
@@ -177,7 +177,7 @@ struct cube *cube_init(void *arena, size_t bytes,
     return cube;
 }
 
-/* --- passing on ----------------------------------------------------------- */
+/* --- passing on ---------------------------------------------------------- */
 
 static unsigned field16(const uint8_t *bytes)
 {
@@ -292,7 +292,7 @@ int cube_poll(struct cube *cube, uint64_t now_us)
     return count;
 }
 
-/* --- messages of this node ------------------------------------------------ */
+/* --- messages of this node ----------------------------------------------- */
 
 static uint32_t ways_out(const struct cube *cube, uint16_t dest)
 {
@@ -382,7 +382,7 @@ void cube_release(struct cube *cube)
     }
 }
 
-/* --- state ---------------------------------------------------------------- */
+/* --- state --------------------------------------------------------------- */
 
 unsigned cube_links(const struct cube *cube)
 {

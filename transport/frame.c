@@ -37,7 +37,7 @@ static inline word zero_marks(word w)
     return ~(((w & low) + low) | w | low);
 }
 
-/* --- checks --------------------------------------------------------------- */
+/* --- checks -------------------------------------------------------------- */
 
 static inline uint32_t load32(const uint8_t *p)
 {
@@ -113,7 +113,7 @@ size_t frame_find_zero(const uint8_t *bytes, size_t size)
     return i;
 }
 
-/* --- encoding ------------------------------------------------------------- */
+/* --- encoding ------------------------------------------------------------ */
 
 /* out == code + 1 + run: the code of the open run is written when it ends. */
 struct writer {
@@ -246,7 +246,7 @@ size_t frame_encode(uint8_t *out, const struct frame_header *header,
     return (size_t)(w.out - out);
 }
 
-/* --- decoding ------------------------------------------------------------- */
+/* --- decoding ------------------------------------------------------------ */
 
 enum { BLOCK = 16 };
 

@@ -4,7 +4,7 @@
 
 #include "check.h"
 
-/* --- memory --------------------------------------------------------------- */
+/* --- memory -------------------------------------------------------------- */
 
 enum { STAGING_DEFAULT = 8, TIMEOUT_FIRST_US = 200000 };
 
@@ -119,7 +119,7 @@ struct link *link_init(void *memory, size_t bytes,
     return link;
 }
 
-/* --- messages ------------------------------------------------------------- */
+/* --- messages ------------------------------------------------------------ */
 
 static unsigned used(const struct link *link)
 {
@@ -234,7 +234,7 @@ void link_release(struct link *link)
     }
 }
 
-/* --- state ---------------------------------------------------------------- */
+/* --- state --------------------------------------------------------------- */
 
 int link_poll(struct link *link, uint64_t now_us)
 {

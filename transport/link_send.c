@@ -25,7 +25,7 @@ uint32_t link_timeout_us(const struct link *link)
     return us < c->timeout_max_us ? (uint32_t)us : c->timeout_max_us;
 }
 
-/* --- what acknowledgements say -------------------------------------------- */
+/* --- what acknowledgements say ------------------------------------------- */
 
 /* Smoothed round trip and its variation (Jacobson, 1988; RFC 6298). */
 static void measure(struct link *link, uint32_t rtt)
@@ -175,7 +175,7 @@ void link_send_resume(struct link *link)
     mark_lost(link, link->send.order);
 }
 
-/* --- frames --------------------------------------------------------------- */
+/* --- frames -------------------------------------------------------------- */
 
 static bool may_send_next(const struct link *link)
 {
@@ -228,6 +228,7 @@ static void stage(struct link *link, unsigned kind, unsigned flags,
     } else {
         r->reported = (uint16_t)(r->next + link_credit(link));
         r->unreported = 0;
+        r->ack_now &= r->early > 0; /* what came early must be listed */
     }
     if (out->end == 0) {
         /* Noise on a line at rest must not take the next frame with it. */
@@ -311,7 +312,7 @@ static void stage_bye(struct link *link, unsigned flags)
     link->bye_us = link->now_us;
 }
 
-/* --- timers --------------------------------------------------------------- */
+/* --- timers -------------------------------------------------------------- */
 
 static void timeout(struct link *link)
 {
@@ -358,7 +359,7 @@ static void run_timer(struct link *link)
     }
 }
 
-/* --- bytes ---------------------------------------------------------------- */
+/* --- bytes --------------------------------------------------------------- */
 
 /* Gives the pipe what is staged; false: it does not take all. */
 static bool flush(struct link *link)
@@ -392,30 +393,45 @@ static bool staging_room(const struct link *link)
            FRAME_ENCODED(link->config.frame_payload) + FRAME_SLACK + 1;
 }
 
+/* Something to say without data. */
+static bool stage_control(struct link *link)
+{
+    uint64_t rest_us = link->now_us - link->sent_us;
+    uint64_t bye_us = link->now_us - link->bye_us;
+    if (link_ack_due(link) || rest_us >= link->config.keep_alive_us) {
+        stage_ack(link, 0);
+        return true;
+    }
+    if (link->closing && link_idle(link) && bye_us >= link->config.hello_us) {
+        stage_bye(link, LINK_ASK);
+        return true;
+    }
+    return false;
+}
+
 /* One frame more, the most urgent; false: nothing to say. */
 static bool stage_one(struct link *link)
 {
     if (link_hello_due(link)) {
         stage_hello(link);
-    } else if (link->bye_due) {
+        return true;
+    }
+    if (link->bye_due) {
         stage_bye(link, 0);
         link->bye_due = false;
-    } else if (!link->up) {
+        return true;
+    }
+    if (!link->up) {
         return false;
-    } else if (link->receive.ack_now && link->receive.early > 0) {
+    }
+    if (link->receive.ack_now && link->receive.early > 0) {
         stage_ack(link, 0);
     } else if (link->send.lost > 0) {
         stage_again(link);
     } else if (may_send_next(link)) {
         stage_next(link);
-    } else if (link_ack_due(link) ||
-               link->now_us - link->sent_us >= link->config.keep_alive_us) {
-        stage_ack(link, 0);
-    } else if (link->closing && link_idle(link) &&
-               link->now_us - link->bye_us >= link->config.hello_us) {
-        stage_bye(link, LINK_ASK);
     } else {
-        return false;
+        return stage_control(link);
     }
     return true;
 }

@@ -125,8 +125,7 @@ static void destroy(struct machine *m)
     free(m);
 }
 
-/* --- traffic ---------------------------------------------------------------
- */
+/* --- traffic ------------------------------------------------------------- */
 
 static unsigned content(const struct machine *m, uint8_t *bytes, unsigned from,
                         uint32_t number, bool broadcast)
@@ -259,8 +258,7 @@ static void run(struct machine *m, uint32_t each, uint64_t most_us)
     }
 }
 
-/* --- tests -----------------------------------------------------------------
- */
+/* --- tests --------------------------------------------------------------- */
 
 static void every_pair_at_once_with_windows_of_one(void **unused)
 {

@@ -31,7 +31,7 @@ static uint32_t draw_sparse(void)
     return mask & draw();
 }
 
-/* --- checks: bit by bit, from the definition -------------------------------
+/* --- checks, bit by bit ----------------------------------------------------
  */
 
 static uint32_t slow_crc(const uint8_t *p, size_t size, uint32_t polynomial,
@@ -108,8 +108,7 @@ static void zeros_are_found(void **unused)
     }
 }
 
-/* --- encoding --------------------------------------------------------------
- */
+/* --- encoding ------------------------------------------------------------ */
 
 /* COBS as its authors define it, a byte at a time. */
 static size_t slow_cobs(uint8_t *out, const uint8_t *in, size_t size)
@@ -296,8 +295,7 @@ static void both_ends_of_a_full_run(void **unused)
     assert_int_equal(seen, 20);
 }
 
-/* --- damage ----------------------------------------------------------------
- */
+/* --- damage -------------------------------------------------------------- */
 
 static void each_wrong_bit_is_found(void **unused)
 {

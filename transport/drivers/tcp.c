@@ -10,7 +10,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* --- the pipe ------------------------------------------------------------- */
+/* --- the pipe ------------------------------------------------------------ */
 
 /* Bytes moved, 0 for the present, or closed. */
 static int result(struct tcp_pipe *pipe, ssize_t moved)
@@ -73,7 +73,7 @@ short tcp_events(const struct tcp_pipe *pipe)
     return pipe->blocked ? POLLIN | POLLOUT : POLLIN;
 }
 
-/* --- sockets -------------------------------------------------------------- */
+/* --- sockets ------------------------------------------------------------- */
 
 /* Fixed before the connection is made, when the window's scale is agreed. */
 static int fix_buffers(int fd)
@@ -134,10 +134,12 @@ static int accept_ours(int listener, int ours)
 {
     struct sockaddr_in here, there;
     socklen_t size = sizeof here;
+    memset(&here, 0, sizeof here);
     if (getsockname(ours, (struct sockaddr *)&here, &size) != 0) {
         return -1;
     }
     for (;;) {
+        memset(&there, 0, sizeof there);
         size = sizeof there;
         int fd =
             accept4(listener, (struct sockaddr *)&there, &size, SOCK_CLOEXEC);

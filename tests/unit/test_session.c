@@ -1,0 +1,354 @@
+/* Peers that come, go and come again: handshake, restart, wrong wires,
+ * farewell, and the bytes that PROTOCOL.md promises. */
+#include "link_pair.h"
+
+/* --- peers that come, go and come again ---------------------------------- */
+
+static void a_cut_wire_goes_on_where_it_was(void **unused)
+{
+    (void)unused;
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        struct pair *p = new_pair(&small, &perfect, seed);
+        p->ends[0].size_max = p->ends[1].size_max = 1608;
+        p->ends[0].most = p->ends[1].most = 400;
+        for (unsigned i = 0; i < 20000 && !finished(p); i++) {
+            uint64_t phase = (i + seed) % 90;
+            if (phase == 60) {
+                line_cut(&p->wire, true);
+            } else if (phase == 61 + seed) {
+                line_cut(&p->wire, false);
+            }
+            step(p, 150);
+            if (phase > 61 && phase < 61 + seed) {
+                assert_true(link_state(p->ends[0].link) == LINK_DOWN);
+            }
+        }
+        assert_true(finished(p));
+        const struct link_statistics *s = link_statistics(p->ends[0].link);
+        assert_int_equal(s->sessions, 1);
+        if (seed > 1) {
+            assert_true(s->resumed >= 1 && s->pipe_closed >= 1);
+        }
+        free_pair(p);
+    }
+}
+
+static void a_peer_that_stops_for_long_is_called_silent(void **unused)
+{
+    (void)unused;
+    struct pair *p = new_pair(&small, &perfect, 2);
+    for (unsigned i = 0; i < 200; i++) {
+        step(p, 100);
+    }
+    for (unsigned i = 0; i < 1000; i++) { /* ten seconds */
+        p->now_us += 10000;
+        link_poll(p->ends[0].link, p->now_us);
+    }
+    assert_true(link_state(p->ends[0].link) == LINK_SILENT);
+    assert_true(link_statistics(p->ends[0].link)->retransmitted < 40);
+    run(p, p->ends[0].written + 50, 100, 5000000);
+    assert_true(link_state(p->ends[0].link) == LINK_UP);
+    assert_int_equal(link_statistics(p->ends[0].link)->sessions, 1);
+    free_pair(p);
+}
+
+/* End 1 starts again; the other must notice and begin a session without
+ * anything of the old one. */
+static void restart(struct pair *p, uint32_t epoch, struct link_statistics *sum)
+{
+    struct end *peer = &p->ends[0], *reborn = &p->ends[1];
+    uint64_t sessions = link_statistics(peer->link)->sessions;
+    start(p, 1, epoch);
+    reborn->written = reborn->read = 0;
+    reborn->most = 0;
+    unsigned i;
+    for (i = 0; link_statistics(peer->link)->sessions == sessions; i++) {
+        assert_true(i < 100000);
+        p->now_us += 100;
+        link_poll_receive(peer->link, p->now_us);
+        struct link_message message;
+        while (link_read(peer->link, &message)) {
+            /* What was whole when the old session ended is still read. */
+            size_t size = size_of(reborn, 1, peer->read);
+            assert_int_equal(message.size, size);
+            link_release(peer->link);
+            peer->read++;
+        }
+        if (link_statistics(peer->link)->sessions == sessions) {
+            write_some(peer, 0);
+        }
+        link_poll_send(peer->link, p->now_us);
+        assert_false(link_read(reborn->link, &message));
+        link_poll(reborn->link, p->now_us);
+    }
+    sum->messages_dropped = link_statistics(peer->link)->messages_dropped;
+    /* Both begin anew: 0's queue is empty by now. */
+    peer->written = peer->read = 0;
+    reborn->most = UINT32_MAX;
+}
+
+static void a_restarted_peer_is_noticed(void **unused)
+{
+    struct line_quality bad = perfect;
+    (void)unused;
+    bad.latency_us = 3000;
+    bad.drop = 2e-4;
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        struct pair *p = new_pair(&small, seed % 2 ? &bad : &perfect, seed);
+        struct link_statistics sum = {0};
+        p->ends[0].size_max = p->ends[1].size_max = 1608;
+        for (unsigned life = 1; life < 6; life++) {
+            while (p->ends[0].written < 40 + 9 * seed) {
+                step(p, 100);
+            }
+            restart(p, 77777 * life + (uint32_t)seed, &sum);
+        }
+        run(p, p->ends[0].written + 50, 100, 60000000);
+        assert_true(sum.messages_dropped > 0);
+        assert_int_equal(link_statistics(p->ends[0].link)->sessions, 6);
+        free_pair(p);
+    }
+}
+
+static void greet_only(struct pair *p)
+{
+    for (unsigned i = 0; i < 50; i++) {
+        p->now_us += 10000;
+        for (unsigned who = 0; who < 2; who++) {
+            link_poll(p->ends[who].link, p->now_us);
+        }
+    }
+}
+
+static void a_wrong_wire_is_named(void **unused)
+{
+    (void)unused;
+    struct pair *p = new_pair(&small, &perfect, 1);
+    p->ends[1].config.node = 99;
+    /* start() sets who it is: another node, by hand. */
+    struct link_config c = p->ends[1].config;
+    c.node = 99;
+    p->ends[1].link = link_init(p->ends[1].memory, p->ends[1].bytes, &c);
+    greet_only(p);
+    const struct link_peer *peer = link_peer(p->ends[0].link);
+    assert_true(link_state(p->ends[0].link) == LINK_REFUSED);
+    assert_true(peer->refusal == LINK_WRONG_WIRE);
+    assert_int_equal(peer->node, 99);
+    assert_int_equal(peer->port, 2);
+    assert_true(link_state(p->ends[1].link) == LINK_REFUSED);
+    /* Wired right at last: no restart of this end is needed. */
+    start(p, 1, 4242);
+    run(p, 20, 100, 5000000);
+    assert_true(link_state(p->ends[0].link) == LINK_UP);
+    free_pair(p);
+}
+
+static void sizes_that_do_not_fit_are_refused(void **unused)
+{
+    (void)unused;
+    struct pair *p = new_pair(&small, &perfect, 1);
+    p->ends[1].config.frame_payload = 168;
+    start(p, 1, 4242);
+    greet_only(p);
+    assert_true(link_state(p->ends[0].link) == LINK_REFUSED);
+    assert_true(link_peer(p->ends[0].link)->refusal == LINK_WRONG_SIZES);
+    free_pair(p);
+}
+
+/* Its own bytes come back: the plug is in both sockets of one port. */
+static void a_wire_to_itself_is_refused(void **unused)
+{
+    (void)unused;
+    struct pair *p = new_pair(&small, &perfect, 1);
+    p->wire.ends[0].in = p->wire.ends[0].out;
+    greet_only(p);
+    assert_true(link_state(p->ends[0].link) == LINK_REFUSED);
+    assert_int_equal(link_peer(p->ends[0].link)->node, 10);
+    free_pair(p);
+}
+
+static void farewell(void **unused)
+{
+    (void)unused;
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        struct line_quality bad = perfect;
+        bad.drop = seed % 2 ? 0.002 : 0;
+        struct pair *p = new_pair(&small, &bad, seed);
+        p->ends[0].size_max = p->ends[1].size_max = 300;
+        p->ends[0].most = 40;
+        p->ends[1].most = 0;
+        for (unsigned i = 0; i < 3; i++) {
+            step(p, 100);
+        }
+        p->ends[0].most = p->ends[0].written;
+        link_close(p->ends[0].link, p->now_us + 10000000);
+        for (unsigned i = 0; i < 90000; i++) {
+            step(p, 100);
+            if (link_state(p->ends[0].link) == LINK_CLOSED) {
+                break;
+            }
+        }
+        assert_true(link_state(p->ends[1].link) == LINK_CLOSED);
+        assert_int_equal(p->ends[1].read, p->ends[0].most);
+        /* Another start of the closed end is welcome. */
+        start(p, 0, 31 + (uint32_t)seed);
+        p->ends[0].written = p->ends[1].read = 0;
+        run(p, 10, 100, 60000000);
+        free_pair(p);
+    }
+}
+
+static void farewell_to_the_dead_ends_in_time(void **unused)
+{
+    (void)unused;
+    for (unsigned cut = 0; cut < 2; cut++) {
+        struct pair *p = new_pair(&small, &perfect, 1);
+        for (unsigned i = 0; i < 50; i++) {
+            step(p, 100);
+        }
+        if (cut) {
+            line_cut(&p->wire, true);
+        }
+        uint64_t deadline = p->now_us + 300000;
+        link_close(p->ends[0].link, deadline);
+        while (link_state(p->ends[0].link) != LINK_CLOSED) {
+            uint64_t due = link_next_due_us(p->ends[0].link, p->now_us);
+            assert_true(p->now_us <= deadline && due <= 300000);
+            p->now_us += due > 0 ? due : 1;
+            link_poll(p->ends[0].link, p->now_us);
+        }
+        free_pair(p);
+    }
+}
+
+/* --- test vectors -------------------------------------------------------- */
+
+/* What one end hears is written by hand; what it says is looked at. */
+struct script {
+    const uint8_t *hear;
+    size_t left;
+    uint8_t said[256];
+    size_t size;
+};
+
+static int script_receive(void *context, uint8_t *bytes, size_t size)
+{
+    struct script *s = context;
+    size = size < s->left ? size : s->left;
+    memcpy(bytes, s->hear, size);
+    s->hear += size;
+    s->left -= size;
+    return (int)size;
+}
+
+static int script_send(void *context, const uint8_t *bytes, size_t size)
+{
+    struct script *s = context;
+    assert_true(s->size + size <= sizeof s->said);
+    memcpy(s->said + s->size, bytes, size);
+    s->size += size;
+    return (int)size;
+}
+
+static void hear(struct script *s, struct link *link, const uint8_t *bytes,
+                 size_t size)
+{
+    s->hear = bytes;
+    s->left = size;
+    s->size = 0;
+    link_poll(link, 1000);
+    assert_int_equal(s->left, 0);
+}
+
+/* Those of PROTOCOL.md, which another program made: node 1 of epoch 0xfffe
+ * answers node 5 of epoch 0x11223344 on port 2. */
+static void test_vectors(void **unused)
+{
+    static const uint8_t hello_5[] = {
+        0x03, 0x01, 0x08, 0x01, 0x01, 0x01, 0x03, 0x44, 0x33, 0x01, 0x02,
+        0x18, 0x06, 0x02, 0x23, 0x01, 0x02, 0x05, 0x02, 0x01, 0x02, 0x02,
+        0x05, 0x44, 0x33, 0x22, 0x11, 0x01, 0x01, 0x01, 0x02, 0x08, 0x05,
+        0x48, 0x06, 0x48, 0x06, 0x01, 0x05, 0xe6, 0x2b, 0xc3, 0xe4, 0x00};
+    static const uint8_t hello_1[] = {
+        0x00, 0x03, 0x01, 0x08, 0x01, 0x01, 0x01, 0x03, 0xfe, 0xff, 0x01, 0x02,
+        0x18, 0x06, 0x36, 0x8f, 0x01, 0x02, 0x01, 0x02, 0x05, 0x02, 0x02, 0x03,
+        0xfe, 0xff, 0x01, 0x06, 0x44, 0x33, 0x22, 0x11, 0x08, 0x05, 0x48, 0x06,
+        0x48, 0x06, 0x01, 0x05, 0xc9, 0x8b, 0x93, 0x42, 0x00};
+    static const uint8_t ack_5[] = {0x0b, 0x03, 0x08, 0xcc, 0x41, 0xc0, 0x42,
+                                    0x44, 0x33, 0xfe, 0xff, 0x01, 0x07, 0x69,
+                                    0x2d, 0x17, 0xc1, 0x8b, 0x3d, 0x00};
+    static const uint8_t ack_1[] = {0x00, 0x0b, 0x03, 0x08, 0x8f, 0x87, 0x96,
+                                    0xfb, 0xfe, 0xff, 0x44, 0x33, 0x01, 0x07,
+                                    0x20, 0xdc, 0x80, 0x96, 0xdc, 0x71, 0x00};
+    static const uint8_t data_1[] = {
+        0x00, 0x0c, 0x02, 0x08, 0x8f, 0x87, 0x96, 0xfb, 0xfe, 0xff, 0x44,
+        0x33, 0x0c, 0x04, 0x99, 0x68, 0x05, 0x02, 0x01, 0x02, 0x22, 0x01,
+        0x01, 0x09, 0x70, 0x61, 0x67, 0x65, 0xe2, 0xa5, 0x5d, 0x07, 0x00,
+        0x0c, 0x02, 0x08, 0x8f, 0x87, 0x96, 0xfb, 0xff, 0xff, 0x44, 0x33,
+        0x08, 0x04, 0xb4, 0xea, 0x05, 0x02, 0x01, 0x02, 0x22, 0x01, 0x01,
+        0x05, 0xfe, 0x9d, 0x6e, 0x88, 0x00};
+    static const uint8_t sack_5[] = {0x0c, 0x03, 0x08, 0xcc, 0x41, 0xc0, 0x42,
+                                     0x44, 0x33, 0xfe, 0xff, 0x08, 0x04, 0xfd,
+                                     0x42, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01,
+                                     0x01, 0x05, 0x31, 0xb1, 0x89, 0x83, 0x00};
+    static const uint8_t ack_all_5[] = {
+        0x09, 0x03, 0x08, 0xcc, 0x41, 0xc0, 0x42, 0x44, 0x33, 0x01,
+        0x01, 0x01, 0x07, 0x34, 0x0c, 0xda, 0xea, 0x50, 0x11, 0x00};
+    static const uint8_t bye_1[] = {0x00, 0x07, 0x24, 0x08, 0x8f, 0x87, 0x96,
+                                    0xfb, 0x01, 0x03, 0x44, 0x33, 0x01, 0x07,
+                                    0xb6, 0xaf, 0x77, 0x35, 0x4c, 0x98, 0x00};
+    const uint8_t head[8] = {5, 0, 1, 0, 34, 0, 0, 0};
+    struct script s = {.left = 0};
+    struct link_config c = {.pipe = {&s, script_send, script_receive},
+                            .epoch = 0xfffe,
+                            .node = 1,
+                            .port = 2,
+                            .peer_node = 5,
+                            .peer_port = 2,
+                            .window = 8,
+                            .message_max = 1608};
+    (void)unused;
+    void *memory = malloc(link_bytes(&c));
+    struct link *link = link_init(memory, link_bytes(&c), &c);
+    assert_non_null(link);
+    hear(&s, link, hello_5, sizeof hello_5);
+    assert_memory_equal(s.said, hello_1, sizeof hello_1);
+    assert_int_equal(s.size, sizeof hello_1);
+    hear(&s, link, ack_5, sizeof ack_5);
+    assert_true(link_state(link) == LINK_UP);
+    assert_int_equal(s.size, sizeof ack_1);
+    assert_memory_equal(s.said, ack_1, sizeof ack_1);
+    assert_int_equal(link_write(link, head, 8, "page", 4), 0);
+    assert_int_equal(link_write(link, head, 8, NULL, 0), 0);
+    hear(&s, link, NULL, 0);
+    assert_int_equal(s.size, sizeof data_1);
+    assert_memory_equal(s.said, data_1, sizeof data_1);
+    /* The second has arrived, so the first is lost: it goes again. */
+    hear(&s, link, sack_5, sizeof sack_5);
+    assert_int_equal(s.size, 33);
+    assert_memory_equal(s.said, data_1, 33);
+    hear(&s, link, ack_all_5, sizeof ack_all_5);
+    assert_int_equal(s.size, 0);
+    assert_true(link_idle(link));
+    link_close(link, 100000);
+    hear(&s, link, NULL, 0);
+    assert_int_equal(s.size, sizeof bye_1);
+    assert_memory_equal(s.said, bye_1, sizeof bye_1);
+    free(memory);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_vectors),
+        cmocka_unit_test(a_cut_wire_goes_on_where_it_was),
+        cmocka_unit_test(a_peer_that_stops_for_long_is_called_silent),
+        cmocka_unit_test(a_restarted_peer_is_noticed),
+        cmocka_unit_test(a_wrong_wire_is_named),
+        cmocka_unit_test(sizes_that_do_not_fit_are_refused),
+        cmocka_unit_test(a_wire_to_itself_is_refused),
+        cmocka_unit_test(farewell),
+        cmocka_unit_test(farewell_to_the_dead_ends_in_time),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
