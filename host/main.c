@@ -213,6 +213,7 @@ static const struct command commands[] = {
     {"convert", command_convert}, {"bench", command_bench}};
 
 /* Stops at the first word that is no option: the command. */
+/* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
 static error_t parse_top(int key, char *value, struct argp_state *state)
 {
     int *command = state->input;

@@ -175,6 +175,7 @@ static int append(struct host_spill *s, struct host_spill_list *list,
                   struct incode_face face, struct host_error *error)
 {
     struct host_spill_block tail;
+    tail.end = 0;
     if (list->tail != HOST_SPILL_END && list->faces > 0 &&
         load(s, list->tail, &tail, error) != 0) {
         return error->code;

@@ -6,13 +6,11 @@
  *     incode-node --node 3 --dimension 3 --memory 4194304 --stack 65536 \
  *                 --window 8 --epoch 17 --links 5,6,7
  */
-#include <elf.h>
 #include <link.h>
 #include <poll.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
-#include <sys/auxv.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <time.h>
@@ -102,20 +100,27 @@ static bool read_straps(char **argv, struct straps *straps)
                straps->dimension + (straps->node == 0 ? 1 : 0);
 }
 
-/* Bytes of .data and .bss as the kernel counts them: whole pages of the
- * writable segments. */
-static uint64_t static_bytes(void)
+/* Adds the writable segments in whole pages, as the kernel counts them. */
+static int add_segments(struct dl_phdr_info *info, size_t size, void *context)
 {
-    const ElfW(Phdr) *header = (const void *)getauxval(AT_PHDR);
-    unsigned long count = getauxval(AT_PHNUM);
-    uint64_t bytes = 0;
-    for (unsigned long i = 0; header != NULL && i < count; i++) {
-        if (header[i].p_type == PT_LOAD && (header[i].p_flags & PF_W) != 0) {
-            uint64_t from = header[i].p_vaddr / PAGE * PAGE;
-            uint64_t to = header[i].p_vaddr + header[i].p_memsz;
-            bytes += (to - from + PAGE - 1) / PAGE * PAGE;
+    uint64_t *bytes = context;
+    (void)size;
+    for (unsigned i = 0; i < info->dlpi_phnum; i++) {
+        const ElfW(Phdr) *header = &info->dlpi_phdr[i];
+        if (header->p_type == PT_LOAD && (header->p_flags & PF_W) != 0) {
+            uint64_t from = header->p_vaddr / PAGE * PAGE;
+            uint64_t to = header->p_vaddr + header->p_memsz;
+            *bytes += (to - from + PAGE - 1) / PAGE * PAGE;
         }
     }
+    return 0;
+}
+
+/* Bytes of .data and .bss. */
+static uint64_t static_bytes(void)
+{
+    uint64_t bytes = 0;
+    (void)dl_iterate_phdr(add_segments, &bytes);
     return bytes;
 }
 
