@@ -110,24 +110,36 @@ static void set_lengths(struct incode_gather *g, uint32_t first, uint32_t end)
 }
 
 struct span {
-    incode_vd lo[3], hi[3];
+    incode_vf lo[3], hi[3];
 };
 
-INCODE_INLINE uint32_t within(const struct span *span, incode_vd x, incode_vd y,
-                              incode_vd z)
+/* Rounding is monotone: a point within the box is within it after rounding
+ * point and box alike. */
+static void set_span(struct span *span, const struct incode_gather *g,
+                     const double lo[3], const double hi[3])
 {
-    return incode_vd_mask((x >= span->lo[0]) & (x <= span->hi[0]) &
-                          (y >= span->lo[1]) & (y <= span->hi[1]) &
-                          (z >= span->lo[2]) & (z <= span->hi[2]));
+    for (int d = 0; d < 3; d++) {
+        span->lo[d] = incode_vf_all((float)((lo[d] - g->p0[d]) * g->scale));
+        span->hi[d] = incode_vf_all((float)((hi[d] - g->p0[d]) * g->scale));
+    }
+}
+
+INCODE_INLINE uint32_t within(const struct span *span, const incode_vf r[3])
+{
+    incode_vm out =
+        incode_vf_less(r[0], span->lo[0]) | incode_vf_less(span->hi[0], r[0]) |
+        incode_vf_less(r[1], span->lo[1]) | incode_vf_less(span->hi[1], r[1]) |
+        incode_vf_less(r[2], span->lo[2]) | incode_vf_less(span->hi[2], r[2]);
+    return ~incode_vm_bits(out) & 0xffff;
 }
 
 INCODE_INLINE void pack(struct incode_gather *g, uint32_t to, uint32_t in,
-                        incode_vd x, incode_vd y, incode_vd z, uint32_t at)
+                        const incode_vf r[3], incode_vi at)
 {
-    incode_vd_pack_float(g->x + to, in, x);
-    incode_vd_pack_float(g->y + to, in, y);
-    incode_vd_pack_float(g->z + to, in, z);
-    incode_pack_count(g->at + to, in, at);
+    incode_vf_pack(g->x + to, in, r[0]);
+    incode_vf_pack(g->y + to, in, r[1]);
+    incode_vf_pack(g->z + to, in, r[2]);
+    incode_vi_pack(g->at + to, in, at);
 }
 
 /* Packs what lies in the inner box and what lies in the outer alone; false:
@@ -135,29 +147,27 @@ INCODE_INLINE void pack(struct incode_gather *g, uint32_t to, uint32_t in,
 static bool select_near(struct incode_gather *g)
 {
     incode_vd scale = incode_vd_all(g->scale), p0[3];
+    incode_vi at = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    incode_vi step = {16, 16, 16, 16, 16, 16, 16, 16,
+                      16, 16, 16, 16, 16, 16, 16, 16};
     struct span outer, inner;
-    for (int d = 0; d < 3; d++) {
+    set_span(&outer, g, g->lo, g->hi);
+    set_span(&inner, g, g->inner_lo, g->inner_hi);
+    for (int d = 0; d < 3; d++)
         p0[d] = incode_vd_all(g->p0[d]);
-        outer.lo[d] = incode_vd_all(g->lo[d]);
-        outer.hi[d] = incode_vd_all(g->hi[d]);
-        inner.lo[d] = incode_vd_all(g->inner_lo[d]);
-        inner.hi[d] = incode_vd_all(g->inner_hi[d]);
-    }
     uint32_t n = 0, m = INCODE_OUTER;
-    for (uint32_t i = 0; i < g->around; i += INCODE_VD_LANES) {
-        incode_vd x = incode_vd_load(g->p[0] + i),
-                  y = incode_vd_load(g->p[1] + i),
-                  z = incode_vd_load(g->p[2] + i);
-        uint32_t in = within(&outer, x, y, z), near;
-        if (g->around - i < INCODE_VD_LANES)
+    for (uint32_t i = 0; i < g->around; i += INCODE_VF_LANES) {
+        incode_vf r[3];
+        for (int d = 0; d < 3; d++)
+            r[d] = incode_vf_relative(g->p[d] + i, p0[d], scale);
+        uint32_t in = within(&outer, r);
+        if (g->around - i < INCODE_VF_LANES)
             in &= (UINT32_C(1) << (g->around - i)) - 1;
-        near = in & within(&inner, x, y, z);
+        uint32_t near = in & within(&inner, r);
         in ^= near;
-        x = (x - p0[0]) * scale;
-        y = (y - p0[1]) * scale;
-        z = (z - p0[2]) * scale;
-        pack(g, n, near, x, y, z, i);
-        pack(g, m, in, x, y, z, i);
+        pack(g, n, near, r, at);
+        pack(g, m, in, r, at);
+        at += step;
         n += (uint32_t)__builtin_popcount(near);
         m += (uint32_t)__builtin_popcount(in);
         if (n > INCODE_INNER_POINTS ||

@@ -24,8 +24,7 @@
 enum {
     INCODE_AROUND_POINTS = 768, /* around a leaf */
     INCODE_AROUND_EXTRA = 64,   /* far vertices */
-    INCODE_AROUND_ALL =
-        INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA + INCODE_LEAF_POINTS,
+    INCODE_AROUND_ALL = INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA + 16,
     INCODE_INNER_POINTS = 96, /* around a vertex: the inner box, at most */
     INCODE_OUTER = 128,       /* where the outer points begin */
     INCODE_OUTER_END = 448,   /* and end, far vertices included */

@@ -170,16 +170,48 @@ INCODE_INLINE void incode_vd_pack(double *out, uint32_t mask, incode_vd a)
 #endif
 }
 
-/* The same, converted to single precision. */
-INCODE_INLINE void incode_vd_pack_float(float *out, uint32_t mask, incode_vd a)
+/* (p[i] - origin) * scale of 16 numbers, in single precision. */
+INCODE_INLINE incode_vf incode_vf_relative(const double *p, incode_vd origin,
+                                           incode_vd scale)
+{
+    incode_vd low = (incode_vd_load(p) - origin) * scale;
+    incode_vd high = (incode_vd_load(p + INCODE_VD_LANES) - origin) * scale;
+#ifdef __AVX512DQ__
+    return (incode_vf)_mm512_insertf32x8(
+        _mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)low)),
+        _mm512_cvtpd_ps((__m512d)high), 1);
+#else
+    incode_vf out;
+    for (int i = 0; i < INCODE_VD_LANES; i++) {
+        out[i] = (float)low[i];
+        out[i + INCODE_VD_LANES] = (float)high[i];
+    }
+    return out;
+#endif
+}
+
+/* Lanes of sixteen whose bit is set, packed together; the rest is undefined. */
+INCODE_INLINE void incode_vf_pack(float *out, uint32_t mask, incode_vf a)
 {
 #ifdef __AVX512DQ__
-    __m256 f = _mm512_cvtpd_ps((__m512d)a);
-    _mm256_storeu_ps(out, _mm256_maskz_compress_ps((__mmask8)mask, f));
+    _mm512_storeu_ps(out, _mm512_maskz_compress_ps((__mmask16)mask, (__m512)a));
 #else
-    for (int i = 0, n = 0; i < INCODE_VD_LANES; i++) {
-        out[n] = (float)a[i];
-        n += (int)(mask >> i & 1);
+    for (uint32_t i = 0, n = 0; i < INCODE_VF_LANES; i++) {
+        out[n] = a[i];
+        n += mask >> i & 1;
+    }
+#endif
+}
+
+INCODE_INLINE void incode_vi_pack(uint32_t *out, uint32_t mask, incode_vi a)
+{
+#ifdef __AVX512DQ__
+    _mm512_storeu_si512(
+        out, _mm512_maskz_compress_epi32((__mmask16)mask, (__m512i)a));
+#else
+    for (uint32_t i = 0, n = 0; i < INCODE_VF_LANES; i++) {
+        out[n] = (uint32_t)a[i];
+        n += mask >> i & 1;
     }
 #endif
 }
