@@ -125,10 +125,23 @@ static void start(struct incode_triangulator *t, struct incode_task *task,
     begin_walk(t, task, INCODE_QUERY_NEAREST, frame, p);
 }
 
+/* Other stars go on while a seed waits for a page. */
+static bool is_reached(const struct incode_triangulator *t, uint32_t v)
+{
+    const struct incode_touched *entry =
+        incode_afl_find(&t->afl, v / INCODE_BRICK_POINTS);
+    return entry != NULL &&
+           (entry->reached >> v % INCODE_BRICK_POINTS & 1) != 0;
+}
+
 enum incode_outcome incode_seed_run(struct incode_triangulator *t,
                                     struct incode_task *task)
 {
     struct incode_seed *s = &task->seed;
+    if (task->kind == INCODE_TASK_SEED && is_reached(t, task->v)) {
+        task->kind = INCODE_TASK_IDLE;
+        return INCODE_OK;
+    }
     struct incode_query *q = &task->search.query;
     double p[3];
     if (!incode_fetch_point(t, task->v, p, &task->page))
