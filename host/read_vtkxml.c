@@ -34,6 +34,7 @@ struct xml {
     uint64_t piece_points, piece_cells;
     uint64_t points_before; /* in earlier pieces */
     enum want reading;      /* WANTS: none */
+    unsigned nested;        /* elements within the array at hand */
     bool reading_base64;    /* format="binary" */
     char *text;             /* of the array at hand */
     size_t text_bytes, text_capacity;
@@ -128,7 +129,9 @@ static void XMLCALL start_element(void *context, const char *name,
                                   const char **attributes)
 {
     struct xml *x = context;
-    if (strcmp(name, "VTKFile") == 0) {
+    if (x->reading != WANTS) {
+        x->nested++; /* information about the array: not its text */
+    } else if (strcmp(name, "VTKFile") == 0) {
         start_file(x, attributes);
     } else if (strcmp(name, "Piece") == 0) {
         x->any_piece = x->in_piece = true;
@@ -149,7 +152,7 @@ static void XMLCALL characters(void *context, const char *text, int length)
 {
     struct xml *x = context;
     size_t n = (size_t)length;
-    if (x->reading == WANTS || x->error->code != 0) {
+    if (x->reading == WANTS || x->nested > 0 || x->error->code != 0) {
         return;
     }
     if (x->text_bytes == 0) {
@@ -259,7 +262,9 @@ static void end_piece(struct xml *x)
 static void XMLCALL end_element(void *context, const char *name)
 {
     struct xml *x = context;
-    if (strcmp(name, "DataArray") == 0 && x->reading != WANTS) {
+    if (x->nested > 0) {
+        x->nested--;
+    } else if (x->reading != WANTS) {
         end_array(x);
     } else if (strcmp(name, "Points") == 0) {
         x->in_points = false;

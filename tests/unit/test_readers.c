@@ -506,7 +506,9 @@ static void put_xml(struct bytes *b, int way, bool wide_header, bool packed,
         "</DataArray></Points>\n</Piece>\n</PolyData>\n";
     static const char empty[] = "/></Points>\n</Piece>\n</PolyData>\n";
     if (way == 0) {
-        put_text(b, "ascii\">\n-3 -2.5 -2 -1.5 -1 -.5 0 .5 1 1.5 2 2.5\n");
+        put_text(b, "ascii\">\n-3 -2.5 -2 -1.5 -1 -.5 0 .5 1 1.5 2 2.5\n"
+                    "<InformationKey name=\"RANGE\"><Value index=\"0\"> 7 "
+                    "</Value></InformationKey>\n");
         put_text(b, after);
     } else if (way == 1 || way == 2) {
         put_text(b, "binary\">\n  ");
