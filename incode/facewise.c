@@ -127,13 +127,16 @@ enum incode_outcome incode_face_pursue(struct incode_triangulator *t,
         r = begin(t, task);
     if (r != INCODE_OK || task->kind == INCODE_TASK_IDLE)
         return r;
+    uint64_t before = t->stats.candidates;
     do {
         r = t->setup.index == INCODE_GRID ? look_at_cells(t, task)
                                           : look_at_all(t, task);
     } while (r == INCODE_MORE && t->setup.index == INCODE_GRID &&
              task->cells.reach <= 4 && task->cells.list == task->cells.end);
+    task->search.looked += t->stats.candidates - before;
     if (r != INCODE_OK)
         return r;
+    incode_count_candidates(t, task->search.looked);
     use_found(t, &task->search.query);
     task->kind = INCODE_TASK_IDLE;
     return INCODE_OK;

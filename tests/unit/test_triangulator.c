@@ -1,0 +1,369 @@
+/* The triangulator, with every index, against the digests that came with the
+ * data and against a plain reference: regions, partitions, rules, memories,
+ * pages that come at random, spilled faces, hubs, extreme coordinates. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "../../host/gen.h"
+#include "reference.h"
+#include "solo.h"
+
+static const char *const index_names[] = {"naive", "grid", "kd"};
+
+/* Runs one case and compares the digest. */
+static void expect(struct solo *s, const struct host_points *points,
+                   const char *digest, const char *name)
+{
+    struct solo start = *s;
+    solo_run(s, points->xyz, points->count);
+    if (strcmp(s->digest.text, digest) != 0) {
+        fail_msg("%s, %s, %u regions (%s), rule %d, %zu bytes, shuffle %llu, "
+                 "chance %llu, pressure %u: %s, expected %s",
+                 name, index_names[s->index], s->regions,
+                 s->partition == HOST_UNIFORM ? "uniform" : "adaptive",
+                 s->face_rule, s->memory, (unsigned long long)start.shuffle,
+                 (unsigned long long)start.chance, s->pressure, s->digest.text,
+                 digest);
+    }
+    solo_close(s);
+}
+
+static void reference_digest(const struct host_points *points,
+                             struct host_digest *digest)
+{
+    struct host_tetrahedra tets = {0};
+    reference_delaunay(points->xyz, (uint32_t)points->count, &tets);
+    host_tetrahedra_sort(&tets);
+    host_digest(&tets, digest);
+    host_tetrahedra_free(&tets);
+}
+
+/* Every index, region count, partition and rule, the rest drawn from a seed. */
+static void expect_all(const struct host_points *points, const char *digest,
+                       const char *name, bool few)
+{
+    static const uint32_t counts[] = {1, 32, 2, 8};
+    uint64_t seed = 1;
+    for (unsigned i = 0; i < 3; i++) {
+        for (unsigned j = 0; j < (few ? 2 : 4); j++) {
+            for (unsigned k = 0; k < 4; k++) {
+                seed = seed * UINT64_C(6364136223846793005) + 1442695040888963;
+                struct solo s = {
+                    .index = (uint8_t)i,
+                    .regions = counts[j],
+                    .partition = k & 1 ? HOST_UNIFORM : HOST_ADAPTIVE,
+                    .face_rule = k & 2 ? INCODE_FACE_PAPER : INCODE_FACE_OWN,
+                    .memory = seed >> 63 ? 0 : 4 << 20,
+                    .shuffle = seed >> 62 & 1 ? seed : 0,
+                    .chance = seed >> 61 & 1 ? seed : 0,
+                    .false_start = seed >> 60 & 1};
+                expect(&s, points, digest, name);
+            }
+        }
+    }
+}
+
+static const char *const degenerate[] = {
+    "deg_cgal_T3_1",           "deg_cgal_grid5",
+    "deg_cgal_nested_cubes",   "deg_mourner_orient3d_denormal",
+    "deg_octahedron",          "deg_quickhull3d_issue2",
+    "deg_scipy_16094_grid18",  "deg_quickhull3d_issue38_dupcube",
+    "deg_spirula_60_thin_tet", "deg_trimesh_1446",
+    "deg_cgal_lp500"};
+
+/* Reads a set, or skips the test. */
+static void read_set(const char *name, const char *suffix,
+                     struct host_points *points)
+{
+    char file[96];
+    (void)snprintf(file, sizeof file, "%s%s", name, suffix);
+    if (!reference_data(file, points)) {
+        print_message("%s: not there\n", file);
+        skip();
+    }
+}
+
+static void degenerate_sets(void **unused)
+{
+    (void)unused;
+    for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++) {
+        struct host_points points = {0};
+        struct host_digest digest;
+        read_set(degenerate[i], ".xyz", &points);
+        reference_digest(&points, &digest);
+        expect_all(&points, digest.text, degenerate[i], points.count > 400);
+        host_points_free(&points);
+    }
+}
+
+/* Scaling by a power of two changes no sign, so the digest stays. */
+static void scaled_sets(void **unused)
+{
+    (void)unused;
+    static const int powers[] = {500, -500};
+    for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++) {
+        if (strstr(degenerate[i], "denormal") != NULL)
+            continue;
+        struct host_points points = {0};
+        struct host_digest digest;
+        read_set(degenerate[i], ".xyz", &points);
+        reference_digest(&points, &digest);
+        for (int k = 0; k < 2; k++) {
+            struct host_points scaled = {0};
+            struct host_error error = {0};
+            (void)host_points_append(&scaled, points.xyz, points.count, &error);
+            for (uint64_t j = 0; j < 3 * points.count; j++)
+                scaled.xyz[j] = ldexp(points.xyz[j], powers[k]);
+            expect_all(&scaled, digest.text, degenerate[i], true);
+            host_points_free(&scaled);
+        }
+        host_points_free(&points);
+    }
+}
+
+/* Coordinates of 2^1000 beside coordinates of 2^-1074. */
+static void both_ends(void **unused)
+{
+    (void)unused;
+    uint64_t seed = 3;
+    for (int round = 0; round < 8; round++) {
+        struct host_points points = {0};
+        struct host_error error = {0};
+        struct host_digest digest;
+        for (int i = 0; i < 8 + 4 * round; i++) {
+            double p[3];
+            for (int d = 0; d < 3; d++) {
+                seed = seed * UINT64_C(6364136223846793005) + 1442695040888963;
+                int kind = (int)(seed >> 60), value = (int)(seed >> 50 & 7) - 3;
+                p[d] = ldexp(value, kind < 6 ? 1000 : kind < 12 ? -1074 : 0);
+                p[d] = p[d] == 0 ? 0 : p[d];
+            }
+            (void)host_points_append(&points, p, 1, &error);
+        }
+        reference_digest(&points, &digest);
+        expect_all(&points, digest.text, "both ends", true);
+        host_points_free(&points);
+    }
+}
+
+static void made(const char *kind, uint64_t n, struct host_points *points)
+{
+    struct host_error error = {0};
+    if (host_gen(kind, n, 5, points, &error) != 0)
+        fail_msg("%s", error.text);
+}
+
+static void made_sets(void **unused)
+{
+    (void)unused;
+    static const char *const kinds[] = {
+        "uniform", "bubbles", "bluntfin", "sphere", "grid", "rotated", "hub"};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        struct host_points points = {0};
+        struct host_digest digest;
+        made(kinds[i], 600, &points);
+        reference_digest(&points, &digest);
+        for (uint8_t index = 0; index < 3; index++) {
+            for (uint32_t k = 0; k < 4; k++) {
+                struct solo s = {
+                    .index = index,
+                    .regions = k & 1 ? 8 : 1,
+                    .partition = k & 2 ? HOST_UNIFORM : HOST_ADAPTIVE,
+                    .face_rule = index == 2 && k & 2 ? INCODE_FACE_PAPER
+                                                     : INCODE_FACE_OWN,
+                    .chance = k + 1,
+                    .pressure = k & 1 ? 0 : 500};
+                expect(&s, &points, digest.text, kinds[i]);
+            }
+        }
+        host_points_free(&points);
+    }
+}
+
+/* A front at one vertex that is far longer than what is kept at hand. */
+static void hub(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_digest digest[2];
+    made("hub", 6000, &points);
+    /* The hub in the middle of the order of work, not before it. */
+    for (int d = 0; d < 3; d++)
+        points.xyz[d] = 0.02 * (d + 1);
+    for (unsigned k = 0; k < 8; k++) {
+        struct solo s = {.index = INCODE_KD,
+                         .regions = k & 1 ? 8 : 1,
+                         .face_rule =
+                             k & 2 ? INCODE_FACE_PAPER : INCODE_FACE_OWN,
+                         .chance = k,
+                         .pressure = k & 4 ? 330 : 0};
+        solo_run(&s, points.xyz, points.count);
+        digest[k > 0] = s.digest;
+        assert_string_equal(digest[k > 0].text, digest[0].text);
+        assert_true(s.hubs > 0);
+        if (s.pressure != 0)
+            assert_true(s.spilled > 0);
+        solo_close(&s);
+    }
+    host_points_free(&points);
+}
+
+/* ---- larger sets ---- */
+
+/* The digest of a set in INDEX.md beside it; false: it is not there. */
+static bool known_digest(const char *name, char text[72])
+{
+    const char *folder = getenv("INCODE_DATA");
+    char path[512], line[4096], hex[65], set[64];
+    (void)snprintf(path, sizeof path, "%s/INDEX.md",
+                   folder != NULL ? folder : "../shared/data");
+    FILE *file = fopen(path, "r");
+    bool found = false;
+    while (file != NULL && !found && fgets(line, sizeof line, file) != NULL) {
+        found = sscanf(line, "%64[0-9a-f]  %63s", hex, set) == 2 &&
+                strcmp(set, name) == 0;
+    }
+    if (file != NULL)
+        (void)fclose(file);
+    if (found)
+        (void)snprintf(text, 72, "sha256:%.64s", hex);
+    return found;
+}
+
+struct real {
+    const char *name;
+    uint8_t index;
+    uint32_t regions;
+    uint32_t pressure;
+};
+
+static void real_sets(void **unused)
+{
+    (void)unused;
+    static const struct real cases[] = {
+        {"cactus", INCODE_NAIVE, 1, 0},  {"pdb_3GQP", INCODE_NAIVE, 8, 0},
+        {"cactus", INCODE_GRID, 8, 600}, {"pdb_3GQP", INCODE_GRID, 2, 0},
+        {"can_fem", INCODE_GRID, 32, 0}, {"office", INCODE_GRID, 1, 700},
+        {"cactus", INCODE_KD, 32, 600},  {"mug_fem", INCODE_KD, 8, 600},
+        {"pdb_3GQP", INCODE_KD, 1, 700}, {"can_fem", INCODE_KD, 2, 700},
+        {"office", INCODE_KD, 8, 600},   {"hexa_amr", INCODE_KD, 1, 900},
+        {"ocean_r", INCODE_KD, 8, 700},  {"halo_dm", INCODE_KD, 1, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const struct real *c = &cases[i];
+        struct host_points points = {0};
+        char digest[72];
+        if (!known_digest(c->name, digest)) {
+            print_message("INDEX.md: not there\n");
+            skip();
+        }
+        read_set(c->name, ".xyz.gz", &points);
+        struct solo s = {.index = c->index,
+                         .regions = c->regions,
+                         .partition = i & 1 ? HOST_UNIFORM : HOST_ADAPTIVE,
+                         .face_rule =
+                             i & 2 ? INCODE_FACE_PAPER : INCODE_FACE_OWN,
+                         .shuffle = i & 1 ? i : 0,
+                         .chance = i + 1,
+                         .pressure = c->pressure};
+        expect(&s, &points, digest, c->name);
+        host_points_free(&points);
+    }
+}
+
+/* ---- memory and the interface's refusals ---- */
+
+static void smallest_memory(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    made("uniform", 20000, &points);
+    struct host_digest digest[2];
+    static const size_t memories[] = {0, 512 << 10, 4 << 20};
+    for (int i = 0; i < 3; i++) {
+        struct solo s = {
+            .index = INCODE_KD, .regions = 1, .memory = memories[i]};
+        solo_run(&s, points.xyz, points.count);
+        digest[i > 0] = s.digest;
+        assert_string_equal(digest[i > 0].text, digest[0].text);
+        const struct incode_map *map = incode_triangulator_map(s.t);
+        assert_in_range(map->total, 1, s.memory);
+        assert_true(map->frames >= map->frame_count * INCODE_PAGE_BYTES);
+        assert_int_equal(s.evictions > 0, i < 2);
+        solo_close(&s);
+    }
+    host_points_free(&points);
+}
+
+static void too_little_memory(void **unused)
+{
+    (void)unused;
+    struct incode_setup setup = {.bricks = 10, .index = INCODE_KD};
+    struct incode_ports ports = {0};
+    size_t least = incode_arena_min(&setup);
+    assert_in_range(least, 1, 512 << 10);
+    void *arena = aligned_alloc(64, (least + 63) / 64 * 64);
+    assert_non_null(arena);
+    const char *why = NULL;
+    assert_null(
+        incode_triangulator_init(arena, least - 1024, &setup, &ports, &why));
+    assert_non_null(why);
+    assert_non_null(
+        incode_triangulator_init(arena, least, &setup, &ports, &why));
+    setup.bricks = 0;
+    why = NULL;
+    assert_null(incode_triangulator_init(arena, least, &setup, &ports, &why));
+    assert_non_null(why);
+    free(arena);
+}
+
+static void refusals(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    made("uniform", 500, &points);
+    struct solo s = {.index = INCODE_KD, .regions = 1};
+    solo_open(&s, points.xyz, points.count);
+    assert_int_equal(incode_triangulator_step(s.t), INCODE_FINISHED);
+    solo_start(&s, 0);
+    uint8_t page[INCODE_PAGE_BYTES] = {0};
+    /* A page not asked for, faces not asked for. */
+    assert_int_equal(incode_triangulator_page(s.t, 3, page, sizeof page), -1);
+    assert_int_equal(incode_triangulator_page(s.t, INCODE_NONE, page, 24), -1);
+    assert_int_equal(incode_triangulator_unspill(s.t, 0, NULL, 0, true), -1);
+    while (s.page_count == 0)
+        (void)incode_triangulator_step(s.t);
+    /* Wrong sizes. */
+    static const size_t sizes[] = {0, 1, 23, 25, 1535, 1537, 1560};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        uint8_t large[1600] = {0};
+        assert_int_equal(
+            incode_triangulator_page(s.t, s.pages[0], large, sizes[i]), -1);
+    }
+    /* All the same, it finishes. */
+    assert_true(solo_step(&s, UINT64_MAX));
+    solo_close(&s);
+    host_points_free(&points);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(degenerate_sets),
+        cmocka_unit_test(scaled_sets),
+        cmocka_unit_test(both_ends),
+        cmocka_unit_test(made_sets),
+        cmocka_unit_test(hub),
+        cmocka_unit_test(real_sets),
+        cmocka_unit_test(smallest_memory),
+        cmocka_unit_test(too_little_memory),
+        cmocka_unit_test(refusals),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
