@@ -239,6 +239,9 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
             continue;
         uint32_t page = tree->base[level - 1] + first + child;
         const struct incode_frame *f = incode_pager_get(w->walker->pager, page);
+        if (f == NULL && w->q->ahead && level == 1 &&
+            incode_pager_loading(w->walker->pager, page))
+            continue;
         if (f == NULL)
             return wait_for(w, tree->base[level - 1], first, left, child);
         enum incode_walk r = level == 1

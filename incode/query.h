@@ -32,6 +32,7 @@ struct incode_query {
     enum incode_question question;
     bool boxed;          /* only what meets [lo, hi] */
     bool timid;          /* APEX: only points clearly beyond the face */
+    bool ahead;          /* BOX: asks for missing bricks and passes them over */
     bool done;           /* not what lies within [done_lo, done_hi] */
     double lo[3], hi[3]; /* absolute coordinates */
     double done_lo[3], done_hi[3];
@@ -40,9 +41,9 @@ struct incode_query {
     double scale;               /* relative = (p - pv) * scale */
     double rb[3], rc[3];        /* b and c, relative */
     struct incode_sphere sphere;
-    double centre[3];           /* of the sphere: where its value peaks */
-    double limit;  /* NEAREST, CIRCLE: squared, relative */
-    uint32_t best; /* vertex number, or INCODE_NONE */
+    double centre[3]; /* of the sphere: where its value peaks */
+    double limit;     /* NEAREST, CIRCLE: squared, relative */
+    uint32_t best;    /* vertex number, or INCODE_NONE */
     double best_p[3];
     uint32_t cursor;  /* bricks below this one are done */
     uint32_t missing; /* the page a suspended walk waits for */

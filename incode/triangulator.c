@@ -12,7 +12,8 @@ enum {
     FACES_MIN = 4096,
     BRICKS_MIN = 512,
     FRAMES_MAX = INCODE_NO_FRAME - 1,
-    FETCH_AHEAD = 32 /* bricks */
+    FETCH_AHEAD = 32,  /* bricks */
+    LOOKAHEAD_MAX = 48 /* bricks */
 };
 
 static size_t round_up(size_t bytes)
@@ -105,8 +106,10 @@ incode_triangulator_init(void *arena, size_t bytes,
     incode_gather_reset(&t->gather);
     t->spread = 1.6;
     t->window = 4;
-    t->lookahead = (uint32_t)map.frame_count / 48;
-    t->lookahead = t->lookahead < 1 ? 1 : t->lookahead > 16 ? 16 : t->lookahead;
+    t->lookahead = (uint32_t)map.frame_count / 24;
+    t->lookahead = t->lookahead < 1               ? 1
+                   : t->lookahead > LOOKAHEAD_MAX ? LOOKAHEAD_MAX
+                                                  : t->lookahead;
     t->room_faces = 2 * INCODE_STAR_FACES + 4 * INCODE_STAR_BUILT;
     t->room_bricks = (uint32_t)map.brick_entries / 4;
     t->finished = true;
@@ -320,14 +323,17 @@ static void look_ahead(struct incode_triangulator *t)
         t->ahead = t->current;
     if (t->ahead >= own || t->ahead >= t->current + t->lookahead)
         return;
-    const struct incode_frame *f =
-        incode_pager_get(&t->pager, t->job.first + t->ahead);
-    if (f == NULL)
+    uint32_t brick = t->job.first + t->ahead;
+    const struct incode_frame *f = incode_pager_get(&t->pager, brick);
+    if (f == NULL) {
+        for (uint32_t i = 1; i < t->lookahead && t->ahead + i < own; i++)
+            (void)incode_pager_get(&t->pager, brick + i);
         return;
+    }
     struct incode_query q;
     memset(&q, 0, sizeof q);
     q.question = INCODE_QUERY_BOX;
-    q.boxed = true;
+    q.boxed = q.ahead = true;
     uint32_t leaves = (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
     double extent = 0;
     for (int d = 0; d < 3; d++) {
