@@ -1,0 +1,199 @@
+/* The host believes no message: whatever a node sends, the host takes it as it
+ * should be, or names the node and stops; it never writes where it must not. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "../../host/gen.h"
+#include "../../host/intake.h"
+#include "../../node/result.h"
+
+enum { NODES = 4 };
+
+static uint64_t state = 88172645463325252u;
+
+static uint32_t draw(uint32_t below)
+{
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return (uint32_t)(state >> 32) % below;
+}
+
+static struct host_service service;
+static struct host_cluster cluster;
+static struct host_order order;
+static struct host_tetrahedra tets;
+
+static int set_up(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    assert_int_equal(host_gen("uniform", 3000, 1, &points, &error), 0);
+    assert_int_equal(host_order_make(&order, "test", points.xyz, points.count,
+                                     HOST_ADAPTIVE, NODES, false, &error),
+                     0);
+    host_points_free(&points);
+    return 0;
+}
+
+static int tear_down(void **unused)
+{
+    (void)unused;
+    host_order_free(&order);
+    return 0;
+}
+
+/* A service in the midst of its run, a job at each node. */
+static void begin(void)
+{
+    struct host_error error = {0};
+    memset(&service, 0, sizeof service);
+    memset(&tets, 0, sizeof tets);
+    cluster.nodes = NODES;
+    service.cluster = &cluster;
+    service.order = &order;
+    service.tets = &tets;
+    service.workers = NODES;
+    service.node = calloc(NODES, sizeof *service.node);
+    assert_non_null(service.node);
+    assert_int_equal(
+        host_ledger_init(&service.ledger, order.bricks, NODES, &error), 0);
+    assert_int_equal(host_spill_init(&service.spill, 0, &error), 0);
+    for (uint32_t i = 0; i < NODES; i++) {
+        (void)host_ledger_open(&service.ledger, i, order.region[i].first,
+                               order.region[i].last);
+    }
+}
+
+static void end(void)
+{
+    free(service.node);
+    host_ledger_free(&service.ledger);
+    host_spill_free(&service.spill);
+    host_tetrahedra_free(&tets);
+}
+
+static int send(uint16_t source, uint8_t type, const void *data, size_t size,
+                struct host_error *error)
+{
+    /* A copy of the right size, so that a sanitizer sees reads past it. */
+    uint8_t *copy = malloc(size + 1);
+    assert_non_null(copy);
+    if (size > 0) {
+        memcpy(copy, data, size);
+    }
+    struct cube_message message = {source, (uint16_t)size, type, copy};
+    int status = host_intake(&service, &message, error);
+    free(copy);
+    return status;
+}
+
+static void test_any_bytes(void **unused)
+{
+    (void)unused;
+    for (uint32_t round = 0; round < 2000; round++) {
+        begin();
+        for (uint32_t k = 0; k < 40; k++) {
+            uint8_t data[CUBE_PAYLOAD_MAX];
+            uint32_t size = draw(draw(4) == 0 ? CUBE_PAYLOAD_MAX : 40);
+            struct host_error error = {0};
+            for (uint32_t i = 0; i < size; i++) {
+                data[i] = (uint8_t)(draw(2) == 0 ? 0 : draw(256));
+            }
+            uint32_t epoch = 1 + draw(NODES);
+            if (size >= 4 && draw(2) == 0) {
+                memcpy(data, &epoch, 4);
+            }
+            uint8_t type =
+                (uint8_t)(draw(8) == 0 ? draw(256) : NODE_READY + draw(8));
+            if (send((uint16_t)draw(NODES + 1), type, data, size, &error) !=
+                0) {
+                assert_true(error.code == HOST_CUBE ||
+                            error.code == HOST_BROKEN);
+                assert_int_equal(strncmp(error.text, "node ", 5), 0);
+                break;
+            }
+        }
+        for (uint64_t i = 0; i < tets.count; i++) {
+            for (int k = 0; k < 4; k++) {
+                assert_true(tets.v[i][k] < 64 * order.bricks);
+            }
+        }
+        end();
+    }
+}
+
+static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick)
+{
+    struct node_result_writer writer;
+    const uint32_t apexes[1][3] = {{1, 2, 3}};
+    memcpy(data, &epoch, 4);
+    node_result_begin(&writer, data + 4, 100);
+    assert_int_equal(node_result_star(&writer, 0, apexes, 1), 1);
+    assert_int_equal(node_result_commit(&writer, brick), 1);
+    return 4 + writer.size;
+}
+
+/* Results of a job that is no more are counted as read, and dropped. */
+static void test_epochs(void **unused)
+{
+    (void)unused;
+    uint8_t data[128];
+    struct host_error error = {0};
+    begin();
+    size_t size = batch(data, service.ledger.job[1].epoch, 0);
+    assert_int_equal(send(0, NODE_RESULT, data, size, &error), 0);
+    assert_int_equal(tets.count, 0);
+    assert_int_equal(service.ledger.committed, 0);
+    assert_int_equal(service.node[0].results, 1);
+    size = batch(data, service.ledger.job[0].epoch, 0);
+    assert_int_equal(send(0, NODE_RESULT, data, size, &error), 0);
+    assert_int_equal(tets.count, 1);
+    assert_int_equal(service.ledger.committed, 1);
+    /* The same brick a second time cannot be. */
+    assert_int_equal(send(0, NODE_RESULT, data, size, &error), HOST_CUBE);
+    end();
+}
+
+/* A node that has not committed all its bricks is not done. */
+static void test_unfinished(void **unused)
+{
+    (void)unused;
+    static struct node_finished_message finished;
+    struct host_error error = {0};
+    begin();
+    assert_int_equal(send(2, NODE_FINISHED, &finished, sizeof finished, &error),
+                     HOST_BROKEN);
+    assert_non_null(strstr(error.text, "node 2: "));
+    assert_int_equal(service.done, 0);
+    end();
+}
+
+static void test_fault(void **unused)
+{
+    (void)unused;
+    struct host_error error = {0};
+    begin();
+    assert_int_equal(send(3, NODE_FAULT, "no memory", 9, &error), HOST_CUBE);
+    assert_non_null(strstr(error.text, "node 3: no memory; "));
+    assert_non_null(strstr(error.text, "--memory"));
+    end();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_any_bytes),
+        cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_unfinished),
+        cmocka_unit_test(test_fault),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
