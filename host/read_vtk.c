@@ -9,7 +9,7 @@
 #include "stream.h"
 
 /* Points that a few words may imply: a damaged file shall not fill memory. */
-static const uint64_t grid_max = UINT64_C(1) << 26;
+static const uint64_t grid_max = UINT64_C(1) << 24;
 
 struct vtk {
     const struct host_source *source;
@@ -151,7 +151,7 @@ static int append_grid(struct vtk *vtk, const uint64_t n[3],
     }
     if (points == 0 || points > grid_max) {
         return damaged(vtk, error,
-                       "the grid has no point or more than 2^26; correct its "
+                       "the grid has no point or more than 2^24; correct its "
                        "dimensions, or list the points");
     }
     bool axes = vtk->axis[0] != NULL;

@@ -102,13 +102,14 @@ static void start_array(struct xml *x, const char **attributes)
         return;
     }
     struct array *a = &x->array[want];
-    a->type = host_number_named(attribute(attributes, "type"));
-    a->text = strcmp(format, "ascii") == 0 || *format == '\0';
-    if (a->there || a->type == HOST_NO_NUMBER) {
+    enum host_number type = host_number_named(attribute(attributes, "type"));
+    if (a->there || type == HOST_NO_NUMBER) {
         fail(x, "an array is there twice or of unknown type; correct it");
         return;
     }
     a->there = true;
+    a->type = type;
+    a->text = strcmp(format, "ascii") == 0 || *format == '\0';
     if (strcmp(format, "appended") != 0) {
         x->reading = want;
         x->reading_base64 = !a->text;

@@ -466,7 +466,7 @@ static void vtk_legacy(void **unused)
     refused("a.vtk",
             "# vtk DataFile Version 2.0\nt\nASCII\n"
             "DATASET STRUCTURED_POINTS\nDIMENSIONS 99999 99999 99999\n",
-            "more than 2^26");
+            "more than 2^24");
 }
 
 /* One VTK XML file with its points coded in one of five ways. */
@@ -557,6 +557,11 @@ static void vtk_xml_of_every_coding(void **unused)
             "<DataArray type=\"Float32\" format=\"ascii\">\n1 2\nq "
             "</DataArray></Points></Piece></VTKFile>",
             "a.vtu:5:1: 'q' is no number");
+    refused("a.vtu",
+            "<VTKFile><Piece><Points><DataArray type=\"Int8\">1 2 3"
+            "</DataArray><DataArray type=\"Int8\" format=\"binary\"/>"
+            "</Points></Piece></VTKFile>",
+            "there twice");
     refused("a.vtu", "<VTKFile>\n<Piece>\n</VTKFile>\n", "a.vtu:3: mismatch");
     refused("a.vtu", "<VTKFile compressor=\"vtkLZ4DataCompressor\">\n",
             "a.vtu:1: a compressor");
