@@ -58,7 +58,7 @@ static const struct argp_option options_of_run[] = {
     {"nodes", KEY_NODES, "N", 0,
      "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
     {"memory", KEY_MEMORY, "BYTES", 0,
-     "Data memory of a node, stack included: 512K .. 1G. Default: 4M", 1},
+     "Data memory of a node, stack included: 256K .. 1G. Default: 4M", 1},
     {"link", KEY_LINK, "NAME", 0, "Wires between nodes: tcp", 1},
     {"board", KEY_BOARD, "NAME", 0, "What a node runs on: linux", 1},
     {"cube", KEY_CUBE, "FILE", 0, "Real nodes: not in this version", 1},

@@ -122,7 +122,6 @@ static void become_node(const struct host_cluster *c,
     char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
     char *no_environment[] = {NULL};
     size_t at = 0;
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (unsigned d = 0; d < c->dimension + (node == 0 ? 1u : 0u); d++) {
         int fd = wires->end[node][d];
         fcntl(fd, F_SETFD, 0);
@@ -176,8 +175,12 @@ static int start_node(struct host_cluster *c,
         return host_fail(error, HOST_BROKEN, "node %u: %s; close some files",
                          node, strerror(errno));
     }
-    pid_t pid = fork();
+    pid_t host = getpid(), pid = fork();
     if (pid == 0) {
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
+        if (getppid() != host) {
+            _exit(127); /* the host ended before it could be watched */
+        }
         become_node(c, options, path, node, wires, report[1]);
     }
     close(report[1]);

@@ -143,8 +143,9 @@ void host_report_run(FILE *file, const struct host_run_options *options,
             r->time_total_s, r->verified ? "; verified" : "");
     if (alone != NULL) {
         char title[128];
-        snprintf(title, sizeof title,
-                 "Spatial decomposition, %s partition, index %s",
+        snprintf(title, sizeof title, "%s, %s partition, index %s",
+                 r->strategy == HOST_SPATIAL ? "Spatial decomposition"
+                                             : "Sequential",
                  host_partition_name(r->partition), host_index_name(r->index));
         table_head(file, title);
         table_row(file, alone, alone);
