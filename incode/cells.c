@@ -148,7 +148,7 @@ static bool fill_batch(const struct incode_cells *c,
         if (!get_word(g, g->walker->tree->list_base, c->list + batch->count,
                       &id, missing))
             return false;
-        if (id / INCODE_BRICK_POINTS != brick) {
+        if (f == NULL || id / INCODE_BRICK_POINTS != brick) {
             brick = id / INCODE_BRICK_POINTS;
             f = incode_pager_get(g->walker->pager, brick);
             *missing = brick;
