@@ -6,7 +6,7 @@
 
 /* --- memory -------------------------------------------------------------- */
 
-enum { STAGING_DEFAULT = 8, TIMEOUT_FIRST_US = 200000 };
+enum { STAGING_MOST = 8, TIMEOUT_FIRST_US = 200000 };
 
 static uint32_t or_default(uint32_t value, uint32_t otherwise)
 {
@@ -16,7 +16,9 @@ static uint32_t or_default(uint32_t value, uint32_t otherwise)
 static struct link_config complete(const struct link_config *config)
 {
     struct link_config c = *config;
-    unsigned staging = c.window < STAGING_DEFAULT ? c.window : STAGING_DEFAULT;
+    unsigned half = c.window / 2u > 4 ? c.window / 2u : 4;
+    unsigned staging = c.window < half ? c.window : half;
+    staging = staging < STAGING_MOST ? staging : STAGING_MOST;
     c.message_max = (uint16_t)or_default(c.message_max, LINK_MESSAGE_MAX);
     c.frame_payload = (uint16_t)or_default(c.frame_payload, c.message_max);
     c.staging = (uint16_t)or_default(c.staging, staging);

@@ -7,8 +7,8 @@
  * slots of `frame_payload` bytes each way, one message less one slot so that a
  * message of several frames lies in one piece, and two staging buffers of
  * `staging` encoded frames.  Credits are the receiver's free slots, so nothing
- * is ever received that has no place.  Work: link_poll handles at most `window`
- * frames each way, and calls the pipe at most twice `window` times.
+ * is ever received that has no place.  Work: link_poll handles at most window +
+ * 2 frames each way, and calls the pipe at most 2 window + 5 times.
  *
  *     link_init(&link, memory, bytes, &config);
  *     link_poll(&link, now_us);
@@ -107,7 +107,7 @@ struct link_config {
     uint16_t window;         /* frames a direction, 1 .. LINK_WINDOW_MAX */
     uint16_t message_max;    /* bytes; default LINK_MESSAGE_MAX */
     uint16_t frame_payload;  /* bytes; default: a message a frame */
-    uint16_t staging;        /* frames; default min(window, 8) */
+    uint16_t staging;        /* frames; default half a window, 4 to 8 */
     uint32_t timeout_min_us; /* retransmission: 100 ms, */
     uint32_t timeout_max_us; /* and 1 s; a slow line wants less */
     uint32_t ack_delay_us;   /* of acknowledgements; 5 ms */
