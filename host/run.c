@@ -153,14 +153,19 @@ static uint64_t memory_needed(const struct host_run_options *options,
     return memory;
 }
 
-static int check_memory(const struct host_run_options *options,
-                        const struct host_order *order, unsigned dimension,
+/* bricks, cells: of the order, where it is known; else 1 and none. */
+static int check_memory(const struct host_run_options *options, unsigned nodes,
+                        uint32_t bricks, const uint32_t cells[3],
                         struct host_error *error)
 {
     struct incode_setup setup = {0};
-    setup.bricks = order->bricks;
+    unsigned dimension = 0;
+    while (1u << dimension < nodes) {
+        dimension++;
+    }
+    setup.bricks = bricks;
     setup.index = (uint8_t)options->index;
-    memcpy(setup.cells, order->cells, sizeof setup.cells);
+    memcpy(setup.cells, cells, sizeof setup.cells);
     uint64_t needed = memory_needed(options, dimension, &setup);
     return needed <= options->memory
                ? 0
@@ -168,7 +173,7 @@ static int check_memory(const struct host_run_options *options,
                            "--memory %lluK: index %s on %u nodes needs at "
                            "least %lluK; give that, or another --index",
                            (unsigned long long)options->memory / 1024,
-                           host_index_name(options->index), 1u << dimension,
+                           host_index_name(options->index), nodes,
                            (unsigned long long)needed / 1024);
 }
 
@@ -189,7 +194,8 @@ int host_triangulate(const struct host_run_options *options,
     nodes.memory = options->memory;
     nodes.window = options->window;
     nodes.program = options->node_program;
-    if (host_cluster_start(&cluster, &nodes, error) != 0) {
+    if (check_memory(options, result->nodes, 1, order.cells, error) != 0 ||
+        host_cluster_start(&cluster, &nodes, error) != 0) {
         return error->code;
     }
     service.cluster = &cluster;
@@ -211,7 +217,8 @@ int host_triangulate(const struct host_run_options *options,
         result->rows = order.rows;
         result->points = order.points;
         result->duplicates = order.duplicates;
-        status = check_memory(options, &order, cluster.dimension, error);
+        status = check_memory(options, result->nodes, order.bricks, order.cells,
+                              error);
     }
     if (status == 0) {
         status = run_service(options, &order, &cluster, &service, tets, result,

@@ -51,10 +51,26 @@ static struct cube_config configure(const struct node_identity *identity,
     return config;
 }
 
+/* Stands in for the links of a node that is only measured. */
+static int nowhere(void *context, const uint8_t *bytes, size_t size)
+{
+    (void)context, (void)bytes, (void)size;
+    return 0;
+}
+
+static int nothing(void *context, uint8_t *bytes, size_t size)
+{
+    (void)context, (void)bytes, (void)size;
+    return 0;
+}
+
 size_t node_arena_needed(const struct node_identity *identity, size_t memory,
                          const struct incode_setup *setup)
 {
     struct cube_config config = configure(identity, memory);
+    for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
+        config.pipes[d] = (struct link_pipe){NULL, nowhere, nothing};
+    }
     return up64(sizeof(struct node)) + up64(cube_arena_bytes(&config)) +
            node_worker_outbox_bytes(memory) + incode_arena_min(setup);
 }
