@@ -9,7 +9,7 @@
 enum {
     SAMPLE_MAX = 256,     /* items looked at to choose a pivot */
     SORT_MAX = 16,        /* fewer items than this are sorted by insertion */
-    FORK_ITEMS = 1 << 15, /* fewer items than this are not worth a thread */
+    FORK_ITEMS = 1 << 13, /* fewer items than this are not worth a thread */
 };
 
 void host_arrange_box(const struct host_item *items, size_t n, double lo[3],

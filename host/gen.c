@@ -121,13 +121,21 @@ static uint64_t side_for(uint64_t n, uint64_t times, uint64_t by)
     return side;
 }
 
+static void lattice(uint64_t i, uint64_t side, double c[3])
+{
+    uint64_t row = i / side, layer = row / side;
+    c[0] = (double)(i % side);
+    c[1] = (double)(row % side);
+    c[2] = (double)layer;
+}
+
 static void grid(struct maker *m)
 {
     uint64_t side = side_for(m->n, 1, 1), i = 0;
-    while (put(m, (double)(i % side), (double)(i / side % side),
-               (double)(i / side / side))) {
-        i++;
-    }
+    double c[3];
+    do {
+        lattice(i++, side, c);
+    } while (put(m, c[0], c[1], c[2]));
 }
 
 /* The same out of its axes, by the rotation of the quaternion (4, 1, 2, 3):
@@ -137,15 +145,13 @@ static void rotated(struct maker *m)
     static const double rotation[3][3] = {
         {4, -20, 22}, {28, 10, 4}, {-10, 20, 20}};
     uint64_t side = side_for(m->n, 1, 1), i = 0;
-    double p[3];
+    double p[3], c[3];
     do {
-        double c[3] = {(double)(i % side), (double)(i / side % side),
-                       (double)(i / side / side)};
+        lattice(i++, side, c);
         for (int d = 0; d < 3; d++) {
             const double *row = rotation[d];
             p[d] = (row[0] * c[0] + row[1] * c[1] + row[2] * c[2]) / 30;
         }
-        i++;
     } while (put(m, p[0], p[1], p[2]));
 }
 
@@ -165,7 +171,8 @@ static void bluntfin(struct maker *m)
         double z = 6 * stretched((double)k / (double)(nj - 1));
         for (uint64_t ij = 0; ij < ni * nj && more; ij++) {
             double along = (double)(ij % ni) / (double)(ni - 1);
-            double out = (double)(ij / ni) / (double)(nj - 1);
+            uint64_t row = ij / ni;
+            double out = (double)row / (double)(nj - 1);
             double r = 0.5 + 8 * stretched(out), x, y;
             if (along < 0.5) { /* a quarter circle about the nose */
                 double t = 2 * along;

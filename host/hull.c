@@ -306,7 +306,7 @@ static void check_winding(struct check *c)
             return;
         }
     }
-    for (uint64_t i = 0; i < DIRECTIONS; i++) {
+    for (uint64_t i = 0; i < DIRECTIONS && c->hull->count > 0; i++) {
         uint32_t v[3];
         size_t facet = (size_t)(mix(i + 77) % c->hull->count);
         outward(c, facet, v);

@@ -65,7 +65,7 @@ static uint64_t bits_at(const uint8_t *from, size_t bytes, bool big)
 
 static int64_t extended(uint64_t bits, size_t bytes)
 {
-    uint64_t sign = UINT64_C(1) << (8 * bytes - 1);
+    uint64_t sign = bytes == 0 ? 0 : UINT64_C(1) << (8 * bytes - 1);
     return (int64_t)((bits ^ sign) - sign);
 }
 

@@ -10,7 +10,7 @@
 #include "parallel.h"
 #include "unique.h"
 
-enum { FORK_POINTS = 1 << 15 };
+enum { FORK_POINTS = 1 << 13 };
 
 /* Vertex numbers of all bricks must stay below INCODE_NONE. */
 static const uint64_t bricks_max = (UINT64_C(1) << 26) - 1024;
@@ -45,7 +45,7 @@ static void cut_regions(void *argument)
     struct cut *c = argument;
     struct host_item *items = c->items + c->first;
     if (c->regions == 1) {
-        struct host_region *r = &c->order->region[c->region];
+        struct host_region *r = c->order->region + c->region;
         r->points = (uint32_t)c->n;
         memcpy(r->lo, c->lo, sizeof r->lo);
         memcpy(r->hi, c->hi, sizeof r->hi);
@@ -391,8 +391,7 @@ int host_order_make(struct host_order *order, const char *where,
     order->region = calloc(regions, sizeof *order->region);
     if (order->region == NULL) {
         host_fail_memory(error, "the regions");
-    }
-    if (error->code == 0) {
+    } else if (error->code == 0) {
         arrange_items(order, unique.items, partition, error);
     }
     host_unique_free(&unique);

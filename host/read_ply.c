@@ -160,7 +160,7 @@ static int take_number(struct ply *ply, enum host_number type, uint64_t row,
 static int take_list(struct ply *ply, const struct property *p, uint64_t row,
                      struct host_error *error)
 {
-    double count, skipped;
+    double count = 0, skipped;
     if (take_number(ply, p->count, row, &count, error) != 0) {
         return error->code;
     }
@@ -169,7 +169,7 @@ static int take_list(struct ply *ply, const struct property *p, uint64_t row,
                                 "a list of impossible length; the file is "
                                 "damaged, get it again");
     }
-    for (double i = 0; i < count; i++) {
+    for (uint64_t i = (uint64_t)count; i > 0; i--) {
         if (take_number(ply, p->type, row, &skipped, error) != 0) {
             return error->code;
         }

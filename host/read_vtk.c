@@ -9,7 +9,7 @@
 #include "stream.h"
 
 /* Points that a few words may imply: a damaged file shall not fill memory. */
-static const uint64_t grid_max = UINT64_C(1) << 24;
+static const uint64_t grid_max = UINT64_C(1) << 22;
 
 struct vtk {
     const struct host_source *source;
@@ -151,16 +151,16 @@ static int append_grid(struct vtk *vtk, const uint64_t n[3],
     }
     if (points == 0 || points > grid_max) {
         return damaged(vtk, error,
-                       "the grid has no point or more than 2^24; correct its "
+                       "the grid has no point or more than 2^22; correct its "
                        "dimensions, or list the points");
     }
-    bool axes = vtk->axis[0] != NULL;
     for (uint64_t i = 0; i < points; i++) {
         uint64_t at[3] = {i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
         double xyz[3];
         for (int d = 0; d < 3; d++) {
-            xyz[d] = axes ? vtk->axis[d][at[d]]
-                          : vtk->origin[d] + (double)at[d] * vtk->spacing[d];
+            xyz[d] = vtk->axis[d] != NULL
+                         ? vtk->axis[d][at[d]]
+                         : vtk->origin[d] + (double)at[d] * vtk->spacing[d];
         }
         if (host_points_append(vtk->mesh->points, xyz, 1, error) != 0) {
             return error->code;

@@ -131,7 +131,7 @@ struct sort {
 /* A first word with about half of the rows below it. */
 static uint32_t middle(row_t *v, size_t n)
 {
-    uint32_t key[SAMPLE];
+    uint32_t key[SAMPLE] = {0};
     for (size_t i = 0; i < SAMPLE; i++) {
         uint32_t k = v[n / SAMPLE * i][0];
         size_t j = i;

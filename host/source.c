@@ -154,7 +154,7 @@ static int unpack(struct host_source *source, struct host_error *error)
         return host_source_fail(source, error,
                                 "more than 4 GiB packed; unpack it first");
     }
-    z.next_in = (z_const Bytef *)(uintptr_t)source->data;
+    z.next_in = (z_const Bytef *)source->data;
     z.avail_in = (uInt)source->bytes;
     if (inflateInit2(&z, 15 + 16) != Z_OK) {
         return host_fail_memory(error, "unpacking");

@@ -95,8 +95,8 @@ static int take_cell(struct host_stream *connectivity, uint64_t size,
                      uint64_t type, uint64_t first,
                      struct host_tetrahedra *tets, struct host_error *error)
 {
-    if (type != VTK_TETRA && type <= VTK_QUAD) {
-        return host_stream_skip(connectivity, size, error); /* no volume */
+    if (type <= VTK_QUAD) { /* as numbered, all cells without volume */
+        return host_stream_skip(connectivity, size, error);
     }
     if (type != VTK_TETRA || size != 4) {
         return host_fail(error, HOST_INPUT,
@@ -106,7 +106,7 @@ static int take_cell(struct host_stream *connectivity, uint64_t size,
                          (unsigned long long)tets->count,
                          (unsigned long long)type);
     }
-    uint64_t v[4];
+    uint64_t v[4] = {0};
     for (int k = 0; k < 4; k++) {
         if (host_stream_whole(connectivity, &v[k], error) != 0) {
             return error->code;
@@ -123,7 +123,7 @@ int host_stream_cells(struct host_stream *connectivity,
 {
     uint64_t from = 0;
     for (; cells > 0; cells--) {
-        uint64_t type, size;
+        uint64_t type = 0, size = 0;
         if (host_stream_whole(types, &type, error) != 0 ||
             host_stream_whole(offsets == NULL ? connectivity : offsets, &size,
                               error) != 0) {

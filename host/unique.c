@@ -9,7 +9,7 @@
 
 enum {
     AHEAD = 16, /* rows hashed ahead, so that their slots come from memory */
-    FORK_ROWS = 1 << 15,
+    FORK_ROWS = 1 << 13,
     PARTS_MAX = 16
 };
 
@@ -220,6 +220,7 @@ void host_unique_free(struct host_unique *unique)
     *unique = (struct host_unique){0};
 }
 
+/* NOLINTNEXTLINE(readability-non-const-parameter): the threads write it */
 uint64_t host_unique_rows(const double *xyz, uint64_t rows, uint32_t *lowest)
 {
     struct search s = {.xyz = xyz, .rows = rows, .lowest = lowest};

@@ -261,6 +261,9 @@ static void write_vtu(struct host_output *out, const struct host_points *points,
     size_t word = 4 * m < INT32_MAX && n < INT32_MAX ? 4 : 8;
     const char *type = word == 4 ? "Int32" : "Int64";
     uint64_t bytes[4] = {24 * n, 4 * m * word, m * word, m};
+    uint64_t at[3] = {8 + bytes[0]}; /* past a length and its bytes */
+    at[1] = at[0] + 8 + bytes[1];
+    at[2] = at[1] + 8 + bytes[2];
     char text[1600];
     (void)snprintf(
         text, sizeof text,
@@ -281,9 +284,8 @@ static void write_vtu(struct host_output *out, const struct host_points *points,
         "</Cells>\n</Piece>\n</UnstructuredGrid>\n"
         "<AppendedData encoding=\"raw\">\n_",
         (unsigned long long)n, (unsigned long long)m, type,
-        (unsigned long long)(8 + bytes[0]), type,
-        (unsigned long long)(16 + bytes[0] + bytes[1]),
-        (unsigned long long)(24 + bytes[0] + bytes[1] + bytes[2]));
+        (unsigned long long)at[0], type, (unsigned long long)at[1],
+        (unsigned long long)at[2]);
     host_output_text(out, text);
     write_word(out, bytes[0], 8);
     for (uint64_t i = 0; i < 3 * n; i++) {
@@ -318,9 +320,9 @@ static void write_vtk(struct host_output *out, const struct host_points *points,
     for (uint64_t i = 0; i < 3 * points->count; i++) {
         write_double(out, points->xyz[i] + 0.0, true);
     }
+    unsigned long long words = 5 * tets->count;
     (void)snprintf(text, sizeof text, "\nCELLS %llu %llu\n",
-                   (unsigned long long)tets->count,
-                   (unsigned long long)(5 * tets->count));
+                   (unsigned long long)tets->count, words);
     host_output_text(out, text);
     for (uint64_t i = 0; i < tets->count; i++) {
         write_big(out, 4, 4);

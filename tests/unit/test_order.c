@@ -359,7 +359,8 @@ static void flat_input_is_refused(void **unused)
     struct host_error error = {0};
     double xyz[3 * 200];
     for (int i = 0; i < 200; i++) {
-        double t = i / 2; /* in pairs: 100 distinct ones */
+        int pair = i / 2; /* 100 distinct ones */
+        double t = pair;
         xyz[3 * i] = t, xyz[3 * i + 1] = 2 * t, xyz[3 * i + 2] = 3 * t;
     }
     assert_int_equal(host_order_make(&order, "a.xyz", xyz, 200, HOST_UNIFORM, 4,

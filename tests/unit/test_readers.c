@@ -190,7 +190,8 @@ static void numbers_are_correctly_rounded(void **unused)
         struct host_error error = {0};
         assert_int_equal(
             host_points_parse("a.xyz", b->data, b->n, &points, &error), 0);
-        if (memcmp(points.xyz, &expected, sizeof expected) != 0) {
+        if (points.xyz[0] != expected ||
+            signbit(points.xyz[0]) != signbit(expected)) {
             fail_msg("%s: %.17g, not %.17g", text, points.xyz[0], expected);
         }
         host_points_free(&points);
@@ -466,7 +467,7 @@ static void vtk_legacy(void **unused)
     refused("a.vtk",
             "# vtk DataFile Version 2.0\nt\nASCII\n"
             "DATASET STRUCTURED_POINTS\nDIMENSIONS 99999 99999 99999\n",
-            "more than 2^24");
+            "more than 2^22");
 }
 
 /* One VTK XML file with its points coded in one of five ways. */
@@ -608,7 +609,9 @@ static void packed_files(void **unused)
         z_stream z;
         memset(&z, 0, sizeof z);
         assert_int_equal(deflateInit2(&z, 6, Z_DEFLATED, 15 + 16, 8, 0), Z_OK);
-        z.next_in = (z_const Bytef *)(uintptr_t)(text + 11 * member);
+        uint8_t plain[64];
+        memcpy(plain, text, strlen(text) + 1);
+        z.next_in = plain + 11 * member;
         z.avail_in = member == 0 ? 11 : (uInt)strlen(text) - 11;
         z.next_out = b.data + b.n;
         z.avail_out = 1000;
@@ -660,13 +663,14 @@ static void files_that_are_not_there(void **unused)
 static void real_data(void **unused)
 {
     (void)unused;
-    struct host_points points;
+    struct host_points points = {0};
     struct host_error error = {0};
     if (!reference_data("bluntfin.xyz.gz", &points)) {
         print_message("bluntfin.xyz.gz: not there\n");
         skip();
     }
     assert_int_equal(points.count, 40960);
+    assert_non_null(points.xyz);
     /* as the original: big-endian single precision PLOT3D, 40 x 32 x 32 */
     size_t bytes = 12 + 12 * 40960;
     struct bytes b = {.n = 0};
