@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "scale.h"
+#include "tie.h"
 
 /* cppcheck-suppress shiftNegativeLHS */
 _Static_assert((-1 >> 1) == -1, "shifts of negative numbers keep the sign");
@@ -60,6 +61,23 @@ bool incode_fixed_differences(int64_t d[][3], const double *const p[],
     default:
         return differences(d, p, 4, origin, &s);
     }
+}
+
+/* For incode_tie: the four points and the origin in order. */
+static uint32_t rank(const int64_t d[4][3])
+{
+    static const int64_t zero[3] = {0, 0, 0};
+    uint32_t above = 0;
+    for (int i = 0; i < 5; i++) {
+        for (int j = i + 1; j < 5; j++) {
+            const int64_t *a = d[i], *b = j < 4 ? d[j] : zero;
+            int larger = (a[0] > b[0]) |
+                         ((a[0] == b[0]) &
+                          ((a[1] > b[1]) | ((a[1] == b[1]) & (a[2] > b[2]))));
+            above += INCODE_TIE_ABOVE(i, j, larger);
+        }
+    }
+    return above;
 }
 
 /* ---- 32-bit words ---- */
@@ -182,11 +200,12 @@ int incode_fixed_orient3d_portable(const int64_t d[3][3])
     return words_sign(det, 6);
 }
 
-int incode_fixed_in_sphere_portable(const int64_t d[4][3], int swapped[4])
+int incode_fixed_in_sphere_portable(const int64_t d[4][3])
 {
     static const uint8_t rest[4][3] = {
         {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
     uint32_t det[10] = {0};
+    int cofactor[5];
     for (int i = 0; i < 4; i++) {
         words4 lift = {0};
         words6 minor;
@@ -194,11 +213,15 @@ int incode_fixed_in_sphere_portable(const int64_t d[4][3], int swapped[4])
         for (int k = 0; k < 3; k++)
             accumulate_product(lift, d[i][k], d[i][k], false);
         minor3_portable(minor, d[rest[i][0]], d[rest[i][1]], d[rest[i][2]]);
-        swapped[i] = words_sign(minor, 6);
+        cofactor[i] = words_sign(minor, 6);
         product(term, lift, 4, minor, 6);
         accumulate(det, term, 10, false);
     }
-    return words_sign(det, 10);
+    int sign = words_sign(det, 10);
+    if (sign != 0)
+        return sign;
+    cofactor[4] = -1;
+    return incode_tie(rank(d), cofactor);
 }
 
 /* ---- 64-bit words ---- */
@@ -280,7 +303,7 @@ static inline void add_lifted(struct columns *s, const int64_t d[3],
     s->c[4] += p12 >> 64;
 }
 
-static int in_sphere_long(const int64_t d[4][3], int swapped[4])
+static int in_sphere_long(const int64_t d[4][3])
 {
     const int64_t *a = d[0], *b = d[1], *c = d[2], *e = d[3];
     i128 ab = minor2(a, b), bc = minor2(b, c), ce = minor2(c, e);
@@ -299,16 +322,34 @@ static int in_sphere_long(const int64_t d[4][3], int swapped[4])
         any |= (uint64_t)carry;
         carry >>= 64;
     }
-    if (any == 0 && carry == 0) {
-        for (int i = 0; i < 4; i++)
-            swapped[i] = sign_of(m[i]);
-    }
-    return carry < 0 ? -1 : any != 0 || carry > 0;
+    if (any != 0 || carry != 0)
+        return carry < 0 ? -1 : 1;
+    int cofactor[5] = {sign_of(m[0]), sign_of(m[1]), sign_of(m[2]),
+                       sign_of(m[3]), -1};
+    return incode_tie(rank(d), cofactor);
 }
 
-/* For |d[i][j]| < 2^24: minors of two below 2^49, of three below 2^75, lifts
- * below 2^50, the determinant below 2^127. */
-static int in_sphere_short(const int64_t d[4][3], int swapped[4])
+/* As rank, for |d[i][j]| < 2^31: a point is one number, x the highest digit. */
+static uint32_t rank_short(const int64_t d[4][3])
+{
+    i128 key[5];
+    uint32_t above = 0;
+    for (int i = 0; i < 4; i++) {
+        int64_t low = d[i][1] * 0x100000000 + d[i][2];
+        key[i] = (i128)d[i][0] * ((i128)1 << 64) + low;
+    }
+    key[4] = 0;
+    for (int i = 0; i < 5; i++) {
+        for (int j = i + 1; j < 5; j++)
+            above += INCODE_TIE_ABOVE(i, j, key[i] > key[j]);
+    }
+    return above;
+}
+
+/* For |d[i][j]| < 2^31 and |det| < 2^127: minors of two are below 2^63, of
+ * three below 2^96, lifts below 2^64; products keep what they have below
+ * 2^128, and the sum is right in the end. */
+static int in_sphere_short(const int64_t d[4][3])
 {
     int64_t ab = d[0][0] * d[1][1] - d[1][0] * d[0][1];
     int64_t bc = d[1][0] * d[2][1] - d[2][0] * d[1][1];
@@ -321,37 +362,40 @@ static int in_sphere_short(const int64_t d[4][3], int swapped[4])
                  times(ca, ez) - times(ea, cz) - times(ce, az),
                  times(ab, ez) + times(ea, bz) - times(eb, az),
                  -times(ab, cz) - times(ca, bz) - times(bc, az)};
-    i128 det = 0;
+    u128 sum = 0;
     for (int i = 0; i < 4; i++)
-        det +=
-            m[i] * (d[i][0] * d[i][0] + d[i][1] * d[i][1] + d[i][2] * d[i][2]);
-    if (det == 0) {
-        for (int i = 0; i < 4; i++)
-            swapped[i] = (m[i] > 0) - (m[i] < 0);
-    }
-    return (det > 0) - (det < 0);
+        sum += (u128)m[i] *
+               ((uint64_t)(d[i][0] * d[i][0]) + (uint64_t)(d[i][1] * d[i][1]) +
+                (uint64_t)(d[i][2] * d[i][2]));
+    i128 det = (i128)sum;
+    if (det != 0)
+        return det < 0 ? -1 : 1;
+    int cofactor[5];
+    for (int i = 0; i < 4; i++)
+        cofactor[i] = (m[i] > 0) - (m[i] < 0);
+    cofactor[4] = -1;
+    return incode_tie(rank_short(d), cofactor);
 }
 
-int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4])
+int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero)
 {
     uint64_t ones = 0, bits = 0;
     for (int i = 0; i < 4; i++) {
         for (int k = 0; k < 3; k++) {
             ones |= (uint64_t)d[i][k];
-            bits |= (uint64_t)(d[i][k] < 0 ? ~d[i][k] : d[i][k]);
+            bits |= (uint64_t)(d[i][k] < 0 ? -d[i][k] : d[i][k]);
         }
     }
-    if (ones == 0)
-        return swapped[0] = swapped[1] = swapped[2] = swapped[3] = 0;
-    int zeros = __builtin_ctzll(ones);
-    if (bits >> zeros >> 24 != 0)
-        return in_sphere_long(d, swapped);
+    int zeros = ones == 0 ? 0 : __builtin_ctzll(ones);
+    /* 4 * 6 * 3 * 2^(5 * 24) < 2^127, and 2^(5 * 31 - 41) is. */
+    if (bits >> zeros >> (near_zero ? 31 : 24) != 0)
+        return in_sphere_long(d);
     int64_t n[4][3];
     for (int i = 0; i < 4; i++) {
         for (int k = 0; k < 3; k++)
             n[i][k] = d[i][k] >> zeros;
     }
-    return in_sphere_short((const int64_t(*)[3])n, swapped);
+    return in_sphere_short((const int64_t(*)[3])n);
 }
 
 #else
@@ -361,9 +405,10 @@ int incode_fixed_orient3d(const int64_t d[3][3])
     return incode_fixed_orient3d_portable(d);
 }
 
-int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4])
+int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero)
 {
-    return incode_fixed_in_sphere_portable(d, swapped);
+    (void)near_zero;
+    return incode_fixed_in_sphere_portable(d);
 }
 
 #endif

@@ -3,7 +3,7 @@
  * grids, and doubles at most 61 binary places below the largest difference).
  * True zeros cost here no more than other signs.
  *
- * Memory: under 1 KB of stack.  Work: 12 (orient3d) or 72 (in_sphere)
+ * Memory: under 1 KB of stack.  Work: 12 (orient3d) or 44 to 72 (in_sphere)
  * products of 64-bit words.
  *
  *     int64_t d[3][3];
@@ -25,10 +25,13 @@ bool incode_fixed_differences(int64_t d[][3], const double *const p[],
 /* Sign of det(d), exact for |d[i][j]| <= 2^61. */
 int incode_fixed_orient3d(const int64_t d[3][3]);
 
-/* Sign of -det with rows (d[i], |d[i]|^2), exact for |d[i][j]| <= 2^61.  Where
- * it is 0, swapped[i] is the sign of orient3d with the origin in place of the
- * i-th point: the symbolic perturbation asks for it. */
-int incode_fixed_in_sphere(const int64_t d[4][3], int swapped[4]);
+/* Sign of -det with rows (d[i], |d[i]|^2), exact for |d[i][j]| <= 2^61, never
+ * 0: in_sphere of the origin, ties broken as in tie.h.  Precondition: the four
+ * points and the origin are distinct, orient3d of the four is positive.
+ * `near_zero`: the caller knows |det| to be below 2^-41 times the fifth power
+ * of the largest |d[i][j]|, as it is where the static filter failed; one word
+ * then holds what otherwise takes two. */
+int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero);
 
 /* Sign of |d[0]|^2 - |d[1]|^2, exact for |d[i][j]| <= 2^61. */
 int incode_fixed_compare_norm(const int64_t d[2][3]);
@@ -39,6 +42,6 @@ bool incode_fixed_parallel(const int64_t d[2][3]);
 /* The first two from 32-bit words alone, for processors without a 128-bit
  * product; on the others they are there for comparison. */
 int incode_fixed_orient3d_portable(const int64_t d[3][3]);
-int incode_fixed_in_sphere_portable(const int64_t d[4][3], int swapped[4]);
+int incode_fixed_in_sphere_portable(const int64_t d[4][3]);
 
 #endif

@@ -3,6 +3,7 @@
 #include "exact.h"
 #include "fixed.h"
 #include "pair.h"
+#include "tie.h"
 
 /* Each sign comes from the first stage that is sure of it:
  *   the rounded determinant and a bound on its error (static filter);
@@ -74,57 +75,37 @@ int incode_lexicographic(const double a[3], const double b[3])
     return higher(a, b) - higher(b, a);
 }
 
-/* The two lexicographically largest of five distinct points, largest first:
- * each is compared with each, since branches would be mispredicted. */
-static void two_largest(const double *const p[5], int m[2])
+/* Five cospherical points where no stage has told on the way: see tie.h. */
+static int in_sphere_tie(struct incode_tally *tally, const double *const p[5])
 {
-    int above[5] = {0};
+    uint32_t above = 0;
+    int cofactor[5];
     for (int i = 0; i < 5; i++) {
-        for (int j = i + 1; j < 5; j++) {
-            int up = higher(p[i], p[j]);
-            above[i] += up;
-            above[j] += 1 - up;
-        }
+        for (int j = i + 1; j < 5; j++)
+            above += INCODE_TIE_ABOVE(i, j, higher(p[i], p[j]));
     }
-    m[0] = m[1] = 0;
-    for (int i = 1; i < 5; i++) {
-        m[0] = above[i] == 4 ? i : m[0];
-        m[1] = above[i] == 3 ? i : m[1];
-    }
-}
-
-/* Signs of orient3d(p0..p3) with p4 in place of each. */
-static void swapped_orientations(struct incode_tally *tally,
-                                 const double *const p[5], int swapped[4])
-{
     for (int i = 0; i < 4; i++) {
         const double *q[4] = {p[0], p[1], p[2], p[3]};
         q[i] = p[4];
-        swapped[i] = incode_orient3d(tally, q[0], q[1], q[2], q[3]);
+        cofactor[i] = incode_orient3d(tally, q[0], q[1], q[2], q[3]);
     }
+    cofactor[4] = -1;
+    return incode_tie(above, cofactor);
 }
 
-/* p[4] is the query.  Five cospherical points: the larger one, the more its
- * lift is raised, so the largest decides unless the others are coplanar. */
+/* p[4] is the query, `near_zero` as in fixed.h. */
 static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
-                           double most)
+                           double most, bool near_zero)
 {
     int64_t n[4][3];
-    int swapped[4], m[2], sign;
-    bool fixed = incode_fixed_differences(n, p, 4, p[4], most);
-    if (fixed)
-        sign = incode_fixed_in_sphere((const int64_t(*)[3])n, swapped);
-    else if (!incode_pair_in_sphere(p, most, &sign))
-        sign = incode_exact_in_sphere(p);
+    int sign;
     tally->exact_in_sphere++;
-    if (sign != 0)
+    if (incode_fixed_differences(n, p, 4, p[4], most))
+        return incode_fixed_in_sphere((const int64_t(*)[3])n, near_zero);
+    if (incode_pair_in_sphere(p, most, &sign))
         return sign;
-    two_largest(p, m);
-    if (!fixed && m[0] != 4)
-        swapped_orientations(tally, p, swapped);
-    if (m[0] != 4 && swapped[m[0]] != 0)
-        return swapped[m[0]];
-    return m[0] == 4 || m[1] == 4 ? -1 : swapped[m[1]];
+    sign = incode_exact_in_sphere(p);
+    return sign != 0 ? sign : in_sphere_tie(tally, p);
 }
 
 int incode_in_sphere(struct incode_tally *tally, const double a[3],
@@ -150,7 +131,8 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
     double det = aw * bcd - bw * acd + (cw * abd - dw * abc);
     double least = mx < my ? mx : my, most = larger(mx, larger(my, mz));
     least = least < mz ? least : mz;
-    if (least > 1e-58 && most < 1e61) {
+    bool in_range = least > 1e-58 && most < 1e61;
+    if (in_range) {
         double bound = in_sphere_bound * mx * my * mz * (most * most);
         if (det > bound)
             return 1;
@@ -158,7 +140,7 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
             return -1;
     }
     const double *p[5] = {a, b, c, d, e};
-    return in_sphere_exact(tally, p, most);
+    return in_sphere_exact(tally, p, most, in_range);
 }
 
 /* Differences of two points from the third, as rounded, and the largest. */

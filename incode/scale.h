@@ -1,4 +1,4 @@
-/* Multiplication by a power of two that brings numbers near 2^61, whatever
+/* Multiplication by a power of two that brings numbers near 2^60, whatever
  * their exponents: exact, but for what falls below the least double on the way
  * down.
  *
@@ -27,7 +27,7 @@ static inline double incode_power_of_two(int32_t e)
     return value;
 }
 
-/* Scales what is at most `most` >= 0 to less than 2^61.  False near overflow:
+/* Scales what is at most `most` >= 0 to less than 2^60.  False near overflow:
  * from 2^1022 on. */
 static inline bool incode_scale_init(struct incode_scale *s, double most)
 {
@@ -37,7 +37,7 @@ static inline bool incode_scale_init(struct incode_scale *s, double most)
     if (e > 2044)
         return false;
     /* most < 2^(e-1022); denormals (e = 0) are below 2^-1022. */
-    int32_t k = 1083 - (e == 0 ? 1 : e), half = k / 2;
+    int32_t k = 1082 - (e == 0 ? 1 : e), half = k / 2;
     s->up1 = incode_power_of_two(half);
     s->up2 = incode_power_of_two(k - half);
     s->down1 = incode_power_of_two(-half);

@@ -170,7 +170,7 @@ static void hard_points(uint64_t *seed, enum hard_family family, double p[5][3])
             if (family == HARD_LARGE_GRID) {
                 scale = ldexp(1, 1 + hard_below(seed, 40));
                 lo[k] = floor(lo[k] * scale);
-                hi[k] = lo[k] + 1 + floor(hi[k] * 16);
+                hi[k] = lo[k] + 1 + floor(ldexp(hi[k], hard_below(seed, 32)));
             } else if (family == HARD_FLOATS) {
                 lo[k] = (float)(10 * lo[k]);
                 hi[k] = (float)(lo[k] + 0.1 * hi[k]);
