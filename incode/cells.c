@@ -222,9 +222,16 @@ static enum incode_walk finish_piece(struct incode_cells *c,
 
 /* ---- shells ---- */
 
+/* Layers or rows from first to end that have been tested, one bit each. */
+struct tested {
+    uint32_t first, end, mask;
+};
+
 struct shell {
     struct range outer[3], inner[3];
-    struct lane_boxes box; /* the first lane: of the row, then the piece */
+    double lo[3], hi[3];        /* of outer, in coordinates */
+    struct lane_boxes box;      /* the first lane: of a piece */
+    struct tested rows, layers; /* rows: of this layer */
     uint32_t work;
 };
 
@@ -251,10 +258,11 @@ static enum incode_walk next_piece(struct incode_cells *c,
         }
         if (crosses && c->x < s->inner[0].first)
             last = s->inner[0].first - 1;
-        for (;;) {
+        bool whole = c->x == s->outer[0].first && last == s->outer[0].last;
+        for (;; whole = false) {
             set_range(&s->box, g, 0, (struct range){c->x, last});
             s->work++;
-            if (passing(q, &s->box, 1) == 0)
+            if (!whole && passing(q, &s->box, 1) == 0)
                 break;
             uint32_t from, to;
             if (!get_word(g, base, row + c->x, &from, &q->missing) ||
@@ -275,17 +283,39 @@ static enum incode_walk next_piece(struct incode_cells *c,
     return INCODE_WALK_STOP;
 }
 
+/* Whether the question concerns layer or row i (d: 2 or 1) of the shell; eight
+ * are tested at once, and what is found later can only leave fewer. */
+static bool passes(const struct incode_grid *g, const struct incode_query *q,
+                   struct shell *s, struct tested *tested, int d, uint32_t i)
+{
+    if (i >= tested->first && i < tested->end)
+        return (tested->mask >> (i - tested->first) & 1) != 0;
+    struct lane_boxes boxes;
+    uint32_t left = s->outer[d].last - i + 1;
+    uint32_t count = left < LANES ? left : LANES;
+    for (uint32_t k = 0; k < LANES; k++) {
+        for (int e = 0; e < 3; e++) {
+            boxes.lo[e][k] = e > d ? s->box.lo[e][0] : s->lo[e];
+            boxes.hi[e][k] = e > d ? s->box.hi[e][0] : s->hi[e];
+        }
+        uint32_t at = i + (k < count ? k : 0);
+        boxes.lo[d][k] = floor_of(g, d, at);
+        boxes.hi[d][k] = ceiling_of(g, d, at);
+    }
+    tested->first = i;
+    tested->end = i + count;
+    tested->mask = passing(q, &boxes, count);
+    s->work++;
+    return (tested->mask & 1) != 0;
+}
+
 static enum incode_walk run_row(struct incode_cells *c,
                                 const struct incode_grid *g,
                                 struct incode_query *q, struct shell *s)
 {
+    if (c->x == s->outer[0].first && !passes(g, q, s, &s->rows, 1, c->y))
+        return INCODE_WALK_DONE;
     set_range(&s->box, g, 1, (struct range){c->y, c->y});
-    if (c->x == s->outer[0].first) {
-        set_range(&s->box, g, 0, s->outer[0]);
-        s->work++;
-        if (passing(q, &s->box, 1) == 0)
-            return INCODE_WALK_DONE;
-    }
     for (;;) {
         enum incode_walk r = next_piece(c, g, q, s);
         if (r == INCODE_WALK_STOP)
@@ -302,14 +332,11 @@ static enum incode_walk run_layer(struct incode_cells *c,
                                   const struct incode_grid *g,
                                   struct incode_query *q, struct shell *s)
 {
+    if (c->y == s->outer[1].first && c->x == s->outer[0].first &&
+        !passes(g, q, s, &s->layers, 2, c->z))
+        return INCODE_WALK_DONE;
     set_range(&s->box, g, 2, (struct range){c->z, c->z});
-    if (c->y == s->outer[1].first && c->x == s->outer[0].first) {
-        set_range(&s->box, g, 0, s->outer[0]);
-        set_range(&s->box, g, 1, s->outer[1]);
-        s->work++;
-        if (passing(q, &s->box, 1) == 0)
-            return INCODE_WALK_DONE;
-    }
+    s->rows.end = 0;
     for (; c->y <= s->outer[1].last; c->y++) {
         enum incode_walk r = run_row(c, g, q, s);
         if (r == INCODE_WALK_DONE && s->work >= INCODE_CELLS_WORK)
@@ -330,6 +357,8 @@ static enum incode_walk run_shell(struct incode_cells *c,
     for (int d = 0; d < 3; d++) {
         s.outer[d] = range_of(c, g, d, c->reach);
         s.inner[d] = range_of(c, g, d, c->done);
+        s.lo[d] = floor_of(g, d, s.outer[d].first);
+        s.hi[d] = ceiling_of(g, d, s.outer[d].last);
     }
     enum incode_walk r = finish_piece(c, g, q, &s.work);
     for (; r == INCODE_WALK_DONE && c->z <= s.outer[2].last; c->z++) {
