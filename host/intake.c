@@ -127,8 +127,8 @@ static int take_finished(struct host_service *s,
 {
     struct host_node_report *report = &s->report[message->source];
     struct host_node *node = &s->node[message->source];
-    if (message->size != sizeof report->statistics) {
-        return unsound(message, "sent statistics of a wrong size", error);
+    if (message->size != sizeof report->statistics || report->finished) {
+        return unsound(message, "sent statistics out of turn", error);
     }
     memcpy(&report->statistics, message->data, sizeof report->statistics);
     if (message->source < s->workers &&
@@ -178,7 +178,8 @@ int host_intake(struct host_service *service,
         report->ready = true;
         return 0;
     case NODE_HERE:
-        service->here++;
+        service->here += !report->here;
+        report->here = true;
         return 0;
     case NODE_PAGE_REQUEST:
         return take_requests(service, message, error);

@@ -48,7 +48,7 @@ struct host_node {
 
 /* What remains of a node when the run is over. */
 struct host_node_report {
-    bool ready, finished;
+    bool here, ready, finished;
     struct node_ready_message map;
     struct node_finished_message statistics;
     uint64_t pages; /* that this node had from the host */
