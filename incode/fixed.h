@@ -1,6 +1,6 @@
 /* The predicates on integers: coordinate differences written as multiples of
  * one common power of two, which exact data of like exponents are (floats,
- * grids, and doubles at most 61 binary places below the largest difference).
+ * grids, and doubles at most 60 binary places below the largest difference).
  * True zeros cost here no more than other signs.
  *
  * Memory: under 1 KB of stack.  Work: 12 (orient3d) or 44 to 72 (in_sphere)
