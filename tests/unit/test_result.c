@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "../../node/result.h"
+#include "emulated.h"
 
 enum { BATCH = 1592, STARS = 4000, APEXES = 40 };
 
@@ -201,6 +202,10 @@ static double seconds(void)
 static void test_speed(void **unused)
 {
     (void)unused;
+    if (emulated()) {
+        print_message("no speed is to be had under valgrind\n");
+        skip();
+    }
     static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
     static uint32_t apexes[1024][7][3];
     struct node_result_writer writer;
