@@ -15,14 +15,6 @@ static uint32_t higher(uint32_t a, uint32_t b)
     return a < b ? b : a;
 }
 
-/* Vertex of a canonical row by ascending rank. */
-static uint32_t ranked(const uint32_t v[4], int rank)
-{
-    return rank < 2    ? v[rank]
-           : rank == 2 ? lower(v[2], v[3])
-                       : higher(v[2], v[3]);
-}
-
 /* first[p] .. first[p + 1]: where the tetrahedra with vertex p at `rank` stand
  * in `order` (NULL: only count). */
 static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
@@ -30,7 +22,7 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
 {
     const struct host_tetrahedra *tets = a->tets;
     for (uint64_t i = 0; i < tets->count; i++) {
-        first[ranked(tets->v[i], rank) + 1]++;
+        first[tets->v[i][rank] + 1]++;
     }
     for (uint32_t p = 0; p < a->vertices; p++) {
         first[p + 1] += first[p];
@@ -39,7 +31,7 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
         return;
     }
     for (uint64_t i = 0; i < tets->count; i++) {
-        order[first[ranked(tets->v[i], rank)]++] = (uint32_t)i;
+        order[first[tets->v[i][rank]]++] = (uint32_t)i;
     }
     memmove(first + 1, first, (size_t)a->vertices * sizeof *first);
     first[0] = 0;
@@ -47,7 +39,7 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
 
 int host_adjacency_make(struct host_adjacency *a,
                         const struct host_tetrahedra *tets, uint32_t vertices,
-                        bool edges, struct host_error *error)
+                        struct host_error *error)
 {
     *a = (struct host_adjacency){.tets = tets, .vertices = vertices};
     if (tets->count >= UINT32_MAX) {
@@ -60,21 +52,13 @@ int host_adjacency_make(struct host_adjacency *a,
     a->first_by_lowest = host_map(first);
     a->first_by_second = host_map(first);
     a->by_second = host_map(order);
-    if (edges) {
-        a->first_by_third = host_map(first);
-        a->by_third = host_map(order);
-    }
     if (a->first_by_lowest == NULL || a->first_by_second == NULL ||
-        a->by_second == NULL ||
-        (edges && (a->first_by_third == NULL || a->by_third == NULL))) {
+        a->by_second == NULL) {
         host_adjacency_free(a);
         return host_fail_memory(error, "the neighbours of the tetrahedra");
     }
     index_by(a, 0, a->first_by_lowest, NULL);
     index_by(a, 1, a->first_by_second, a->by_second);
-    if (edges) {
-        index_by(a, 2, a->first_by_third, a->by_third);
-    }
     return 0;
 }
 
@@ -85,9 +69,7 @@ void host_adjacency_free(struct host_adjacency *a)
         a->tets == NULL ? 0 : (size_t)a->tets->count * sizeof(uint32_t);
     host_unmap(a->first_by_lowest, first);
     host_unmap(a->first_by_second, first);
-    host_unmap(a->first_by_third, first);
     host_unmap(a->by_second, order);
-    host_unmap(a->by_third, order);
     *a = (struct host_adjacency){0};
 }
 
@@ -168,40 +150,6 @@ int host_adjacency_group(const struct host_adjacency *a, uint32_t p,
         add(group, v[2], v[3], a->by_second[j], 0);
     }
     sort_group(group);
-    return 0;
-}
-
-int host_adjacency_edges(const struct host_adjacency *a, uint32_t p,
-                         struct host_group *group, uint64_t *edges,
-                         struct host_error *error)
-{
-    uint32_t i = a->first_by_lowest[p], end = a->first_by_lowest[p + 1];
-    uint32_t j = a->first_by_second[p], last = a->first_by_second[p + 1];
-    uint32_t k = a->first_by_third[p], stop = a->first_by_third[p + 1];
-    size_t most = 3 * (size_t)(end - i) + 2 * (size_t)(last - j) + (stop - k);
-    if (reserve(group, most, error) != 0) {
-        return error->code;
-    }
-    for (; i < end; i++) {
-        const uint32_t *v = a->tets->v[i];
-        add(group, v[1], v[1], 0, 0);
-        add(group, v[2], v[2], 0, 0);
-        add(group, v[3], v[3], 0, 0);
-    }
-    for (; j < last; j++) {
-        const uint32_t *v = a->tets->v[a->by_second[j]];
-        add(group, v[2], v[2], 0, 0);
-        add(group, v[3], v[3], 0, 0);
-    }
-    for (; k < stop; k++) {
-        uint32_t r = ranked(a->tets->v[a->by_third[k]], 3);
-        add(group, r, r, 0, 0);
-    }
-    sort_group(group);
-    *edges = group->count > 0;
-    for (size_t n = 1; n < group->count; n++) {
-        *edges += group->facet[n].others != group->facet[n - 1].others;
-    }
     return 0;
 }
 

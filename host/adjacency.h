@@ -1,17 +1,15 @@
 /* Which tetrahedra share a facet, vertex by vertex: the facets whose lowest
  * vertex is p, sorted, so that twins stand side by side.
  *
- * Memory: 4 bytes a tetrahedron and 8 a vertex; with `edges` twice that.  Work:
- * two passes; a group of g facets O(g log g).
+ * Memory: 4 bytes a tetrahedron and 8 a vertex.  Work: two passes; a group of g
+ * facets O(g log g).
  *
- *     host_adjacency_make(&a, &tets, rows, false, &error);
+ *     host_adjacency_make(&a, &tets, rows, &error);
  *     n = host_adjacency_group(&a, p, &group, &error);
  *     host_adjacency_free(&a);
  */
 #ifndef HOST_ADJACENCY_H
 #define HOST_ADJACENCY_H
-
-#include <stdbool.h>
 
 #include "tetrahedra.h"
 
@@ -21,8 +19,6 @@ struct host_adjacency {
     uint32_t *first_by_lowest; /* [vertices + 1] rows are sorted by it */
     uint32_t *first_by_second; /* [vertices + 1] into by_second */
     uint32_t *by_second;       /* [count] tetrahedra by second vertex */
-    uint32_t *first_by_third;  /* with edges */
-    uint32_t *by_third;
 };
 
 /* A facet of the group of its lowest vertex p. */
@@ -37,22 +33,17 @@ struct host_group {
     size_t count, capacity;
 };
 
-/* Tetrahedra sorted, every vertex below `vertices`; at most 2^32 - 2 of them.
- * `edges`: also what host_adjacency_edges needs. */
+/* Tetrahedra sorted, every vertex below `vertices`; at most 2^32 - 2 of
+ * them. */
 int host_adjacency_make(struct host_adjacency *a,
                         const struct host_tetrahedra *tets, uint32_t vertices,
-                        bool edges, struct host_error *error);
+                        struct host_error *error);
 void host_adjacency_free(struct host_adjacency *a);
 
 /* Fills the group of p, sorted by `others`.  0 or HOST_BROKEN. */
 int host_adjacency_group(const struct host_adjacency *a, uint32_t p,
                          struct host_group *group, struct host_error *error);
 void host_group_free(struct host_group *group);
-
-/* Distinct edges from p to higher vertices. `group` is scratch. */
-int host_adjacency_edges(const struct host_adjacency *a, uint32_t p,
-                         struct host_group *group, uint64_t *edges,
-                         struct host_error *error);
 
 /* The facet opposite a corner of a positive tetrahedron, its normal (by the
  * right hand) pointing out. */

@@ -8,6 +8,7 @@
 
 #include "../incode/predicates.h"
 #include "adjacency.h"
+#include "edges.h"
 #include "hull.h"
 #include "memory.h"
 #include "parallel.h"
@@ -207,22 +208,18 @@ static void check_facets(void *context, unsigned part)
     struct incode_tally tally = {0, 0};
     struct host_group group = {0};
     struct host_error error = {0};
-    uint64_t vertices = v->points->count, p, edges = 0, more;
+    uint64_t vertices = v->points->count, p;
     while ((p = take_chunk(v, vertices)) < vertices) {
         uint64_t end = vertices - p < CHUNK ? vertices : p + CHUNK;
         for (; p < end && error.code == 0; p++) {
             if (host_adjacency_group(&v->adjacency, (uint32_t)p, &group,
-                                     &error) == 0 &&
-                check_group(v, &group, &tally) == 0 &&
-                host_adjacency_edges(&v->adjacency, (uint32_t)p, &group, &more,
                                      &error) == 0) {
-                edges += more;
+                (void)check_group(v, &group, &tally);
             }
         }
     }
     host_group_free(&group);
     (void)pthread_mutex_lock(&v->lock);
-    v->report->edges += edges;
     if (error.code != 0 && v->error->code == 0) {
         *v->error = error;
     }
@@ -265,14 +262,19 @@ static void check_all(struct verify *v)
     run(v, check_tetrahedra);
     check_vertices(v);
     if (host_adjacency_make(&v->adjacency, v->tets, (uint32_t)v->points->count,
-                            true, v->error) != 0) {
+                            v->error) != 0) {
         return;
     }
     run(v, check_facets);
     if (v->error->code != 0) {
         return;
     }
+    host_adjacency_free(&v->adjacency); /* room for the edges */
     r->hull_facets = v->hull.count;
+    if (host_edges_count(v->tets, (uint32_t)v->points->count, &r->edges,
+                         v->error) != 0) {
+        return;
+    }
     check_euler(v);
     if (v->positive) {
         struct host_hull_listener listener = {v, hull_fault};

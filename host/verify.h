@@ -3,7 +3,7 @@
  * opposite sides or once on the convex hull, no vertex in a neighbour's sphere,
  * every distinct point a vertex, Euler's relation.
  *
- * Memory: 4 bytes a tetrahedron and 25 a point beyond the arguments.  Work:
+ * Memory: 4 bytes a tetrahedron and 30 a point beyond the arguments.  Work:
  * O(tetrahedra) for vertices of bounded degree, two threads, about 1 us a
  * tetrahedron.
  *

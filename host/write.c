@@ -173,7 +173,7 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
     if (n.opposite_lowest == NULL) {
         host_fail_memory(error, "the neighbours of the tetrahedra");
     } else if (host_adjacency_make(&n.adjacency, tets, (uint32_t)points->count,
-                                   false, error) == 0 &&
+                                   error) == 0 &&
                first_sweep(&n, error) == 0) {
         uint64_t facets = 0;
         host_output_unsigned(neigh, tets->count);
