@@ -14,6 +14,7 @@
 enum {
     WINDOW_DEFAULT = 32,
     CHECK_EVERY_US = 20000, /* looks after the nodes' lives */
+    WIRE_LOST_US = 2000000,
     BRING_UP_US_MAX = 9000000,
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
@@ -115,7 +116,8 @@ static void wait_for_wire(struct host_service *s, uint64_t now_us)
     (void)ppoll(&fd, 1, &wait, NULL);
 }
 
-/* Whether nodes live, and the wire to node 0 holds. */
+/* Whether nodes live, and the wire to node 0 holds.  A wire that closes is as a
+ * rule that of a node about to be reaped: it is given a moment. */
 static int check(struct host_service *s, uint64_t now_us,
                  struct host_error *error)
 {
@@ -123,7 +125,19 @@ static int check(struct host_service *s, uint64_t now_us,
         return 0;
     }
     s->check_us = now_us + CHECK_EVERY_US;
-    return host_cluster_check(s->cluster, error);
+    if (cube_link_state(s->cube, 0) != LINK_DOWN) {
+        s->wire_seen_us = now_us;
+    }
+    if (host_cluster_check(s->cluster, error) != 0) {
+        return error->code;
+    }
+    if (now_us - s->wire_seen_us > WIRE_LOST_US) {
+        return host_fail(error, HOST_CUBE,
+                         "node 0 link %u: the wire to the host is closed; run "
+                         "again, and look for what closed it",
+                         s->cluster->dimension);
+    }
+    return 0;
 }
 
 static void hinder(struct host_service *s)
@@ -288,6 +302,7 @@ static int round_trip(struct host_service *s, struct host_error *error)
 int host_service_start(struct host_service *service, struct host_error *error)
 {
     uint64_t start = host_now_us();
+    service->wire_seen_us = start;
     service->random = service->hindrance.seed * 2 + 88172645463325253u;
     service->spill.file = -1;
     service->node = calloc(service->cluster->nodes, sizeof *service->node);

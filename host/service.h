@@ -82,7 +82,7 @@ struct host_service {
     unsigned here, ready, done; /* nodes that are up; that have their setup;
                                    that finished */
     unsigned turn;              /* the node to be served next */
-    uint64_t random, check_us;
+    uint64_t random, check_us, wire_seen_us;
 };
 
 /* Brings up the cube on the cluster's wire, and waits until every node has
