@@ -171,16 +171,20 @@ bool incode_front_drain(struct incode_triangulator *t)
  * one at work and the farthest one touched. */
 static uint32_t spill_position(const struct incode_triangulator *t)
 {
-    uint32_t farthest = t->current;
+    uint32_t nearest = t->current, farthest = 0;
     for (uint32_t i = 0; i < t->afl.touched_capacity; i++) {
         const struct incode_touched *entry = &t->afl.touched[i];
         if (!incode_touched_used(entry))
             continue;
         uint32_t position = incode_position(t, entry->brick);
+        if (t->foreign && position < nearest)
+            nearest = position;
         if (position < t->spill_from && position > farthest)
             farthest = position;
     }
-    return t->current + 1 + (farthest - t->current) / 2;
+    if (farthest < nearest)
+        farthest = nearest;
+    return nearest + 1 + (farthest - nearest) / 2;
 }
 
 /* Moves a brick's faces and marks out, as far as the port has room; true: all

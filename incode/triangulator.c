@@ -415,28 +415,28 @@ static bool next_own(struct incode_triangulator *t, uint32_t *v)
     return false;
 }
 
-/* The next vertex with open faces anywhere, in cyclic order of position. */
+/* The next vertex with open faces anywhere, the lowest position first, so that
+ * what is left lies ahead and can be spilled.  Bricks without faces are
+ * forgotten on the way. */
 static bool next_foreign(struct incode_triangulator *t, uint32_t *v)
 {
     const struct incode_touched *best = NULL;
     uint32_t least = 0;
     for (uint32_t i = 0; i < t->afl.touched_capacity; i++) {
         const struct incode_touched *entry = &t->afl.touched[i];
-        if (!incode_touched_used(entry) || entry->faces == 0 ||
-            (entry->pending & ~entry->waiting) == 0 ||
-            is_returning(t, entry->brick))
+        if (!incode_touched_used(entry) || is_returning(t, entry->brick))
             continue;
-        uint32_t order = incode_position(t, entry->brick);
-        order = order >= t->current ? order - t->current
-                                    : order + t->setup.bricks - t->current;
-        if (best == NULL || order < least) {
+        if (entry->faces == 0 && entry->waiting == 0)
+            incode_afl_drop(&t->afl, entry->brick);
+        else if ((entry->pending & ~entry->waiting) != 0 &&
+                 (best == NULL || incode_position(t, entry->brick) < least)) {
             best = entry;
-            least = order;
+            least = incode_position(t, entry->brick);
         }
     }
     if (best == NULL)
         return false;
-    t->current = incode_position(t, best->brick);
+    t->current = least;
     *v = best->brick * INCODE_BRICK_POINTS +
          (uint32_t)__builtin_ctzll(best->pending & ~best->waiting);
     return true;

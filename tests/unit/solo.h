@@ -24,11 +24,12 @@ struct solo {
     uint8_t index, face_rule;
     enum host_partition partition;
     uint32_t regions;
-    size_t memory;     /* 0: the least that works */
-    uint64_t shuffle;  /* the pager's own */
-    uint64_t chance;   /* 0: everything is ready at once */
-    uint32_t pressure; /* of spilling: faces that the list may hold, or 0 */
-    bool false_start;  /* each job is begun twice, the first one abandoned */
+    size_t memory;    /* 0: the least that works */
+    uint64_t shuffle; /* the pager's own */
+    uint64_t chance;  /* 0: everything is ready at once */
+    /* What the list may hold before it spills; 0: what fits. */
+    uint32_t pressure, brick_pressure;
+    bool false_start; /* each job is begun twice, the first one abandoned */
 
     /* What became of it. */
     struct host_digest digest;
@@ -210,6 +211,8 @@ static inline void solo_start(struct solo *s, uint32_t region)
     s->wanted = INCODE_NONE;
     if (s->pressure != 0)
         s->t->room_faces = s->t->afl.capacity - s->pressure;
+    if (s->brick_pressure != 0)
+        s->t->room_bricks = s->t->afl.touched_capacity - s->brick_pressure;
 }
 
 /* Steps until the job is done, or `steps` times. */

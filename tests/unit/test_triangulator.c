@@ -203,12 +203,12 @@ static void hub(void **unused)
                          .face_rule =
                              k & 2 ? INCODE_FACE_PAPER : INCODE_FACE_OWN,
                          .chance = k,
-                         .pressure = k & 4 ? 330 : 0};
+                         .brick_pressure = k & 4 ? 12 : 0};
         solo_run(&s, points.xyz, points.count);
         digest[k > 0] = s.digest;
         assert_string_equal(digest[k > 0].text, digest[0].text);
         assert_true(s.hubs > 0);
-        if (s.pressure != 0)
+        if (s.brick_pressure != 0)
             assert_true(s.spilled > 0);
         solo_close(&s);
     }
