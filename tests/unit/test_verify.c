@@ -416,6 +416,29 @@ static void nothing_is_no_triangulation(void **unused)
     close_fixture(&f);
 }
 
+/* Rows of any numbers, the same vertex twice included. */
+static void garbage_is_refused(void **unused)
+{
+    (void)unused;
+    struct fixture f = {0};
+    struct host_error error = {0};
+    uint64_t state = 1;
+    assert_int_equal(host_gen("grid", 27, 1, &f.points, &error), 0);
+    for (int round = 0; round < 2000; round++) {
+        host_tetrahedra_cut(&f.tets, 0);
+        for (int i = 0; i < 1 + round % 40; i++) {
+            uint32_t(*row)[4] = host_tetrahedra_room(&f.tets, 1, &error);
+            for (int k = 0; k < 4; k++) {
+                state = state * 6364136223846793005u + 1442695040888963407u;
+                (*row)[k] = (uint32_t)((state >> 33) % (27 + round % 2));
+            }
+            host_tetrahedra_keep(&f.tets, 1);
+        }
+        expect(&f, "");
+    }
+    close_fixture(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -433,6 +456,7 @@ int main(void)
         cmocka_unit_test(two_bodies_are_found),
         cmocka_unit_test(dents_are_found),
         cmocka_unit_test(nothing_is_no_triangulation),
+        cmocka_unit_test(garbage_is_refused),
     };
     return cmocka_run_group_tests_name("verify", tests, NULL, NULL);
 }
