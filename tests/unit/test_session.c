@@ -235,6 +235,9 @@ static int script_receive(void *context, uint8_t *bytes, size_t size)
 {
     struct script *s = context;
     size = size < s->left ? size : s->left;
+    if (size == 0) {
+        return 0;
+    }
     memcpy(bytes, s->hear, size);
     s->hear += size;
     s->left -= size;
