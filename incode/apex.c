@@ -223,7 +223,8 @@ static bool cap_is_within(const double rlo[3], const double rhi[3],
         return false;
     /* The centre is m / (2 det), the radius its length. */
     double length = __builtin_sqrt(incode_dot(s->m, s->m)), two = 2 * s->det;
-    double wide = length * 1e-6 + 12 * INCODE_SPHERE_EPS * s->pm;
+    double wide =
+        length * 1e-6 + 12 * INCODE_SPHERE_EPS * incode_max_norm(s->pm);
     bool fits = true;
     for (int d = 0; d < 3; d++)
         fits = fits && s->m[d] + length + wide < rhi[d] * two &&
@@ -278,6 +279,8 @@ static void consider(struct near *n, uint32_t i)
     n->best = i;
     memcpy(n->store[3], p, sizeof p);
     incode_sphere_apex(&n->sphere, n->face.b, n->face.c, r);
+    if (incode_sphere_is_blurred(&n->sphere))
+        incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, p, g->scale);
 }
 
 /* The first of points [from, to) by approximate Delaunay distance, if it is
@@ -351,6 +354,8 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     incode_gather_relative(g, b, n.face.b);
     incode_gather_relative(g, c, n.face.c);
     incode_sphere_plane(&n.sphere, n.face.b, n.face.c);
+    if (incode_plane_is_blurred(&n.sphere))
+        incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, g->scale);
     set_face(&n.face, &n.sphere);
     uint64_t before = t->stats.candidates;
     enum incode_near r = contest_all(&n);

@@ -346,7 +346,8 @@ uint32_t incode_gather_inside(const struct incode_gather *g, uint32_t from,
     double scale = incode_scale_for(largest > det ? largest : det);
     /* Single precision: fewer than 16 roundings of 2^-24 on each term, beside
      * those of the coefficients themselves. */
-    double slack = 0x1p-20 * largest + INCODE_SPHERE_EPS * s->pm;
+    double slack =
+        0x1p-20 * largest + INCODE_SPHERE_EPS * incode_max_norm(s->pm);
     double square = 0x1p-20 * det + INCODE_SPHERE_EPS * s->pdet - s->det;
     /* The last terms: what underflows in single precision. */
     incode_vf mx = incode_vf_all((float)(s->m[0] * scale)),

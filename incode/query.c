@@ -42,6 +42,8 @@ void incode_query_face(struct incode_query *q)
     relative(q->rb, q, q->pb);
     relative(q->rc, q, q->pc);
     incode_sphere_plane(&q->sphere, q->rb, q->rc);
+    if (incode_plane_is_blurred(&q->sphere))
+        incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, NULL, q->scale);
 }
 
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
@@ -57,6 +59,8 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     double r[3];
     relative(r, q, p);
     incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
+    if (incode_sphere_is_blurred(&q->sphere))
+        incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, p, q->scale);
     double half = 0.5 / q->sphere.det;
     for (int d = 0; d < 3; d++)
         q->centre[d] = q->sphere.m[d] * half;
@@ -110,7 +114,7 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
         incode_vd far = incode_vd_max(incode_vd_abs(lo), incode_vd_abs(hi));
         incode_vd n = incode_vd_all(s->n[d]);
         plane += incode_vd_max(n * lo, n * hi);
-        plane_error += incode_vd_all(s->pn) * far;
+        plane_error += incode_vd_all(s->pn[d]) * far;
         if (!s->has_apex)
             continue;
         incode_vd m = incode_vd_all(s->m[d]);
@@ -119,7 +123,7 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
         incode_vd best =
             incode_vd_max((m - det * lo) * lo, (m - det * hi) * hi);
         value += incode_vd_max((m - det * top) * top, best);
-        value_error += (incode_vd_all(s->pm) + pdet * far) * far;
+        value_error += (incode_vd_all(s->pm[d]) + pdet * far) * far;
     }
     incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
     incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
@@ -301,11 +305,11 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     for (int d = 0; d < 3; d++) {
         incode_vd r = p->r[d], far = incode_vd_abs(r);
         plane += incode_vd_all(s->n[d]) * r;
-        plane_error += incode_vd_all(s->pn) * far;
+        plane_error += incode_vd_all(s->pn[d]) * far;
         square += r * r;
         if (s->has_apex) {
             value += incode_vd_all(s->m[d]) * r;
-            value_error += incode_vd_all(s->pm) * far;
+            value_error += incode_vd_all(s->pm[d]) * far;
         }
     }
     incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);

@@ -1,5 +1,9 @@
 #include "sphere.h"
 
+#include <stddef.h>
+
+#include "double_double.h"
+
 void incode_sphere_plane(struct incode_sphere *s, const double b[3],
                          const double c[3])
 {
@@ -8,7 +12,7 @@ void incode_sphere_plane(struct incode_sphere *s, const double b[3],
     s->lc = incode_max_norm(c);
     s->bb = incode_dot(b, b);
     s->cc = incode_dot(c, c);
-    s->pn = 2 * s->lb * s->lc;
+    s->pn[0] = s->pn[1] = s->pn[2] = 2 * s->lb * s->lc;
     s->has_apex = false;
 }
 
@@ -24,7 +28,74 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
         s->m[d] = s->bb * ca[d] + s->cc * ab[d] + aa * s->n[d];
     /* Each of the two products of a cross product is at most that of the
      * maximum norms; the determinant has three such pairs. */
-    s->pm = 2 * (s->bb * s->lc * la + s->cc * la * s->lb + aa * s->lb * s->lc);
-    s->pdet = 3 * la * s->pn;
+    s->pm[0] = s->pm[1] = s->pm[2] =
+        2 * (s->bb * s->lc * la + s->cc * la * s->lb + aa * s->lb * s->lc);
+    s->pdet = 6 * la * s->lb * s->lc;
     s->has_apex = true;
+}
+
+/* ---- twice the precision ---- */
+
+struct vector {
+    struct incode_dd d[3];
+};
+
+static struct vector relative(const double p[3], const double v[3],
+                              double scale)
+{
+    struct vector r;
+    for (int k = 0; k < 3; k++)
+        r.d[k] = incode_dd_difference(p[k], v[k], scale);
+    return r;
+}
+
+static struct vector cross(const struct vector *a, const struct vector *b)
+{
+    struct vector r;
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        r.d[k] = incode_dd_cross(a->d[i], b->d[j], a->d[j], b->d[i]);
+    }
+    return r;
+}
+
+static struct incode_dd dot(const struct vector *a, const struct vector *b)
+{
+    return incode_dd_plus(incode_dd_plus(incode_dd_times(a->d[0], b->d[0]),
+                                         incode_dd_times(a->d[1], b->d[1])),
+                          incode_dd_times(a->d[2], b->d[2]));
+}
+
+/* What is left: a share of EPS for the roundings of the evaluation, at most 7
+ * units on a term with m or n, 8 on that with det; and 2^-100 of the old
+ * bounds. */
+static double refined(double share, double value, double bound)
+{
+    return share * __builtin_fabs(value) + 1e-15 * bound;
+}
+
+void incode_sphere_refine(struct incode_sphere *s, const double v[3],
+                          const double b[3], const double c[3], const double *a,
+                          double scale)
+{
+    struct vector rb = relative(b, v, scale), rc = relative(c, v, scale);
+    struct vector n = cross(&rb, &rc);
+    for (int k = 0; k < 3; k++)
+        s->n[k] = n.d[k].hi;
+    for (int k = 0; k < 3; k++)
+        s->pn[k] = refined(0.23, s->n[k], 2 * s->lb * s->lc);
+    if (a == NULL)
+        return;
+    struct vector ra = relative(a, v, scale);
+    struct vector ca = cross(&rc, &ra), ab = cross(&ra, &rb);
+    struct incode_dd bb = dot(&rb, &rb), cc = dot(&rc, &rc), aa = dot(&ra, &ra);
+    for (int k = 0; k < 3; k++) {
+        struct incode_dd m = incode_dd_plus(incode_dd_times(bb, ca.d[k]),
+                                            incode_dd_times(cc, ab.d[k]));
+        m = incode_dd_plus(m, incode_dd_times(aa, n.d[k]));
+        s->m[k] = m.hi;
+        s->pm[k] = refined(0.23, m.hi, s->pm[k]);
+    }
+    s->det = dot(&ra, &n).hi;
+    s->pdet = refined(0.28, s->det, s->pdet);
 }

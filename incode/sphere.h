@@ -18,9 +18,10 @@
 #include <stdbool.h>
 
 struct incode_sphere {
-    double n[3], pn;            /* plane; |error of n[d]| <= EPS pn */
-    double m[3], pm, det, pdet; /* sphere; likewise */
-    double lb, lc, bb, cc;      /* of b and c: maximum norm, square */
+    double n[3], pn[3]; /* plane; |error of n[d] x| <= EPS pn[d] |x| */
+    double m[3], pm[3]; /* sphere; likewise */
+    double det, pdet;
+    double lb, lc, bb, cc; /* of b and c: maximum norm, square */
     bool has_apex;
 };
 
@@ -55,27 +56,52 @@ void incode_sphere_plane(struct incode_sphere *s, const double b[3],
 void incode_sphere_apex(struct incode_sphere *s, const double b[3],
                         const double c[3], const double a[3]);
 
+/* Cancellation has left so little of n, of m or of det that their error bounds
+ * would leave nearly every point in doubt (points on a line or plane up to
+ * rounding). */
+static inline bool incode_plane_is_blurred(const struct incode_sphere *s)
+{
+    return s->pn[0] > 1024 * incode_max_norm(s->n);
+}
+
+static inline bool incode_sphere_is_blurred(const struct incode_sphere *s)
+{
+    return s->pdet > 1024 * __builtin_fabs(s->det) ||
+           s->pm[0] > 1024 * incode_max_norm(s->m);
+}
+
+/* Computes them again from absolute coordinates in twice the precision, so that
+ * only the evaluation's own rounding is left in the bounds.  a: NULL for the
+ * plane alone. */
+void incode_sphere_refine(struct incode_sphere *s, const double v[3],
+                          const double b[3], const double c[3], const double *a,
+                          double scale);
+
 static inline double incode_sphere_value(const struct incode_sphere *s,
                                          const double p[3])
 {
     return incode_dot(s->m, p) - s->det * incode_dot(p, p);
 }
 
+static inline double incode_absolute_dot(const double a[3], const double p[3])
+{
+    return a[0] * __builtin_fabs(p[0]) + a[1] * __builtin_fabs(p[1]) +
+           a[2] * __builtin_fabs(p[2]);
+}
+
 static inline double incode_sphere_error(const struct incode_sphere *s,
                                          const double p[3])
 {
-    double l =
-        __builtin_fabs(p[0]) + __builtin_fabs(p[1]) + __builtin_fabs(p[2]);
-    return INCODE_SPHERE_EPS * (s->pm * l + s->pdet * incode_dot(p, p)) +
+    return INCODE_SPHERE_EPS *
+               (incode_absolute_dot(s->pm, p) + s->pdet * incode_dot(p, p)) +
            INCODE_SPHERE_TINY;
 }
 
 static inline double incode_plane_error(const struct incode_sphere *s,
                                         const double p[3])
 {
-    double l =
-        __builtin_fabs(p[0]) + __builtin_fabs(p[1]) + __builtin_fabs(p[2]);
-    return INCODE_SPHERE_EPS * s->pn * l + INCODE_SPHERE_TINY;
+    return INCODE_SPHERE_EPS * incode_absolute_dot(s->pn, p) +
+           INCODE_SPHERE_TINY;
 }
 
 #endif
