@@ -8,6 +8,8 @@
 #include "scan.h"
 #include "stream.h"
 
+enum { ROW = 256 }; /* points of a grid appended at once */
+
 /* Points that a few words may imply: a damaged file shall not fill memory. */
 static const uint64_t grid_max = UINT64_C(1) << 22;
 
@@ -142,6 +144,24 @@ static int take_axis(struct vtk *vtk, int d, struct host_error *error)
     return 0;
 }
 
+/* The places of a grid along one axis, as they are or made from its spacing. */
+static int fill_axis(struct vtk *vtk, int d, uint64_t count,
+                     struct host_error *error)
+{
+    if (vtk->axis[d] != NULL) {
+        return 0;
+    }
+    vtk->axis_count[d] = count;
+    vtk->axis[d] = host_map((size_t)count * sizeof(double));
+    if (vtk->axis[d] == NULL) {
+        return host_fail_memory(error, "an axis of the grid");
+    }
+    for (uint64_t i = 0; i < count; i++) {
+        vtk->axis[d][i] = vtk->origin[d] + (double)i * vtk->spacing[d];
+    }
+    return 0;
+}
+
 static int append_grid(struct vtk *vtk, const uint64_t n[3],
                        struct host_error *error)
 {
@@ -154,16 +174,24 @@ static int append_grid(struct vtk *vtk, const uint64_t n[3],
                        "the grid has no point or more than 2^22; correct its "
                        "dimensions, or list the points");
     }
-    for (uint64_t i = 0; i < points; i++) {
-        uint64_t at[3] = {i % n[0], i / n[0] % n[1], i / n[0] / n[1]};
-        double xyz[3];
-        for (int d = 0; d < 3; d++) {
-            xyz[d] = vtk->axis[d] != NULL
-                         ? vtk->axis[d][at[d]]
-                         : vtk->origin[d] + (double)at[d] * vtk->spacing[d];
-        }
-        if (host_points_append(vtk->mesh->points, xyz, 1, error) != 0) {
+    for (int d = 0; d < 3; d++) {
+        if (fill_axis(vtk, d, n[d], error) != 0) {
             return error->code;
+        }
+    }
+    double row[3 * ROW];
+    for (uint64_t yz = 0; yz < n[1] * n[2]; yz++) {
+        double y = vtk->axis[1][yz % n[1]], z = vtk->axis[2][yz / n[1]];
+        for (uint64_t x = 0; x < n[0]; x += ROW) {
+            uint64_t count = n[0] - x < ROW ? n[0] - x : ROW;
+            for (uint64_t i = 0; i < count; i++) {
+                row[3 * i] = vtk->axis[0][x + i];
+                row[3 * i + 1] = y;
+                row[3 * i + 2] = z;
+            }
+            if (host_points_append(vtk->mesh->points, row, count, error) != 0) {
+                return error->code;
+            }
         }
     }
     return 0;
@@ -173,9 +201,16 @@ static int append_grid(struct vtk *vtk, const uint64_t n[3],
 static int implied_points(struct vtk *vtk, struct host_error *error)
 {
     if (vtk->axis[0] != NULL && vtk->axis[1] != NULL && vtk->axis[2] != NULL) {
-        return append_grid(vtk, vtk->axis_count, error);
+        uint64_t n[3] = {vtk->axis_count[0], vtk->axis_count[1],
+                         vtk->axis_count[2]};
+        return append_grid(vtk, n, error);
     }
     if (vtk->is_image && vtk->has_dimension) {
+        for (int d = 0; d < 3; d++) { /* a damaged file may have some */
+            host_unmap(vtk->axis[d],
+                       (size_t)vtk->axis_count[d] * sizeof(double));
+            vtk->axis[d] = NULL;
+        }
         return append_grid(vtk, vtk->dimension, error);
     }
     return host_source_fail(vtk->source, error,
