@@ -3,7 +3,7 @@
  * points and leaves of 8 (see incode/pages.h), with the pages that nodes ask
  * for.
  *
- * Memory: 28 bytes a point at the end, 84 at most while it works (input rows
+ * Memory: 28 bytes a point at the end, 60 at most while it works (input rows
  * not counted).  Work: O(n log n), about 100 ms a million points on two cores.
  *
  *     host_order_make(&order, xyz, rows, HOST_ADAPTIVE, 8, false, &error);

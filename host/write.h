@@ -2,7 +2,7 @@
  * .vtk, .msh (Gmsh 2.2), .mesh (Medit), .npy (m,4); "-" is .ele on standard
  * output.  A file appears under its name only when it is whole.
  *
- * Memory: 1 MiB of buffer; for .neigh and .face also 4 bytes a tetrahedron and
+ * Memory: 1 MiB of buffer; for .neigh and .face also 8 bytes a tetrahedron and
  * 8 a point.  Work: one pass, about 100 ns a tetrahedron as text.
  *
  *     host_tetrahedra_map(&tets, order.row); host_tetrahedra_sort(&tets);
