@@ -143,7 +143,7 @@ static void forge(struct pipe *pipe, struct script *script)
 
 static void spoil(struct pipe *pipe, struct script *script)
 {
-    uint8_t bytes[8];
+    uint8_t bytes[8] = {0};
     size_t at = pipe->count == 0 ? 0 : next(script) * 16u % pipe->count;
     size_t size = 1 + next(script) % 8u;
     size = size < pipe->count - at ? size : pipe->count - at;
