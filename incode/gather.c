@@ -23,8 +23,6 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
 {
     struct incode_gather *g = context;
     (void)walker;
-    if (++g->pages > g->pages_max)
-        return false;
     const struct incode_brick *b = &frame->page.brick;
     for (; leaves != 0; leaves &= leaves - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
@@ -59,8 +57,9 @@ enum incode_gathered incode_gather_around(struct incode_gather *g,
     memset(q, 0, sizeof *q);
     q->question = INCODE_QUERY_BOX;
     q->boxed = true;
+    q->pages_max = g->pages_max; /* all must be resident at once */
     g->leaf = INCODE_NONE;
-    g->around = g->pages = 0;
+    g->around = 0;
     g->radius = radius;
     for (int d = 0; d < 3; d++) {
         q->lo[d] = g->around_lo[d] = lo[d] - radius;

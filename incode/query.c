@@ -242,6 +242,8 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
         if (end <= w->q->cursor)
             continue;
         uint32_t page = tree->base[level - 1] + first + child;
+        if (w->q->pages_max != 0 && w->q->pages++ == w->q->pages_max)
+            return INCODE_WALK_STOP;
         const struct incode_frame *f = incode_pager_get(w->walker->pager, page);
         if (f == NULL && w->q->ahead && level == 1 &&
             incode_pager_loading(w->walker->pager, page))

@@ -45,8 +45,10 @@ struct incode_query {
     double limit;     /* NEAREST, CIRCLE: squared, relative */
     uint32_t best;    /* vertex number, or INCODE_NONE */
     double best_p[3];
-    uint32_t cursor;  /* bricks below this one are done */
-    uint32_t missing; /* the page a suspended walk waits for */
+    uint32_t pages, pages_max; /* needed so far; a walk stops at more than that,
+                                  unless it is 0 */
+    uint32_t cursor;           /* bricks below this one are done */
+    uint32_t missing;          /* the page a suspended walk waits for */
 };
 
 /* What a walk runs on. */

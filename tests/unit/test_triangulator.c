@@ -254,7 +254,8 @@ static void real_sets(void **unused)
         {"cactus", INCODE_KD, 32, 600},  {"mug_fem", INCODE_KD, 8, 600},
         {"pdb_3GQP", INCODE_KD, 1, 700}, {"can_fem", INCODE_KD, 2, 700},
         {"office", INCODE_KD, 8, 600},   {"hexa_amr", INCODE_KD, 1, 900},
-        {"ocean_r", INCODE_KD, 8, 700},  {"halo_dm", INCODE_KD, 1, 0}};
+        {"ocean_r", INCODE_KD, 8, 700},  {"bunny", INCODE_KD, 2, 0},
+        {"halo_dm", INCODE_KD, 1, 0}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const struct real *c = &cases[i];
         struct host_points points = {0};
