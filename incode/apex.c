@@ -92,8 +92,9 @@ static void set_final(struct incode_search *s)
 {
     struct incode_query *q = &s->query;
     s->final = true;
-    q->boxed = q->done = q->timid = false;
+    q->done = q->timid = false;
     q->cursor = 0;
+    incode_query_shrink(q);
 }
 
 void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,

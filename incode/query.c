@@ -46,6 +46,36 @@ void incode_query_face(struct incode_query *q)
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, NULL, q->scale);
 }
 
+/* The box of the best's sphere, widened by 1e-6 of its size and by the rounding
+ * of all that leads to it; none where the sphere is ill-conditioned. */
+static void bound_sphere(struct incode_query *q)
+{
+    const struct incode_sphere *s = &q->sphere;
+    q->boxed = false;
+    if (!s->has_apex || !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet))
+        return;
+    double half = 0.5 / s->det, radius = __builtin_sqrt(incode_dot(s->m, s->m));
+    radius = radius * half * (1 + 1e-6) +
+             12 * INCODE_SPHERE_EPS * incode_max_norm(s->pm) * half;
+    double inverse = 1 / q->scale;
+    for (int d = 0; d < 3; d++) {
+        double lo = (q->centre[d] - radius) * inverse;
+        double hi = (q->centre[d] + radius) * inverse;
+        double slack = 1e-15 * (__builtin_fabs(q->pv[d]) + hi - lo);
+        q->lo[d] = q->pv[d] + lo - slack;
+        q->hi[d] = q->pv[d] + hi + slack;
+        if (!(q->lo[d] <= q->hi[d]))
+            return;
+    }
+    q->boxed = true;
+}
+
+void incode_query_shrink(struct incode_query *q)
+{
+    q->shrinking = true;
+    bound_sphere(q);
+}
+
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
                            uint32_t id, const double p[3])
 {
@@ -64,6 +94,8 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     double half = 0.5 / q->sphere.det;
     for (int d = 0; d < 3; d++)
         q->centre[d] = q->sphere.m[d] * half;
+    if (q->shrinking)
+        bound_sphere(q);
 }
 
 /* ---- which of up to 32 boxes a question concerns ---- */
@@ -154,8 +186,11 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
     uint32_t mask = 0;
     for (unsigned i = 0; i < count; i += INCODE_VD_LANES) {
         incode_vl in = (incode_vl){-1, -1, -1, -1, -1, -1, -1, -1};
-        if (q->boxed)
-            in &= meets(q, boxes, i);
+        if (q->boxed) {
+            in = meets(q, boxes, i);
+            if (incode_vd_mask(in) == 0)
+                continue;
+        }
         if (q->done)
             in &= not_done(q, boxes, i);
         if (q->question == INCODE_QUERY_APEX)

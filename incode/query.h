@@ -33,6 +33,7 @@ struct incode_query {
     bool boxed;          /* only what meets [lo, hi] */
     bool timid;          /* APEX: only points clearly beyond the face */
     bool ahead;          /* BOX: asks for missing bricks and passes them over */
+    bool shrinking;      /* APEX: the box is that of the best's sphere */
     bool done;           /* not what lies within [done_lo, done_hi] */
     double lo[3], hi[3]; /* absolute coordinates */
     double done_lo[3], done_hi[3];
@@ -71,6 +72,9 @@ enum incode_walk incode_walk(struct incode_walker *walker,
 
 /* Sets the face (v, b, c) of an APEX query: plane and scale. */
 void incode_query_face(struct incode_query *q);
+
+/* From now on only what meets the sphere of the best so far matters. */
+void incode_query_shrink(struct incode_query *q);
 
 /* A candidate for the apex: takes it if it is strictly on the unknown side and
  * inside the sphere of the best so far.  Exact. */
