@@ -346,6 +346,7 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     n.b = b;
     n.c = c;
     n.best = INCODE_GATHER_NONE;
+    n.sphere = (struct incode_sphere){.has_apex = false};
     memcpy(n.store[0], g->p0, sizeof g->p0);
     copy_point(n.store[1], g, b);
     copy_point(n.store[2], g, c);

@@ -430,7 +430,8 @@ static void garbage_is_refused(void **unused)
             uint32_t(*row)[4] = host_tetrahedra_room(&f.tets, 1, &error);
             for (int k = 0; k < 4; k++) {
                 state = state * 6364136223846793005u + 1442695040888963407u;
-                (*row)[k] = (uint32_t)((state >> 33) % (27 + round % 2));
+                (*row)[k] =
+                    (uint32_t)((state >> 33) % (27 + (unsigned)round % 2));
             }
             host_tetrahedra_keep(&f.tets, 1);
         }
