@@ -4,7 +4,9 @@
  *
  * Memory: one arena, divided by incode_triangulator_init alone (memory map:
  * struct incode_map).  Work: a call of incode_triangulator_step closes at most
- * one star, or takes one search as far as one missing page.
+ * one star, or takes one search as far as one missing page.  With the indexes
+ * `naive` and `grid` it builds at most one tetrahedron, and looks at no more
+ * than 256 pages of points or about 4,096 rows of cells and points.
  *
  *     incode_triangulator_init(&t, arena, bytes, &setup, &ports, &error);
  *     incode_triangulator_start(&t, &job);
@@ -94,7 +96,9 @@ struct incode_statistics {
 
 struct incode_triangulator; /* opaque: lives at the start of the arena */
 
-/* Smallest arena that works for this setup, bytes. */
+/* Smallest arena that works for this setup, bytes.  It is the same for every
+ * index: a face under search needs one page at a time.  `naive` is slow where
+ * not all pages of points fit, `grid` where those around the front do not. */
 size_t incode_arena_min(const struct incode_setup *setup);
 
 /* Divides the arena (aligned to 64 bytes).  Returns the triangulator inside
