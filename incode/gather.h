@@ -48,7 +48,7 @@ struct incode_gather {
     alignas(64) uint32_t id[INCODE_AROUND_ALL];
     uint32_t around, count; /* copied from the box; with the far ones */
     uint32_t leaf;          /* vertex number / 8, or INCODE_NONE */
-    uint32_t pages_max; /* that a walk may need */
+    uint32_t pages_max;     /* that a walk may need */
     double around_lo[3], around_hi[3];
     uint32_t vertex, self; /* its number, its index in p */
     double p0[3], scale, radius;

