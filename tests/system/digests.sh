@@ -2,6 +2,7 @@
 # Every real set with kd and spatial on 8 nodes, in 512 KiB and in 4 MiB: the
 # digest of the index and the same bytes.  Flat sets are refused.
 . tests/system/lib.sh
+need_data digests
 
 while read -r set file points _ tetrahedra digest; do
     if [ -n "$(no_set "$file" "$points")" ]; then

@@ -30,6 +30,13 @@ last() { tail -n 1 "$1" 2>/dev/null | tr -d '\r' | cut -c 1-300; }
 
 # --- the real sets: data/INDEX.md --------------------------------------------
 
+# need_data NAME: ends the script where there is no index of real sets.
+need_data() {
+    [ -r "$INCODE_DATA/INDEX.md" ] && return
+    skip "$1" "there is no $INCODE_DATA/INDEX.md; INCODE_DATA names its folder"
+    exit 0
+}
+
 # "name file points distinct tetrahedra digest" for each set of the index.
 list_sets() {
     awk -F'|' '

@@ -4,6 +4,7 @@
 # for `spatial`.  That the rows cover every pair is checked too.
 # Sets past `naive_max` points are left out with `naive`, whose work is n^2.
 . tests/system/lib.sh
+need_data pairs
 naive_max=${NAIVE_MAX:-5000}
 grid_max=${GRID_MAX:-15000}
 

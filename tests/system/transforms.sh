@@ -8,6 +8,7 @@
 # right one: a mirrored set is verified by itself, and only a set without ties
 # must give the mirror image, row for row.
 . tests/system/lib.sh
+need_data transforms
 
 # runs POINTS OUT [OPTION...]: quietly, statistics in $scratch/stats.json.
 runs() {

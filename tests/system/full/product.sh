@@ -3,6 +3,7 @@
 # and memory.  `naive` is left out past `naive_max` points, for its work is
 # n^2; each set so left out is named.
 . tests/system/lib.sh
+need_data product
 naive_max=${NAIVE_MAX:-15000}
 
 while read -r set file points _ tetrahedra digest; do
