@@ -181,7 +181,7 @@ INCODE_INLINE incode_vf incode_vf_relative(const double *p, incode_vd origin,
         _mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)low)),
         _mm512_cvtpd_ps((__m512d)high), 1);
 #else
-    incode_vf out;
+    incode_vf out = incode_vf_all(0);
     for (int i = 0; i < INCODE_VD_LANES; i++) {
         out[i] = (float)low[i];
         out[i + INCODE_VD_LANES] = (float)high[i];
