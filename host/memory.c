@@ -44,15 +44,26 @@ void *host_remap(void *old, size_t old_bytes, size_t bytes)
     if (old == NULL) {
         return host_map(bytes);
     }
-    void *space = reserve(bytes == 0 ? 1 : bytes);
+    enum { PAGE = 4096 };
+    size_t from = (old_bytes + (old_bytes == 0) + PAGE - 1) / PAGE * PAGE;
+    size_t to = (bytes + (bytes == 0) + PAGE - 1) / PAGE * PAGE;
+    char *space = reserve(to);
     if (space == NULL) {
         return NULL;
     }
-    void *array =
-        mremap(old, old_bytes == 0 ? 1 : old_bytes, bytes == 0 ? 1 : bytes,
-               MREMAP_MAYMOVE | MREMAP_FIXED, space);
+    /* Move, then grow: one call for both is more than valgrind can follow. */
+    size_t kept = from < to ? from : to;
+    void *array = mremap(old, from, kept, MREMAP_MAYMOVE | MREMAP_FIXED, space);
     if (array == MAP_FAILED) {
-        (void)munmap(space, bytes == 0 ? 1 : bytes);
+        (void)munmap(space, to);
+        return NULL;
+    }
+    if (kept < to) {
+        (void)munmap(space + kept, to - kept);
+        array = mremap(space, kept, to, MREMAP_MAYMOVE);
+    }
+    if (array == MAP_FAILED) { /* the old array stays as it was */
+        (void)mremap(space, kept, kept, MREMAP_MAYMOVE | MREMAP_FIXED, old);
         return NULL;
     }
     return array;

@@ -220,7 +220,7 @@ static bool cap_is_within(const double rlo[3], const double rhi[3],
                           const struct incode_sphere *s, const struct face *f)
 {
     if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) || !is_regular(f) ||
-        !(s->det > 1e-100)) /* squares below would underflow */
+        !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
         return false;
     /* The centre is m / (2 det), the radius its length. */
     double length = __builtin_sqrt(incode_dot(s->m, s->m)), two = 2 * s->det;

@@ -52,7 +52,8 @@ static void bound_sphere(struct incode_query *q)
 {
     const struct incode_sphere *s = &q->sphere;
     q->boxed = false;
-    if (!s->has_apex || !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet))
+    if (!s->has_apex || !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
+        !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
         return;
     double half = 0.5 / s->det, radius = __builtin_sqrt(incode_dot(s->m, s->m));
     radius = radius * half * (1 + 1e-6) +

@@ -29,6 +29,8 @@ struct incode_sphere {
  * underflows stays below the absolute term, for points within 2^200. */
 #define INCODE_SPHERE_EPS 3.6e-15
 #define INCODE_SPHERE_TINY 1e-250
+/* Smaller determinants are left to the predicates. */
+#define INCODE_SPHERE_LEAST 1e-100
 
 static inline void incode_cross(double out[3], const double a[3],
                                 const double b[3])
@@ -63,13 +65,15 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
  * rounding). */
 static inline bool incode_plane_is_blurred(const struct incode_sphere *s)
 {
-    return s->pn[0] > 1024 * incode_max_norm(s->n);
+    double n = incode_max_norm(s->n);
+    return s->pn[0] > 1024 * n && n > INCODE_SPHERE_LEAST;
 }
 
 static inline bool incode_sphere_is_blurred(const struct incode_sphere *s)
 {
-    return s->pdet > 1024 * __builtin_fabs(s->det) ||
-           s->pm[0] > 1024 * incode_max_norm(s->m);
+    double det = __builtin_fabs(s->det), m = incode_max_norm(s->m);
+    return (s->pdet > 1024 * det || s->pm[0] > 1024 * m) &&
+           det > INCODE_SPHERE_LEAST && m > INCODE_SPHERE_LEAST;
 }
 
 /* Computes them again from absolute coordinates in twice the precision, so that
