@@ -4,7 +4,7 @@
  * Memory: the struct; stack for INCODE_LEVELS_MAX levels.  Work: the boxes of
  * the pages whose own box passes the question.
  *
- *     incode_query_box(&q, v, lo, hi);
+ *     q.question = INCODE_QUERY_BOX, q.boxed = true;       and q.lo, q.hi
  *     while ((r = incode_walk(&w, &q, visit, context)) == INCODE_WALK_WAIT)
  *         come back when page q.missing is there;
  */
