@@ -1,0 +1,43 @@
+/* All that the host's service asks of the place where its cube runs, as
+ * node/board.h is all that a node asks of its board: processes of this machine,
+ * ranks of MPI, real boards, or a simulation.  The service reads the time and
+ * sleeps through it alone.
+ *
+ * Memory: none of its own.  Work: every function returns at once, but for idle.
+ *
+ *     machine = host_cluster_machine(&cluster);
+ *     while (working) { poll; serve; machine.idle(machine.context, due_us); }
+ *     machine.stop(machine.context);
+ */
+#ifndef HOST_MACHINE_H
+#define HOST_MACHINE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "../transport/link.h"
+#include "error.h"
+
+struct host_machine {
+    void *context;
+    unsigned nodes, dimension;
+    uint32_t epoch;        /* of this start of the host, never repeated */
+    struct link_pipe pipe; /* the bytes to and from node 0 */
+    /* A second wire, to another node, for when node 0 is lost; 0: none. */
+    uint16_t spare_node;
+    struct link_pipe spare;
+    /* Microseconds since any fixed time, never going back. */
+    uint64_t (*now_us)(void *context);
+    /* Sleeps until bytes have come, or room for them where there was none, but
+     * no longer than wait_us. */
+    void (*idle)(void *context, uint64_t wait_us);
+    /* Looks after the nodes, and starts again those that it started itself and
+     * that died.  0, or HOST_CUBE where the cube cannot go on. */
+    int (*check)(void *context, struct host_error *error);
+    /* Whether every node has ended: true as well where nothing tells. */
+    bool (*ended)(void *context);
+    /* Ends what still runs and was started here. */
+    void (*stop)(void *context);
+};
+
+#endif
