@@ -11,10 +11,6 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include "../transport/cube.h"
-#include "../transport/drivers/tcp.h"
-
 /* Sanitizers map memory by the terabyte: no limit then. */
 #ifdef INCODE_SANITIZED
 #define LIMITED false
@@ -23,57 +19,6 @@
 #endif
 
 extern char **environ;
-
-/* Both ends of every wire: end[node][link]. */
-struct wires {
-    int end[HOST_NODES_MAX][CUBE_LINKS_MAX];
-};
-
-static void close_wires(struct wires *wires)
-{
-    for (unsigned i = 0; i < HOST_NODES_MAX; i++) {
-        for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
-            if (wires->end[i][d] >= 0) {
-                close(wires->end[i][d]);
-                wires->end[i][d] = -1;
-            }
-        }
-    }
-}
-
-static int make_wires(struct host_cluster *c, struct wires *wires,
-                      struct host_error *error)
-{
-    int pair[2];
-    memset(wires, -1, sizeof *wires);
-    for (unsigned i = 0; i < c->nodes; i++) {
-        for (unsigned d = 0; d < c->dimension; d++) {
-            unsigned other = i ^ 1u << d;
-            if (other < i) {
-                continue;
-            }
-            if (tcp_pair(pair) != 0) {
-                return host_fail(error, HOST_CUBE,
-                                 "wire between nodes %u and %u: %s; are "
-                                 "loopback connections and %u open files "
-                                 "allowed?",
-                                 i, other, strerror(errno),
-                                 c->nodes * (c->dimension + 1) + 16);
-            }
-            wires->end[i][d] = pair[0];
-            wires->end[other][d] = pair[1];
-        }
-    }
-    if (tcp_pair(pair) != 0) {
-        return host_fail(error, HOST_CUBE,
-                         "wire between host and node 0: %s; are loopback "
-                         "connections allowed?",
-                         strerror(errno));
-    }
-    c->wire = pair[0];
-    wires->end[0][c->dimension] = pair[1];
-    return 0;
-}
 
 /* incode-node beside this executable, or where `make install` puts it. */
 static int find_program(const char *given, char *path, size_t size,
@@ -117,7 +62,7 @@ static void set_limit(int resource, uint64_t bytes, int report)
 static void become_node(const struct host_cluster *c,
                         const struct host_cluster_options *options,
                         const char *path, unsigned node,
-                        const struct wires *wires, int report)
+                        const struct host_wires *wires, int report)
 {
     char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
     char *no_environment[] = {NULL};
@@ -168,7 +113,7 @@ static void become_node(const struct host_cluster *c,
 static int start_node(struct host_cluster *c,
                       const struct host_cluster_options *options,
                       const char *path, unsigned node,
-                      const struct wires *wires, struct host_error *error)
+                      const struct host_wires *wires, struct host_error *error)
 {
     int report[2], reason = 0;
     if (pipe2(report, O_CLOEXEC) != 0) {
@@ -207,7 +152,7 @@ int host_cluster_start(struct host_cluster *cluster,
                        struct host_error *error)
 {
     char path[4096];
-    struct wires wires;
+    struct host_wires wires;
     memset(cluster, 0, sizeof *cluster);
     cluster->wire = -1;
     cluster->nodes = options->nodes;
@@ -225,11 +170,13 @@ int host_cluster_start(struct host_cluster *cluster,
     if (find_program(options->program, path, sizeof path, error) != 0) {
         return error->code;
     }
-    int status = make_wires(cluster, &wires, error);
+    int status = host_wires_make(&wires, HOST_WIRE_TCP, cluster->nodes,
+                                 cluster->dimension, error);
+    cluster->wire = wires.host;
     for (unsigned i = 0; status == 0 && i < cluster->nodes; i++) {
         status = start_node(cluster, options, path, i, &wires, error);
     }
-    close_wires(&wires);
+    host_wires_close_nodes(&wires);
     if (status != 0) {
         host_cluster_stop(cluster);
     }

@@ -18,9 +18,9 @@
 #include <sys/types.h>
 
 #include "error.h"
+#include "wires.h"
 
 enum {
-    HOST_NODES_MAX = 64,           /* on one machine */
     HOST_MEMORY_MIN = 256 * 1024,  /* bytes a node */
     HOST_STATIC_BYTES = 16 * 1024, /* .data and .bss of incode-node, at most */
     HOST_STACK_BYTES = 64 * 1024   /* of a node's memory */
