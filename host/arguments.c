@@ -177,7 +177,7 @@ static int number(struct parse *p, const char *option, const char *value,
 static void parse_nodes(struct parse *p, const char *value)
 {
     uint64_t n = 0;
-    if (host_parse_number(value, 1, HOST_NODES_MAX, &n) != 0 ||
+    if (host_parse_number(value, 1, HOST_PROCESSES_MAX, &n) != 0 ||
         (n & (n - 1)) != 0) {
         host_fail(p->error, HOST_USAGE,
                   "--nodes %s: not a number of nodes of a cube; allowed: 1, "

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +11,11 @@
 #include <sys/random.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
+
+#include "progress.h"
+
 /* Sanitizers map memory by the terabyte: no limit then. */
 #ifdef INCODE_SANITIZED
 #define LIMITED false
@@ -157,15 +162,15 @@ int host_cluster_start(struct host_cluster *cluster,
     cluster->wire = -1;
     cluster->nodes = options->nodes;
     cluster->limited = LIMITED;
-    for (unsigned i = 0; i < HOST_NODES_MAX; i++) {
+    for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
         cluster->process[i].ended = true;
     }
     while (1u << cluster->dimension < options->nodes) {
         cluster->dimension++;
     }
     if (getrandom(&cluster->epoch, sizeof cluster->epoch, 0) < 0 ||
-        cluster->epoch == 0) {
-        cluster->epoch = 1;
+        cluster->epoch <= 1) {
+        cluster->epoch = 2;
     }
     if (find_program(options->program, path, sizeof path, error) != 0) {
         return error->code;
@@ -249,4 +254,54 @@ void host_cluster_stop(struct host_cluster *cluster)
         close(cluster->wire);
         cluster->wire = -1;
     }
+}
+
+/* --- as a machine --------------------------------------------------------- */
+
+static uint64_t machine_now_us(void *context)
+{
+    (void)context;
+    return host_now_us();
+}
+
+static void machine_idle(void *context, uint64_t wait_us)
+{
+    struct host_cluster *cluster = context;
+    struct pollfd fd = {cluster->wire, tcp_events(&cluster->pipe), 0};
+    struct timespec wait = {(time_t)(wait_us / 1000000),
+                            (long)(wait_us % 1000000) * 1000};
+    (void)ppoll(&fd, fd.events != 0, &wait, NULL);
+}
+
+static int machine_check(void *context, struct host_error *error)
+{
+    return host_cluster_check(context, error);
+}
+
+static bool machine_ended(void *context)
+{
+    return host_cluster_ended(context);
+}
+
+static void machine_stop(void *context)
+{
+    host_cluster_stop(context);
+}
+
+struct host_machine host_cluster_machine(struct host_cluster *cluster)
+{
+    struct host_machine machine;
+    memset(&machine, 0, sizeof machine);
+    tcp_pipe_init(&cluster->pipe, cluster->wire);
+    machine.context = cluster;
+    machine.nodes = cluster->nodes;
+    machine.dimension = cluster->dimension;
+    machine.epoch = cluster->epoch - 1;
+    machine.pipe = tcp_link_pipe(&cluster->pipe);
+    machine.now_us = machine_now_us;
+    machine.idle = machine_idle;
+    machine.check = machine_check;
+    machine.ended = machine_ended;
+    machine.stop = machine_stop;
+    return machine;
 }

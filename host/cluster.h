@@ -6,8 +6,8 @@
  * a fork and an exec a node.
  *
  *     host_cluster_start(&cluster, &options, &error);
- *     ... use cluster.wire, the host's end of the wire to node 0 ...
- *     if (host_cluster_check(&cluster, &error) != 0) a node has died;
+ *     machine = host_cluster_machine(&cluster);
+ *     ... give it to the service ...
  *     host_cluster_stop(&cluster);
  */
 #ifndef HOST_CLUSTER_H
@@ -17,7 +17,9 @@
 #include <stdint.h>
 #include <sys/types.h>
 
+#include "../transport/drivers/tcp.h"
 #include "error.h"
+#include "machine.h"
 #include "wires.h"
 
 enum {
@@ -27,7 +29,7 @@ enum {
 };
 
 struct host_cluster_options {
-    unsigned nodes;      /* a power of two, at most HOST_NODES_MAX */
+    unsigned nodes;      /* a power of two, at most HOST_PROCESSES_MAX */
     uint64_t memory;     /* bytes of data memory a node, stack included */
     unsigned window;     /* frames a link and direction; 0: node's choice */
     const char *program; /* NULL: incode-node beside this executable */
@@ -41,15 +43,19 @@ struct host_process {
 
 struct host_cluster {
     unsigned nodes, dimension;
-    uint32_t epoch;
+    uint32_t epoch;       /* of this start of the cube */
+    struct tcp_pipe pipe; /* of wire */
     int wire;     /* a connected socket to node 0, non-blocking; -1: none */
     bool limited; /* the kernel holds the nodes to their memory */
-    struct host_process process[HOST_NODES_MAX];
+    struct host_process process[HOST_PROCESSES_MAX];
 };
 
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,
                        struct host_error *error);
+
+/* The cluster as the service's machine, which points to it. */
+struct host_machine host_cluster_machine(struct host_cluster *cluster);
 
 /* 0 while every node lives; else HOST_CUBE, naming the node. */
 int host_cluster_check(struct host_cluster *cluster, struct host_error *error);

@@ -164,7 +164,7 @@ int host_intake(struct host_service *service,
                 const struct cube_message *message, struct host_error *error)
 {
     struct host_node_report *report;
-    if (message->source >= service->cluster->nodes) {
+    if (message->source >= service->machine->nodes) {
         return unsound(message, "is not of this cube", error);
     }
     report = &service->report[message->source];

@@ -18,6 +18,8 @@
 #include "../transport/link.h"
 #include "error.h"
 
+enum { HOST_NODES_MAX = 1024 }; /* of any machine: 2^CUBE_DIMENSION_MAX */
+
 struct host_machine {
     void *context;
     unsigned nodes, dimension;

@@ -43,7 +43,7 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
         }
         return 0;
     case 'n':
-        if (host_parse_number(value, 1, HOST_NODES_MAX, &n) != 0 ||
+        if (host_parse_number(value, 1, HOST_PROCESSES_MAX, &n) != 0 ||
             (n & (n - 1)) != 0) {
             argp_error(state,
                        "--nodes %s: not a number of nodes of a cube; "

@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include "../node/node.h"
-#include "../transport/drivers/tcp.h"
 #include "facets.h"
 #include "report.h"
 #include "stats.h"
@@ -53,7 +52,7 @@ static unsigned suitable_nodes(void)
 {
     long processors = sysconf(_SC_NPROCESSORS_ONLN);
     unsigned nodes = 1;
-    while (nodes < HOST_NODES_MAX && (long)nodes * 2 <= processors) {
+    while (nodes < HOST_PROCESSES_MAX && (long)nodes * 2 <= processors) {
         nodes *= 2;
     }
     return nodes;
@@ -88,10 +87,7 @@ static uint64_t peak_bytes(void)
 static void gather_reports(const struct host_service *service,
                            struct host_run_result *r)
 {
-    memcpy(r->node, service->report, sizeof r->node);
-    r->limited = service->cluster->limited;
-    (void)tcp_buffers(service->cluster->wire, &r->socket_send_bytes,
-                      &r->socket_receive_bytes);
+    memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
     r->retransmitted = service->retransmitted;
     r->faces_spilled = service->spill.faces_total;
     for (unsigned i = 0; i < r->nodes; i++) {
@@ -120,7 +116,6 @@ static void gather_reports(const struct host_service *service,
 /* The part on the nodes: ordered points in, rows of input rows out. */
 static int run_service(const struct host_run_options *options,
                        const struct host_order *order,
-                       struct host_cluster *cluster,
                        struct host_service *service,
                        struct host_tetrahedra *tets,
                        struct host_run_result *result, struct host_error *error)
@@ -130,7 +125,7 @@ static int run_service(const struct host_run_options *options,
     service->setup.setup.index = (uint8_t)options->index;
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
-    service->workers = result->strategy == HOST_SEQUENTIAL ? 1 : cluster->nodes;
+    service->workers = result->strategy == HOST_SEQUENTIAL ? 1 : result->nodes;
     int status = host_service_run(service, error);
     gather_reports(service, result);
     result->time_io_s += 1e-6 * (double)service->pages_us;
@@ -177,33 +172,30 @@ static int check_memory(const struct host_run_options *options, unsigned nodes,
                            (unsigned long long)needed / 1024);
 }
 
-int host_triangulate(const struct host_run_options *options,
-                     const struct host_points *points,
-                     struct host_tetrahedra *tets,
-                     struct host_run_result *result, struct host_error *error)
+int host_triangulate_on(const struct host_run_options *options,
+                        struct host_machine *machine,
+                        const struct host_points *points,
+                        struct host_tetrahedra *tets,
+                        struct host_run_result *result,
+                        struct host_error *error)
 {
     static struct host_service service;
-    struct host_cluster cluster;
+    struct host_hindered hindered;
+    struct host_machine slowed;
     struct host_order order;
-    struct host_cluster_options nodes = {0};
     uint64_t start = host_now_us();
     memset(&service, 0, sizeof service);
     memset(&order, 0, sizeof order);
-    settle(options, result);
-    nodes.nodes = result->nodes;
-    nodes.memory = options->memory;
-    nodes.window = options->window;
-    nodes.program = options->node_program;
-    if (check_memory(options, result->nodes, 1, order.cells, error) != 0 ||
-        host_cluster_start(&cluster, &nodes, error) != 0) {
-        return error->code;
+    service.machine = machine;
+    if (options->hindrance.stall_us_max != 0 ||
+        options->hindrance.bytes_a_second != 0) {
+        slowed = host_hinder(&hindered, machine, &options->hindrance);
+        service.machine = &slowed;
     }
-    service.cluster = &cluster;
     service.window = options->window;
-    service.hindrance = options->hindrance;
     service.show_progress = options->progress && !options->quiet;
     int status = host_service_start(&service, error);
-    result->time_start_up_s = seconds_since(start);
+    result->time_start_up_s += seconds_since(start);
     start = host_now_us();
     if (status == 0) {
         status = host_order_make(
@@ -221,8 +213,7 @@ int host_triangulate(const struct host_run_options *options,
                               error);
     }
     if (status == 0) {
-        status = run_service(options, &order, &cluster, &service, tets, result,
-                             error);
+        status = run_service(options, &order, &service, tets, result, error);
     }
     result->time_triangulation_s = seconds_since(start);
     result->tetrahedra = tets->count;
@@ -239,6 +230,32 @@ int host_triangulate(const struct host_run_options *options,
     }
     host_order_free(&order);
     return status;
+}
+
+int host_triangulate(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_tetrahedra *tets,
+                     struct host_run_result *result, struct host_error *error)
+{
+    static struct host_cluster cluster;
+    static const uint32_t no_cells[3] = {0, 0, 0};
+    struct host_cluster_options nodes = {0};
+    uint64_t start = host_now_us();
+    settle(options, result);
+    nodes.nodes = result->nodes;
+    nodes.memory = options->memory;
+    nodes.window = options->window;
+    nodes.program = options->node_program;
+    if (check_memory(options, result->nodes, 1, no_cells, error) != 0 ||
+        host_cluster_start(&cluster, &nodes, error) != 0) {
+        return error->code;
+    }
+    struct host_machine machine = host_cluster_machine(&cluster);
+    result->limited = cluster.limited;
+    (void)tcp_buffers(cluster.wire, &result->socket_send_bytes,
+                      &result->socket_receive_bytes);
+    result->time_start_up_s = seconds_since(start);
+    return host_triangulate_on(options, &machine, points, tets, result, error);
 }
 
 /* Whether standard output takes tetrahedra or statistics. */

@@ -11,6 +11,8 @@
 #ifndef HOST_RUN_H
 #define HOST_RUN_H
 
+#include "cluster.h"
+#include "hindrance.h"
 #include "order.h"
 #include "points.h"
 #include "service.h"
@@ -75,6 +77,16 @@ int host_triangulate(const struct host_run_options *options,
                      const struct host_points *points,
                      struct host_tetrahedra *tets,
                      struct host_run_result *result, struct host_error *error);
+
+/* The same on nodes that are there already, result->nodes of them, with
+ * result's strategy and memory as they are.  Ends the machine, whatever
+ * happens. */
+int host_triangulate_on(const struct host_run_options *options,
+                        struct host_machine *machine,
+                        const struct host_points *points,
+                        struct host_tetrahedra *tets,
+                        struct host_run_result *result,
+                        struct host_error *error);
 
 /* The whole command: reads, triangulates, verifies, writes. */
 int host_run(const struct host_run_options *options,

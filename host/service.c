@@ -1,15 +1,9 @@
 #include "service.h"
 
-#include <errno.h>
-#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-#include <unistd.h>
 
-#include "../transport/drivers/tcp.h"
 #include "intake.h"
-#include "memory.h"
 
 enum {
     WINDOW_DEFAULT = 32,
@@ -21,72 +15,23 @@ enum {
     CREDITS_SHARED = 128
 };
 
-/* The host's end of the wire, slowed down where a test asks for it. */
-struct host_wire {
-    struct tcp_pipe tcp;
-    struct link_pipe pipe; /* of tcp */
-    uint64_t start_us, taken;
-    struct host_hindrance hindrance;
-};
-
-static uint64_t draw(uint64_t *state)
+static uint64_t now_of(const struct host_service *s)
 {
-    *state ^= *state << 13;
-    *state ^= *state >> 7;
-    *state ^= *state << 17;
-    return *state;
-}
-
-/* The tests' slow host: so many bytes a second, for a while. */
-static int receive_slowly(void *context, uint8_t *bytes, size_t size)
-{
-    struct host_wire *wire = context;
-    uint64_t passed = host_now_us() - wire->start_us;
-    if (passed < wire->hindrance.slow_us) {
-        uint64_t allowed =
-            passed * wire->hindrance.bytes_a_second / 1000000 + 1;
-        if (wire->taken >= allowed) {
-            return 0;
-        }
-        size = allowed - wire->taken < size ? (size_t)(allowed - wire->taken)
-                                            : size;
-    }
-    int got = wire->pipe.receive(wire->pipe.context, bytes, size);
-    wire->taken += got > 0 ? (uint64_t)got : 0;
-    return got;
-}
-
-static int send_on(void *context, const uint8_t *bytes, size_t size)
-{
-    struct host_wire *wire = context;
-    return wire->pipe.send(wire->pipe.context, bytes, size);
+    return s->machine->now_us(s->machine->context);
 }
 
 static int make_cube(struct host_service *s, struct host_error *error)
 {
     struct cube_config config;
     memset(&config, 0, sizeof config);
-    s->wire = calloc(1, sizeof *s->wire);
-    if (s->wire == NULL) {
-        return host_fail_memory(error, "the wire");
-    }
-    tcp_pipe_init(&s->wire->tcp, s->cluster->wire);
-    s->wire->pipe = tcp_link_pipe(&s->wire->tcp);
-    s->wire->hindrance = s->hindrance;
-    s->wire->start_us = host_now_us();
     config.self = CUBE_HOST;
-    config.dimension = (uint8_t)s->cluster->dimension;
+    config.dimension = (uint8_t)s->machine->dimension;
     config.window = (uint16_t)(s->window == 0 ? WINDOW_DEFAULT : s->window);
     if (config.window > LINK_WINDOW_MAX) {
         config.window = LINK_WINDOW_MAX;
     }
-    config.epoch = s->cluster->epoch - 1;
-    config.pipes[0] = s->wire->pipe;
-    if (s->hindrance.bytes_a_second != 0) {
-        config.pipes[0].context = s->wire;
-        config.pipes[0].receive = receive_slowly;
-        config.pipes[0].send = send_on;
-    }
+    config.epoch = s->machine->epoch;
+    config.pipes[0] = s->machine->pipe;
     size_t bytes = cube_arena_bytes(&config);
     s->cube_memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
     if (s->cube_memory == NULL) {
@@ -97,7 +42,7 @@ static int make_cube(struct host_service *s, struct host_error *error)
         return host_fail(error, HOST_BROKEN,
                          "host: the cube of %u nodes does not come up; please "
                          "report this",
-                         s->cluster->nodes);
+                         s->machine->nodes);
     }
     return 0;
 }
@@ -106,14 +51,8 @@ static int make_cube(struct host_service *s, struct host_error *error)
 static void wait_for_wire(struct host_service *s, uint64_t now_us)
 {
     uint64_t due = cube_next_due_us(s->cube, now_us);
-    struct pollfd fd = {s->cluster->wire, tcp_events(&s->wire->tcp), 0};
-    uint64_t most = s->hindrance.bytes_a_second == 0 ? CHECK_EVERY_US : 1000;
-    due = due > most ? most : due;
-    if (s->hindrance.bytes_a_second != 0) {
-        fd.events = 0;
-    }
-    struct timespec wait = {0, (long)due * 1000};
-    (void)ppoll(&fd, 1, &wait, NULL);
+    s->machine->idle(s->machine->context,
+                     due > CHECK_EVERY_US ? CHECK_EVERY_US : due);
 }
 
 /* Whether nodes live, and the wire to node 0 holds.  A wire that closes is as a
@@ -128,26 +67,16 @@ static int check(struct host_service *s, uint64_t now_us,
     if (cube_link_state(s->cube, 0) != LINK_DOWN) {
         s->wire_seen_us = now_us;
     }
-    if (host_cluster_check(s->cluster, error) != 0) {
+    if (s->machine->check(s->machine->context, error) != 0) {
         return error->code;
     }
     if (now_us - s->wire_seen_us > WIRE_LOST_US) {
         return host_fail(error, HOST_CUBE,
                          "node 0 link %u: the wire to the host is closed; run "
                          "again, and look for what closed it",
-                         s->cluster->dimension);
+                         s->machine->dimension);
     }
     return 0;
-}
-
-static void hinder(struct host_service *s)
-{
-    if (s->hindrance.stall_us_max != 0 && draw(&s->random) % 16 == 0) {
-        uint64_t us = draw(&s->random) % s->hindrance.stall_us_max;
-        struct timespec wait = {(time_t)(us / 1000000),
-                                (long)(us % 1000000) * 1000};
-        (void)nanosleep(&wait, NULL);
-    }
 }
 
 /* Reads all that has come: bytes first, then messages. */
@@ -217,7 +146,7 @@ static bool serve_node(struct host_service *s, uint16_t to,
     struct host_node *node = &s->node[to];
     /* A broadcast and a letter go different ways: jobs wait until every node
      * has its setup. */
-    if (node->job_due && s->ready == s->cluster->nodes) {
+    if (node->job_due && s->ready == s->machine->nodes) {
         node->job_due = cube_write(s->cube, to, NODE_JOB, &node->job,
                                    sizeof node->job) != 0;
         return !node->job_due;
@@ -253,21 +182,21 @@ static unsigned serve(struct host_service *s, struct host_error *error)
         s->setup_due = false;
         sent++;
     }
-    while (idle < s->cluster->nodes && error->code == 0) {
+    while (idle < s->machine->nodes && error->code == 0) {
         if (serve_node(s, (uint16_t)s->turn, error)) {
             sent++;
             idle = 0;
         } else {
             idle++;
         }
-        s->turn = (s->turn + 1) % s->cluster->nodes;
+        s->turn = (s->turn + 1) % s->machine->nodes;
     }
     return sent;
 }
 
 static bool pages_wait(const struct host_service *s)
 {
-    for (unsigned i = 0; i < s->cluster->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (s->node[i].pages_count > 0) {
             return true;
         }
@@ -278,21 +207,20 @@ static bool pages_wait(const struct host_service *s)
 /* One round of the loop: read, serve, and sleep where nothing moved. */
 static int round_trip(struct host_service *s, struct host_error *error)
 {
-    uint64_t now = host_now_us();
+    uint64_t now = now_of(s);
     unsigned moved = (unsigned)cube_poll(s->cube, now);
     if (read_all(s, &moved, error) != 0) {
         return error->code;
     }
     if (s->started) {
         bool pages = pages_wait(s);
-        uint64_t begun = pages ? host_now_us() : 0;
+        uint64_t begun = pages ? now_of(s) : 0;
         moved += serve(s, error);
-        s->pages_us += pages ? host_now_us() - begun : 0;
+        s->pages_us += pages ? now_of(s) - begun : 0;
     }
     if (error->code != 0 || check(s, now, error) != 0) {
         return error->code;
     }
-    hinder(s);
     if (moved == 0) {
         wait_for_wire(s, now);
     }
@@ -301,32 +229,32 @@ static int round_trip(struct host_service *s, struct host_error *error)
 
 int host_service_start(struct host_service *service, struct host_error *error)
 {
-    uint64_t start = host_now_us();
+    uint64_t start = now_of(service);
     service->wire_seen_us = start;
-    service->random = service->hindrance.seed * 2 + 88172645463325253u;
     service->spill.file = -1;
-    service->node = calloc(service->cluster->nodes, sizeof *service->node);
-    if (service->node == NULL) {
+    service->node = calloc(service->machine->nodes, sizeof *service->node);
+    service->report = calloc(service->machine->nodes, sizeof *service->report);
+    if (service->node == NULL || service->report == NULL) {
         return host_fail_memory(error, "the nodes' queues");
     }
     if (make_cube(service, error) != 0) {
         return error->code;
     }
     bool called = false;
-    while (service->here < service->cluster->nodes) {
+    while (service->here < service->machine->nodes) {
         called = called ||
                  cube_write(service->cube, CUBE_ALL, NODE_CALL, NULL, 0) == 0;
         if (round_trip(service, error) != 0) {
             return error->code;
         }
-        if (host_now_us() - start > BRING_UP_US_MAX ||
+        if (now_of(service) - start > BRING_UP_US_MAX ||
             cube_link_state(service->cube, 0) == LINK_REFUSED) {
             return host_fail(error, HOST_CUBE,
                              "node 0 link %u: %u of %u nodes answer; is "
                              "incode-node of this version, and the machine "
                              "not too busy?",
-                             service->cluster->dimension, service->here,
-                             service->cluster->nodes);
+                             service->machine->dimension, service->here,
+                             service->machine->nodes);
         }
     }
     return 0;
@@ -337,14 +265,14 @@ static void prepare(struct host_service *s)
 {
     const struct host_order *order = s->order;
     s->setup.protocol = NODE_PROTOCOL;
-    s->setup.nodes = (uint16_t)s->cluster->nodes;
-    s->setup.holders = (uint16_t)(s->cluster->nodes - s->workers);
-    s->setup.credits = CREDITS_MIN + CREDITS_SHARED / s->cluster->nodes;
+    s->setup.nodes = (uint16_t)s->machine->nodes;
+    s->setup.holders = (uint16_t)(s->machine->nodes - s->workers);
+    s->setup.credits = CREDITS_MIN + CREDITS_SHARED / s->machine->nodes;
     s->setup.setup.bricks = order->bricks;
     memcpy(s->setup.setup.lo, order->lo, sizeof order->lo);
     memcpy(s->setup.setup.hi, order->hi, sizeof order->hi);
     memcpy(s->setup.setup.cells, order->cells, sizeof order->cells);
-    for (unsigned i = 0; i < s->cluster->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
         node->credit = s->setup.credits;
         node->job_due = i < s->workers;
@@ -366,7 +294,7 @@ static void prepare(struct host_service *s)
 int host_service_run(struct host_service *service, struct host_error *error)
 {
     struct host_service *s = service;
-    if (host_ledger_init(&s->ledger, s->order->bricks, s->cluster->nodes,
+    if (host_ledger_init(&s->ledger, s->order->bricks, s->machine->nodes,
                          error) != 0 ||
         host_spill_init(&s->spill, 0, error) != 0) {
         return error->code;
@@ -374,13 +302,13 @@ int host_service_run(struct host_service *service, struct host_error *error)
     prepare(s);
     host_progress_start(&s->progress, s->show_progress);
     bool asked = false;
-    while (s->done < s->cluster->nodes) {
+    while (s->done < s->machine->nodes) {
         if (round_trip(s, error) != 0) {
             host_progress_end(&s->progress);
             return error->code;
         }
         if (!asked && s->done == s->workers) {
-            for (unsigned i = s->workers; i < s->cluster->nodes; i++) {
+            for (unsigned i = s->workers; i < s->machine->nodes; i++) {
                 s->node[i].report_due = true;
             }
             asked = true;
@@ -403,13 +331,14 @@ int host_service_run(struct host_service *service, struct host_error *error)
 void host_service_end(struct host_service *service)
 {
     struct host_service *s = service;
-    uint64_t start = host_now_us();
+    uint64_t start = now_of(service);
     bool told = s->cube == NULL || !s->finished, closing = false;
     if (!s->finished) {
-        host_cluster_stop(s->cluster); /* nothing to wait for */
+        s->machine->stop(s->machine->context); /* nothing to wait for */
     }
-    while (!told || (s->cube != NULL && !host_cluster_ended(s->cluster))) {
-        uint64_t now = host_now_us();
+    while (!told ||
+           (s->cube != NULL && !s->machine->ended(s->machine->context))) {
+        uint64_t now = now_of(s);
         unsigned moved = (unsigned)cube_poll(s->cube, now);
         struct cube_message message;
         while (cube_read(s->cube, &message)) {
@@ -427,14 +356,14 @@ void host_service_end(struct host_service *service)
             wait_for_wire(s, now);
         }
     }
-    host_cluster_stop(s->cluster);
+    s->machine->stop(s->machine->context);
     host_ledger_free(&s->ledger);
     host_spill_free(&s->spill);
     free(s->node);
-    free(s->wire);
+    free(s->report);
     free(s->cube_memory);
     s->cube = NULL;
     s->node = NULL;
-    s->wire = NULL;
+    s->report = NULL;
     s->cube_memory = NULL;
 }

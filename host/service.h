@@ -3,7 +3,7 @@
  * watches over the nodes.  One loop, one thread; it never waits to write while
  * there is something to read.
  *
- * Memory: the cube's windows, 2 KiB a node, a bit a brick, the spilled faces
+ * Memory: the cube's windows, 3 KiB a node, a bit a brick, the spilled faces
  * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
  *
  *     host_service_run(&service, &error);
@@ -14,22 +14,14 @@
 #define HOST_SERVICE_H
 
 #include "../node/message.h"
-#include "cluster.h"
 #include "ledger.h"
+#include "machine.h"
 #include "order.h"
 #include "progress.h"
 #include "spill.h"
 #include "tetrahedra.h"
 
 enum { HOST_PAGES_QUEUED_MAX = 256, HOST_UNSPILLS_MAX = 64 };
-
-/* Hooks of the tests: a host that is slow on purpose. */
-struct host_hindrance {
-    uint64_t stall_us_max;   /* sleeps up to this long, at random */
-    uint64_t bytes_a_second; /* reads no faster; 0: unlimited */
-    uint64_t slow_us;        /* as long as this after the start */
-    uint64_t seed;
-};
 
 /* What the host knows of one node while it runs. */
 struct host_node {
@@ -57,19 +49,18 @@ struct host_node_report {
 
 struct host_service {
     /* Given by the caller, who clears the rest. */
-    struct host_cluster *cluster;
+    struct host_machine *machine;
     const struct host_order *order;
     struct host_tetrahedra *tets; /* takes rows of vertex numbers */
     struct node_setup_message setup;
     unsigned window; /* frames; 0: a large one */
     bool show_progress;
-    struct host_hindrance hindrance;
     /* One job a node: regions of the order; nodes beyond `workers` hold. */
     unsigned workers;
     /* Results. */
-    struct host_node_report report[HOST_NODES_MAX];
-    uint64_t pages_us;      /* time spent on serving pages */
-    uint64_t retransmitted; /* frames, on the host's wire */
+    struct host_node_report *report; /* [nodes], until the end */
+    uint64_t pages_us;               /* time spent on serving pages */
+    uint64_t retransmitted;          /* frames, on the host's wire */
     /* Private. */
     struct cube *cube;
     void *cube_memory;
@@ -77,15 +68,14 @@ struct host_service {
     struct host_ledger ledger;
     struct host_spill spill;
     struct host_progress progress;
-    struct host_wire *wire;
     bool setup_due, started, finished;
     unsigned here, ready, done; /* nodes that are up; that have their setup;
                                    that finished */
     unsigned turn;              /* the node to be served next */
-    uint64_t random, check_us, wire_seen_us;
+    uint64_t check_us, wire_seen_us;
 };
 
-/* Brings up the cube on the cluster's wire, and waits until every node has
+/* Brings up the cube on the machine's wire, and waits until every node has
  * answered: the start-up. */
 int host_service_start(struct host_service *service, struct host_error *error);
 

@@ -71,7 +71,7 @@ int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
 
 void host_wires_close_nodes(struct host_wires *wires)
 {
-    for (unsigned i = 0; i < HOST_NODES_MAX; i++) {
+    for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
         for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
             close_end(&wires->end[i][d]);
         }

@@ -1,8 +1,8 @@
 /* The wires between nodes that this machine emulates, and from the host to node
  * 0: pairs of open files, one end for each side, by kind.
  *
- * Memory: 4 bytes for each port of HOST_NODES_MAX nodes; in the kernel what a
- * wire of its kind takes.  Work: a few system calls a wire.
+ * Memory: 4 bytes for each port of HOST_PROCESSES_MAX nodes; in the kernel what
+ * a wire of its kind takes.  Work: a few system calls a wire.
  *
  *     host_wires_make(&wires, HOST_WIRE_TCP, nodes, dimension, &error);
  *     ... hand wires.end[node][link] to the nodes, use wires.host ...
@@ -14,13 +14,13 @@
 #include "../transport/cube.h"
 #include "error.h"
 
-enum { HOST_NODES_MAX = 64 }; /* on one machine */
+enum { HOST_PROCESSES_MAX = 64 }; /* nodes on one machine */
 
 enum host_wire_kind { HOST_WIRE_TCP };
 
 struct host_wires {
     int host; /* the host's end of its wire to node 0; -1: none */
-    int end[HOST_NODES_MAX][CUBE_LINKS_MAX]; /* [node][link]; -1: none */
+    int end[HOST_PROCESSES_MAX][CUBE_LINKS_MAX]; /* [node][link]; -1: none */
 };
 
 /* All ends non-blocking and closed on exec.  HOST_CUBE where the machine does

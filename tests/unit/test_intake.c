@@ -26,7 +26,7 @@ static uint32_t draw(uint32_t below)
 }
 
 static struct host_service service;
-static struct host_cluster cluster;
+static struct host_machine machine;
 static struct host_order order;
 static struct host_tetrahedra tets;
 
@@ -56,13 +56,15 @@ static void begin(void)
     struct host_error error = {0};
     memset(&service, 0, sizeof service);
     memset(&tets, 0, sizeof tets);
-    cluster.nodes = NODES;
-    service.cluster = &cluster;
+    machine.nodes = NODES;
+    service.machine = &machine;
     service.order = &order;
     service.tets = &tets;
     service.workers = NODES;
     service.node = calloc(NODES, sizeof *service.node);
+    service.report = calloc(NODES, sizeof *service.report);
     assert_non_null(service.node);
+    assert_non_null(service.report);
     assert_int_equal(
         host_ledger_init(&service.ledger, order.bricks, NODES, &error), 0);
     assert_int_equal(host_spill_init(&service.spill, 0, &error), 0);
@@ -75,6 +77,7 @@ static void begin(void)
 static void end(void)
 {
     free(service.node);
+    free(service.report);
     host_ledger_free(&service.ledger);
     host_spill_free(&service.spill);
     host_tetrahedra_free(&tets);
