@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "check.h"
+#include "simd.h"
 #include "state.h"
 
 /* MakeTetra: the apex of a face.  Among the gathered points, single precision
@@ -163,74 +164,60 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
 
 struct face {
     double b[3], c[3]; /* relative to v */
-    double m[3], nn;   /* m / nn: twice the circumcentre; nn = |n|^2 */
+    bool regular;      /* neither thin nor out of the range of floats */
+    struct incode_pencil pencil;
 };
 
+/* A regular face's circumcentre is right to 1e-9 of its size: the sine of its
+ * angle at v is 1e-3 at least. */
 static void set_face(struct face *f, const struct incode_sphere *s)
 {
-    double cn[3], nb[3];
+    double cn[3], nb[3], nn = incode_dot(s->n, s->n);
+    double product = s->lb * s->lc;
+    f->pencil.size = s->lb > s->lc ? s->lb : s->lc;
+    f->regular = nn > 1e-6 * product * product && product > 1e-12 &&
+                 f->pencil.size < 1e6;
+    if (!f->regular)
+        return;
     incode_cross(cn, f->c, s->n);
     incode_cross(nb, s->n, f->b);
-    f->nn = incode_dot(s->n, s->n);
-    for (int d = 0; d < 3; d++)
-        f->m[d] = s->bb * cn[d] + s->cc * nb[d];
-}
-
-/* Whether single precision may propose an apex: nothing out of its range. */
-static bool is_regular(const struct face *f)
-{
-    return f->nn > 1e-60 && f->nn < 1e60 &&
-           incode_max_norm(f->m) < 1e12 * f->nn;
-}
-
-/* Of the sphere, only the closed cap beyond the face matters: where an extreme
- * point of the sphere lies on the known side, the rim of the face's circle is
- * the extreme. */
-static bool cap_fits(const double rlo[3], const double rhi[3],
-                     const struct incode_sphere *s, const struct face *f,
-                     double radius, double wide)
-{
-    double half = 0.5 / s->det, inverse = 1 / f->nn, centre[3], n[3], c0[3];
-    double unit = __builtin_sqrt(inverse);
+    double inverse = 1 / nn, unit = __builtin_sqrt(inverse);
+    double sb = 0.5 * inverse * s->bb, sc = 0.5 * inverse * s->cc;
     for (int d = 0; d < 3; d++) {
-        centre[d] = s->m[d] * half;
-        n[d] = s->n[d] * unit;
-        c0[d] = 0.5 * f->m[d] * inverse;
+        f->pencil.c0[d] = sb * cn[d] + sc * nb[d];
+        f->pencil.n[d] = s->n[d] * unit;
     }
-    double circle = __builtin_sqrt(incode_dot(c0, c0));
-    double level = incode_dot(n, centre);
-    for (int d = 0; d < 3; d++) {
-        double hi = centre[d] + radius, lo = centre[d] - radius;
-        double flat = 1 - n[d] * n[d];
-        double rim = circle * (flat > 0 ? __builtin_sqrt(flat) : 0);
-        if (level + radius * n[d] < 0)
-            hi = c0[d] + rim;
-        if (level - radius * n[d] < 0)
-            lo = c0[d] - rim;
-        if (!(hi + wide < rhi[d] && lo - wide > rlo[d]))
-            return false;
-    }
-    return true;
 }
 
-/* Whether the closed cap of the sphere beyond the face lies strictly inside a
- * box that was scanned.  Conservative: everything is widened by 1e-6 of the
- * sphere's size, and an ill-conditioned sphere is never accepted. */
-static bool cap_is_within(const double rlo[3], const double rhi[3],
-                          const struct incode_sphere *s, const struct face *f)
+/* Six numbers along the axes' two directions each: what stands for the walls of
+ * a box. */
+INCODE_INLINE incode_vd both_ways(const double a[3])
 {
-    if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) || !is_regular(f) ||
-        !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
-        return false;
-    /* The centre is m / (2 det), the radius its length. */
-    double length = __builtin_sqrt(incode_dot(s->m, s->m)), two = 2 * s->det;
-    double wide =
-        length * 1e-6 + 12 * INCODE_SPHERE_EPS * incode_max_norm(s->pm);
-    bool fits = true;
-    for (int d = 0; d < 3; d++)
-        fits = fits && s->m[d] + length + wide < rhi[d] * two &&
-               s->m[d] - length - wide > rlo[d] * two;
-    return fits || cap_fits(rlo, rhi, s, f, length / two, wide / two);
+    return (incode_vd){a[0], a[1], a[2], 0, -a[0], -a[1], -a[2], 0};
+}
+
+/* Whether the closed cap, beyond the face, of the sphere at t of the pencil
+ * lies strictly within the gathered box.  Where an extreme point of the sphere
+ * is on the known side, the rim of the face's circle is the extreme.
+ * Everything is widened by 1e-6 of the sphere's size. */
+static bool cap_is_gathered(const struct incode_gather *g,
+                            const struct incode_pencil *pencil, double t)
+{
+    incode_vd zero = incode_vd_all(0), n = both_ways(pencil->n);
+    incode_vd c0 = both_ways(pencil->c0);
+    double circle = incode_dot(pencil->c0, pencil->c0);
+    double square = circle + 0.25 * t * t, radius = __builtin_sqrt(square);
+    incode_vd wall = incode_vd_load(g->wall);
+    incode_vd gap = wall - (c0 + incode_vd_all(0.5 * t) * n);
+    incode_vl in =
+        (gap > zero) & (gap * gap > incode_vd_all(square * (1 + 4e-6)));
+    incode_vl known =
+        n * incode_vd_all(radius) < incode_vd_all(-0.5 * t - 2e-6 * radius);
+    incode_vd rim =
+        incode_vd_all(circle + 4e-6 * square) - incode_vd_all(circle) * n * n;
+    incode_vd short_gap = wall - c0;
+    in |= known & (short_gap > zero) & (short_gap * short_gap > rim);
+    return incode_vd_mask(in) == 0xff;
 }
 
 struct near {
@@ -241,6 +228,34 @@ struct near {
     struct face face;
     struct incode_sphere sphere;
 };
+
+/* The same for a sphere of any face; an ill-conditioned one is never accepted.
+ * The centre is m / (2 det), the radius its length. */
+static bool cap_is_within(const struct incode_gather *g,
+                          const struct incode_sphere *s)
+{
+    if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
+        !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
+        return false;
+    double nn = incode_dot(s->n, s->n), half = 0.5 / s->det;
+    double centre[3], t = 2 * incode_dot(s->n, s->m) * half;
+    struct incode_pencil pencil;
+    double unit = 1 / __builtin_sqrt(nn);
+    double length = __builtin_sqrt(incode_dot(s->m, s->m)) * half;
+    double error = 12 * INCODE_SPHERE_EPS * incode_max_norm(s->pm) * half;
+    if (!(error < 1e-7 * length))
+        return false;
+    /* Without a good normal, the whole sphere. */
+    if (!(nn > 1e-60) ||
+        !(INCODE_SPHERE_EPS * s->pn[0] < 1e-8 * incode_max_norm(s->n)))
+        t = unit = 0;
+    for (int d = 0; d < 3; d++) {
+        centre[d] = s->m[d] * half;
+        pencil.n[d] = s->n[d] * unit;
+        pencil.c0[d] = centre[d] - 0.5 * t * unit * pencil.n[d];
+    }
+    return cap_is_gathered(g, &pencil, t * unit);
+}
 
 static void copy_point(double p[3], const struct incode_gather *g, uint32_t i)
 {
@@ -284,56 +299,86 @@ static void consider(struct near *n, uint32_t i)
         incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, p, g->scale);
 }
 
-/* The first of points [from, to) by approximate Delaunay distance, if it is
- * certain to be beyond the face. */
-static void propose(struct near *n, uint32_t from, uint32_t to)
+/* The points at hand against each other, by the predicates where their bounds
+ * do not tell. */
+static void contest(struct near *n, const uint16_t *first, uint32_t count)
 {
-    if (!is_regular(&n->face))
-        return;
-    uint32_t first = incode_gather_first(&n->t->gather, from, to, n->sphere.n,
-                                         n->face.m, n->face.nn);
-    if (first != INCODE_GATHER_NONE)
-        consider(n, first);
-}
-
-/* The points [from, to) against the best so far. */
-static void contest(struct near *n, uint32_t from, uint32_t to)
-{
+    const struct incode_gather *g = &n->t->gather;
     uint16_t inside[INCODE_NEAR_ALL];
-    n->t->stats.candidates += to - from;
-    uint32_t count =
-        incode_gather_inside(&n->t->gather, from, to, &n->sphere, inside);
-    for (uint32_t k = 0; k < count; k++)
-        consider(n, inside[k]);
+    for (uint32_t i = 0; i < count; i++)
+        consider(n, first[i]);
+    if (!n->face.regular)
+        for (uint32_t i = 0; i < g->near; i++)
+            consider(n, g->at[i]);
+    if (n->best == INCODE_GATHER_NONE)
+        return;
+    count = incode_gather_inside(g, &n->sphere, inside);
+    for (uint32_t i = 0; i < count; i++)
+        consider(n, inside[i]);
 }
 
-static bool is_certain(const struct near *n, const double rlo[3],
-                       const double rhi[3])
+/* Takes the only candidate if it is clearly beyond the face, and no point at
+ * hand can be inside its sphere, at *t of the pencil; false: that takes
+ * predicates. */
+static bool is_plain(struct near *n, const uint16_t *first, uint32_t count,
+                     double *t)
 {
-    return n->best != INCODE_GATHER_NONE &&
-           cap_is_within(rlo, rhi, &n->sphere, &n->face);
+    const struct incode_gather *g = &n->t->gather;
+    const struct incode_sphere *s = &n->sphere;
+    uint32_t only = INCODE_GATHER_NONE;
+    for (uint32_t i = 0; i < count; i++) {
+        if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
+            continue;
+        if (only != INCODE_GATHER_NONE)
+            return false;
+        only = first[i];
+    }
+    if (only == INCODE_GATHER_NONE)
+        return false;
+    double r[3], most = *t;
+    incode_gather_relative(g, only, r);
+    if (!(incode_dot(s->n, r) >
+          1e10 * INCODE_SPHERE_EPS * incode_max_norm(r) * s->lb * s->lc))
+        return false;
+    const struct incode_pencil *pencil = &n->face.pencil;
+    *t = (incode_dot(r, r) - 2 * incode_dot(pencil->c0, r)) /
+         incode_dot(pencil->n, r);
+    n->best = only;
+    return *t < most;
+}
+
+/* The sphere of the only candidate, for what lies beyond the points at hand. */
+static void set_sphere(struct near *n)
+{
+    double r[3];
+    copy_point(n->store[3], &n->t->gather, n->best);
+    incode_gather_relative(&n->t->gather, n->best, r);
+    incode_sphere_apex(&n->sphere, n->face.b, n->face.c, r);
 }
 
 static enum incode_near contest_all(struct near *n)
 {
-    const struct incode_gather *g = &n->t->gather;
-    propose(n, 0, g->inner);
-    bool inner = n->best != INCODE_GATHER_NONE;
-    if (inner)
-        contest(n, 0, g->inner);
-    if (is_certain(n, g->inner_lo, g->inner_hi))
-        return INCODE_NEAR_FOUND;
-    if (!inner)
-        propose(n, INCODE_OUTER, g->outer);
-    if (n->best != INCODE_GATHER_NONE) {
-        if (!inner)
-            contest(n, 0, g->inner);
-        contest(n, INCODE_OUTER, g->outer);
-    } else if (incode_hull_known(n->t, n->pv, n->pb, n->pc)) {
-        return INCODE_NEAR_HULL;
+    struct incode_gather *g = &n->t->gather;
+    uint16_t first[INCODE_NEAR_ALL];
+    uint32_t count = 0;
+    double t = 0;
+    n->t->stats.candidates += g->near;
+    if (n->face.regular)
+        count = incode_gather_first(g, &n->face.pencil, &t, first);
+    if (count > 0 && is_plain(n, first, count, &t)) {
+        if (cap_is_gathered(g, &n->face.pencil, t))
+            return INCODE_NEAR_FOUND;
+        set_sphere(n);
+        return INCODE_NEAR_SEARCH;
     }
-    return is_certain(n, g->rlo, g->rhi) ? INCODE_NEAR_FOUND
-                                         : INCODE_NEAR_SEARCH;
+    n->best = INCODE_GATHER_NONE;
+    contest(n, first, count);
+    if (n->best == INCODE_GATHER_NONE)
+        return incode_hull_known(n->t, n->pv, n->pb, n->pc)
+                   ? INCODE_NEAR_HULL
+                   : INCODE_NEAR_SEARCH;
+    return cap_is_within(g, &n->sphere) ? INCODE_NEAR_FOUND
+                                        : INCODE_NEAR_SEARCH;
 }
 
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
@@ -359,9 +404,8 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     if (incode_plane_is_blurred(&n.sphere))
         incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, g->scale);
     set_face(&n.face, &n.sphere);
-    uint64_t before = t->stats.candidates;
     enum incode_near r = contest_all(&n);
-    uint64_t looked = t->stats.candidates - before;
+    uint64_t looked = g->near;
     *apex = n.best;
     if (r != INCODE_NEAR_SEARCH) {
         incode_count_candidates(t, looked);

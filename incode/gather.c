@@ -11,8 +11,7 @@ void incode_gather_reset(struct incode_gather *g)
 {
     g->leaf = INCODE_NONE;
     g->around = g->count = 0;
-    g->inner = 0;
-    g->outer = INCODE_OUTER;
+    g->near = 0;
 }
 
 /* ---- around a leaf ---- */
@@ -67,6 +66,7 @@ enum incode_gathered incode_gather_around(struct incode_gather *g,
     }
     enum incode_walk r = incode_walk(walker, q, copy_leaves, g);
     g->count = g->around;
+    g->per_unit = 0;
     if (r == INCODE_WALK_WAIT)
         return INCODE_GATHER_WAIT;
     g->leaf = leaf;
@@ -82,105 +82,133 @@ enum incode_gathered incode_gather_around(struct incode_gather *g,
 
 /* ---- around a vertex ---- */
 
-/* w and l of points [first, end), and padding that no scan mistakes for a
- * point: up to two vectors, with l infinite. */
-static void set_lengths(struct incode_gather *g, uint32_t first, uint32_t end)
+/* The points around the leaf in whole units, up to about 2^30 of them to each
+ * side of the origin; what lies beyond is moved to the border. */
+#define UNITS_HALF 0x1p29
+#define UNITS_MOST 0x1.8p30
+#define UNITS_LEAST 4096 /* a radius */
+
+INCODE_INLINE incode_vd in_units(incode_vd p, double origin, double per_unit)
+{
+    incode_vd a = (p - incode_vd_all(origin)) * incode_vd_all(per_unit);
+    return incode_vd_max(incode_vd_min(a, incode_vd_all(UNITS_MOST)),
+                         incode_vd_all(-UNITS_MOST));
+}
+
+static int32_t unit_of(const struct incode_gather *g, int d, double p)
+{
+    double a = (p - g->origin[d]) * g->per_unit;
+    a = a < UNITS_MOST ? a : UNITS_MOST;
+    return (int32_t)(a > -UNITS_MOST ? a : -UNITS_MOST);
+}
+
+static void set_units(struct incode_gather *g, const double origin[3],
+                      double half)
+{
+    g->per_unit =
+        incode_scale_for(half > 0x1p-900 ? half : 0x1p-900) * UNITS_HALF;
+    memcpy(g->origin, origin, sizeof g->origin);
+    for (uint32_t i = 0; i < g->around; i += INCODE_VD_LANES)
+        for (int d = 0; d < 3; d++)
+            incode_vd_cut(g->unit[d] + i, in_units(incode_vd_load(g->p[d] + i),
+                                                   origin[d], g->per_unit));
+}
+
+/* Units that tell apart what is around p: those of the leaf as a rule. */
+static void choose_units(struct incode_gather *g, const double p[3],
+                         double radius)
+{
+    if (g->per_unit == 0) {
+        double origin[3], half = radius;
+        for (int d = 0; d < 3; d++) {
+            double lo = g->around_lo[d], hi = g->around_hi[d];
+            bool whole = lo <= hi;
+            double h = whole ? hi * 0.5 - lo * 0.5 : 0;
+            origin[d] = whole ? lo * 0.5 + hi * 0.5 : p[d];
+            half = h > half ? h : half;
+        }
+        set_units(g, origin, half);
+    }
+    bool fine = radius * g->per_unit >= UNITS_LEAST;
+    for (int d = 0; d < 3; d++)
+        fine = fine && __builtin_fabs(p[d] - g->origin[d]) * g->per_unit +
+                               radius * g->per_unit <
+                           UNITS_MOST;
+    if (!fine)
+        set_units(g, p, radius * 2);
+}
+
+#define FLOAT_SHARE 0x1p-20F /* 16 roundings of single precision */
+
+/* Relative coordinates from units, w and e of points [0, n), and padding that
+ * no scan mistakes for a point: up to two vectors, with e infinite. */
+static void set_near(struct incode_gather *g, uint32_t n)
 {
     incode_vi lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     incode_vf zero = incode_vf_all(0), infinite = incode_vf_all(INFINITE);
-    for (uint32_t i = first & ~15U; i < end + INCODE_VF_LANES;
-         i += INCODE_VF_LANES) {
-        int32_t n = (int32_t)(end - i);
-        incode_vi in =
-            lane < (incode_vi){n, n, n, n, n, n, n, n, n, n, n, n, n, n, n, n};
-        incode_vf x = incode_vf_select(in, incode_vf_load(g->x + i), zero),
-                  y = incode_vf_select(in, incode_vf_load(g->y + i), zero),
-                  z = incode_vf_select(in, incode_vf_load(g->z + i), zero);
-        incode_vf l = incode_vf_select(x < zero, -x, x) +
-                      incode_vf_select(y < zero, -y, y) +
-                      incode_vf_select(z < zero, -z, z);
+    double share = g->scale / g->per_unit;
+    incode_vf factor = incode_vf_all((float)share);
+    incode_vi origin[3];
+    for (int d = 0; d < 3; d++)
+        origin[d] = incode_vi_all(unit_of(g, d, g->p0[d]));
+    /* Two numbers are cut, each by less than a unit; the point itself may have
+     * been rounded before. */
+    g->doubt = 2.1 * share;
+    incode_vf doubt = incode_vf_all((float)(2.1 * g->doubt));
+    incode_vf all = incode_vf_all(FLOAT_SHARE);
+    for (uint32_t i = 0; i < n + INCODE_VF_LANES; i += INCODE_VF_LANES) {
+        incode_vi in = lane < incode_vi_all((int32_t)(n - i));
+        incode_vf x = incode_vf_from(incode_vi_load(g->x + i) - origin[0]),
+                  y = incode_vf_from(incode_vi_load(g->y + i) - origin[1]),
+                  z = incode_vf_from(incode_vi_load(g->z + i) - origin[2]);
+        x = incode_vf_select(in, x * factor, zero);
+        y = incode_vf_select(in, y * factor, zero);
+        z = incode_vf_select(in, z * factor, zero);
+        incode_vf l = incode_vf_abs(x) + incode_vf_abs(y) + incode_vf_abs(z);
         *(incode_vf *)(g->x + i) = x;
         *(incode_vf *)(g->y + i) = y;
         *(incode_vf *)(g->z + i) = z;
         *(incode_vf *)(g->w + i) =
             incode_vf_fma(x, x, incode_vf_fma(y, y, z * z));
-        *(incode_vf *)(g->l + i) = incode_vf_select(in, l, infinite);
+        *(incode_vf *)(g->e + i) =
+            incode_vf_select(in, incode_vf_fma(l, all, doubt), infinite);
     }
 }
 
-struct span {
-    incode_vf lo[3], hi[3];
-};
-
-/* Rounding is monotone: a point within the box is within it after rounding
- * point and box alike. */
-static void set_span(struct span *span, const struct incode_gather *g,
-                     const double lo[3], const double hi[3])
-{
-    for (int d = 0; d < 3; d++) {
-        span->lo[d] = incode_vf_all((float)((lo[d] - g->p0[d]) * g->scale));
-        span->hi[d] = incode_vf_all((float)((hi[d] - g->p0[d]) * g->scale));
-    }
-}
-
-INCODE_INLINE uint32_t within(const struct span *span, const incode_vf r[3])
-{
-    incode_vm out =
-        incode_vf_less(r[0], span->lo[0]) | incode_vf_less(span->hi[0], r[0]) |
-        incode_vf_less(r[1], span->lo[1]) | incode_vf_less(span->hi[1], r[1]) |
-        incode_vf_less(r[2], span->lo[2]) | incode_vf_less(span->hi[2], r[2]);
-    return ~incode_vm_bits(out) & 0xffff;
-}
-
-INCODE_INLINE void pack(struct incode_gather *g, uint32_t to, uint32_t in,
-                        const incode_vf r[3], incode_vi at)
-{
-    incode_vf_pack(g->x + to, in, r[0]);
-    incode_vf_pack(g->y + to, in, r[1]);
-    incode_vf_pack(g->z + to, in, r[2]);
-    incode_vi_pack(g->at + to, in, at);
-}
-
-/* Packs what lies in the inner box and what lies in the outer alone; false:
- * too many. */
+/* Packs what lies in the box; false: too many.  Cutting is monotone: a point
+ * within the box is within it in units. */
 static bool select_near(struct incode_gather *g)
 {
-    incode_vd scale = incode_vd_all(g->scale), p0[3];
+    incode_vi lo[3], span[3];
     incode_vi at = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    incode_vi step = {16, 16, 16, 16, 16, 16, 16, 16,
-                      16, 16, 16, 16, 16, 16, 16, 16};
-    struct span outer, inner;
-    set_span(&outer, g, g->lo, g->hi);
-    set_span(&inner, g, g->inner_lo, g->inner_hi);
-    for (int d = 0; d < 3; d++)
-        p0[d] = incode_vd_all(g->p0[d]);
-    uint32_t n = 0, m = INCODE_OUTER;
+    for (int d = 0; d < 3; d++) {
+        int32_t a = unit_of(g, d, g->lo[d]), b = unit_of(g, d, g->hi[d]);
+        lo[d] = incode_vi_all(a);
+        span[d] = incode_vi_all(b - a);
+    }
+    uint32_t n = 0;
     for (uint32_t i = 0; i < g->around; i += INCODE_VF_LANES) {
-        incode_vf r[3];
-        for (int d = 0; d < 3; d++)
-            r[d] = incode_vf_relative(g->p[d] + i, p0[d], scale);
-        uint32_t in = within(&outer, r);
+        incode_vi x = incode_vi_load(g->unit[0] + i),
+                  y = incode_vi_load(g->unit[1] + i),
+                  z = incode_vi_load(g->unit[2] + i);
+        uint32_t in = incode_vm_bits(incode_vi_within(x, lo[0], span[0]) &
+                                     incode_vi_within(y, lo[1], span[1]) &
+                                     incode_vi_within(z, lo[2], span[2]));
         if (g->around - i < INCODE_VF_LANES)
             in &= (UINT32_C(1) << (g->around - i)) - 1;
-        uint32_t near = in & within(&inner, r);
-        in ^= near;
-        pack(g, n, near, r, at);
-        pack(g, m, in, r, at);
-        at += step;
-        n += (uint32_t)__builtin_popcount(near);
-        m += (uint32_t)__builtin_popcount(in);
-        if (n > INCODE_INNER_POINTS ||
-            m > INCODE_OUTER_END - INCODE_AROUND_EXTRA)
+        incode_vi_pack(g->x + n, in, x);
+        incode_vi_pack(g->y + n, in, y);
+        incode_vi_pack(g->z + n, in, z);
+        incode_vi_pack(g->at + n, in, at);
+        incode_vi_pack(g->near_id + n, in, incode_vi_load(g->id + i));
+        at += incode_vi_all(INCODE_VF_LANES);
+        n += (uint32_t)__builtin_popcount(in);
+        if (n > INCODE_NEAR_POINTS)
             return false;
     }
-    g->inner = n;
-    g->outer = m;
-    set_lengths(g, 0, n);
-    set_lengths(g, INCODE_OUTER, m);
+    g->near = n;
     return true;
 }
-
-#define INNER_SHARE 0.69 /* of the radius: a third of the points */
 
 /* One side of a box: the wall at `wall` of its direction `sign`, relative. */
 static double side(const struct incode_gather *g, int d, double wall,
@@ -195,20 +223,29 @@ static void set_box(struct incode_gather *g, double radius,
 {
     g->radius = radius;
     g->scale = incode_scale_for(radius);
+    g->wall[3] = g->wall[7] = __builtin_inf();
     for (int d = 0; d < 3; d++) {
         double lo = g->p0[d] - radius, hi = g->p0[d] + radius;
-        double short_lo = g->p0[d] - radius * INNER_SHARE;
-        double short_hi = g->p0[d] + radius * INNER_SHARE;
         lo = lo > g->around_lo[d] ? lo : g->around_lo[d];
         hi = hi < g->around_hi[d] ? hi : g->around_hi[d];
-        short_lo = short_lo > lo ? short_lo : lo;
-        short_hi = short_hi < hi ? short_hi : hi;
         g->lo[d] = lo;
         g->hi[d] = hi;
-        g->inner_lo[d] = short_lo;
-        g->inner_hi[d] = short_hi;
         g->rlo[d] = side(g, d, lo, domain_lo[d], -1);
         g->rhi[d] = side(g, d, hi, domain_hi[d], 1);
+        g->wall[d] = g->rhi[d];
+        g->wall[4 + d] = -g->rlo[d];
+    }
+}
+
+/* More points than there is room for in a box too small for units: none is
+ * taken, and the box certifies nothing. */
+static void give_up_near(struct incode_gather *g)
+{
+    g->near = 0;
+    for (int d = 0; d < 3; d++) {
+        g->rlo[d] = __builtin_inf();
+        g->rhi[d] = -__builtin_inf();
+        g->wall[d] = g->wall[4 + d] = -__builtin_inf();
     }
 }
 
@@ -219,116 +256,153 @@ void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
     g->vertex = vertex;
     memcpy(g->p0, p, sizeof g->p0);
     g->count = g->around; /* far vertices of the last one go */
+    g->reach = 6;         /* three coordinates, each below 2 */
+    choose_units(g, p, radius);
     set_box(g, radius, domain_lo, domain_hi);
     while (!select_near(g)) {
+        if (radius * g->per_unit < UNITS_LEAST / 4) {
+            give_up_near(g);
+            break;
+        }
         radius *= 0.8;
+        choose_units(g, p, radius);
         set_box(g, radius, domain_lo, domain_hi);
     }
-    for (int d = 0; d < 3; d++) {
-        g->inner_lo[d] = side(g, d, g->inner_lo[d], domain_lo[d], -1);
-        g->inner_hi[d] = side(g, d, g->inner_hi[d], domain_hi[d], 1);
-    }
+    set_near(g, g->near);
     g->self = incode_gather_find(g, vertex);
+}
+
+/* Index of the first of n numbers that is `id`, or n. */
+static uint32_t find(const uint32_t *ids, uint32_t n, uint32_t id)
+{
+    incode_vi all = incode_vi_all((int32_t)id);
+    for (uint32_t i = 0; i < n; i += INCODE_VF_LANES) {
+        uint32_t m = incode_vf_mask(incode_vi_load(ids + i) == all);
+        if (m != 0) {
+            uint32_t found = i + (uint32_t)__builtin_ctz(m);
+            return found < n ? found : n;
+        }
+    }
+    return n;
 }
 
 uint32_t incode_gather_find(const struct incode_gather *g, uint32_t id)
 {
-    int32_t a = (int32_t)id;
-    incode_vi all = {a, a, a, a, a, a, a, a, a, a, a, a, a, a, a, a};
-    for (uint32_t i = 0; i < g->count; i += INCODE_VF_LANES) {
-        uint32_t m = incode_vf_mask(
-            *(const incode_vi *)(const void *)(g->id + i) == all);
-        if (m != 0) {
-            uint32_t found = i + (uint32_t)__builtin_ctz(m);
-            return found < g->count ? found : INCODE_GATHER_NONE;
-        }
-    }
-    return INCODE_GATHER_NONE;
+    uint32_t near = find(g->near_id, g->near, id);
+    if (near < g->near)
+        return g->at[near];
+    uint32_t i = find(g->id, g->count, id);
+    return i < g->count ? i : INCODE_GATHER_NONE;
 }
 
 uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
                               const double p[3])
 {
     if (g->count == INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA ||
-        g->outer == INCODE_OUTER_END)
+        g->near == INCODE_NEAR_POINTS + INCODE_AROUND_EXTRA)
         return INCODE_GATHER_NONE;
-    uint32_t i = g->count++;
-    double r[3];
+    uint32_t i = g->count++, k = g->near++;
+    double r[3], square = 0, length = 0;
     g->id[i] = id;
     for (int d = 0; d < 3; d++)
         g->p[d][i] = p[d];
     incode_gather_relative(g, i, r);
-    uint32_t k = g->outer++;
+    for (int d = 0; d < 3; d++) {
+        length += __builtin_fabs(r[d]);
+        square += r[d] * r[d];
+    }
+    g->reach = length > g->reach ? length : g->reach;
     g->x[k] = (float)r[0];
     g->y[k] = (float)r[1];
     g->z[k] = (float)r[2];
+    g->w[k] = (float)square;
+    g->e[k] = (float)(length * FLOAT_SHARE + 2.1 * g->doubt);
     g->at[k] = i;
-    set_lengths(g, k, g->outer);
+    g->near_id[k] = id;
+    /* What follows is padding. */
+    for (uint32_t next = k + 1; next % INCODE_VF_LANES != 0; next++)
+        g->x[next] = g->y[next] = g->z[next] = g->w[next] = 0;
+    for (uint32_t next = k + 1; next % INCODE_VF_LANES != 0; next++)
+        g->e[next] = INFINITE;
     return i;
 }
 
 /* ---- scans ---- */
 
-#define PLANE_SLACK 1e-6F /* rounding of n . p, relative to |x|+|y|+|z| */
-
-/* The best of each lane so far: numerator, denominator, index. */
-struct lanes {
-    incode_vf top, bottom;
-    incode_vi which;
+struct bits {
+    uint64_t word[INCODE_NEAR_ALL / 64 + 1];
 };
 
-/* n: the plane; c: minus twice the circumcentre, and the weight of w. */
-INCODE_INLINE void best_of(struct lanes *best, const struct incode_gather *g,
-                           uint32_t i, const incode_vf n[3],
-                           const incode_vf c[4], incode_vf slack)
+/* The points whose bit is set. */
+static uint32_t list(const struct incode_gather *g, const struct bits *bits,
+                     uint16_t out[INCODE_NEAR_ALL])
 {
-    incode_vf x = incode_vf_load(g->x + i), y = incode_vf_load(g->y + i),
-              z = incode_vf_load(g->z + i);
-    incode_vf below = incode_vf_fma(n[0], x, incode_vf_fma(n[1], y, n[2] * z));
-    incode_vf above = incode_vf_fma(
-        c[0], x,
-        incode_vf_fma(c[1], y,
-                      incode_vf_fma(c[2], z, c[3] * incode_vf_load(g->w + i))));
-    incode_vm better = incode_vf_less(slack * incode_vf_load(g->l + i), below) &
-                       incode_vf_less(above * best->bottom, best->top * below);
-    int32_t k = (int32_t)i;
-    incode_vi here = {k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k};
-    best->top = incode_vf_pick(better, above, best->top);
-    best->bottom = incode_vf_pick(better, below, best->bottom);
-    best->which = incode_vi_pick(better, here, best->which);
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < g->near; i += 64) {
+        uint64_t word = bits->word[i / 64];
+        if (g->near - i < 64)
+            word &= (UINT64_C(1) << (g->near - i)) - 1;
+        for (; word != 0; word &= word - 1)
+            out[count++] = (uint16_t)g->at[i + (uint32_t)__builtin_ctzll(word)];
+    }
+    return count;
 }
 
-uint32_t incode_gather_first(const struct incode_gather *g, uint32_t from,
-                             uint32_t to, const double n[3], const double m[3],
-                             double nn)
+INCODE_INLINE void note(struct bits *bits, uint32_t i, incode_vm out)
 {
-    incode_vf normal[3], centre[4];
-    double extent = incode_max_norm(n);
-    double sn = incode_scale_for(extent), sm = incode_scale_for(nn);
-    for (int d = 0; d < 3; d++) {
-        normal[d] = incode_vf_all((float)(n[d] * sn));
-        centre[d] = incode_vf_all((float)(-m[d] * sm));
+    uint64_t in = ~incode_vm_bits(out) & 0xffff;
+    if (i % 64 == 0)
+        bits->word[i / 64] = 0;
+    bits->word[i / 64] |= in << (i % 64);
+}
+
+uint32_t incode_gather_first(const struct incode_gather *g,
+                             const struct incode_pencil *pencil, double *t,
+                             uint16_t out[INCODE_NEAR_ALL])
+{
+    alignas(64) float above[INCODE_NEAR_ALL], below[INCODE_NEAR_ALL];
+    const double *c = pencil->c0;
+    incode_vf nx = incode_vf_all((float)pencil->n[0]),
+              ny = incode_vf_all((float)pencil->n[1]),
+              nz = incode_vf_all((float)pencil->n[2]);
+    incode_vf cx = incode_vf_all((float)(-2 * c[0])),
+              cy = incode_vf_all((float)(-2 * c[1])),
+              cz = incode_vf_all((float)(-2 * c[2]));
+    incode_vf least = incode_vf_all(INFINITE);
+    for (uint32_t i = 0; i < g->near; i += INCODE_VF_LANES) {
+        incode_vf x = incode_vf_load(g->x + i), y = incode_vf_load(g->y + i),
+                  z = incode_vf_load(g->z + i);
+        incode_vf b = incode_vf_fma(nx, x, incode_vf_fma(ny, y, nz * z));
+        incode_vf a = incode_vf_fma(
+            cx, x,
+            incode_vf_fma(cy, y,
+                          incode_vf_fma(cz, z, incode_vf_load(g->w + i))));
+        *(incode_vf *)(above + i) = a;
+        *(incode_vf *)(below + i) = b;
+        incode_vm beyond = incode_vf_less(incode_vf_load(g->e + i), b);
+        least = incode_vf_min_where(beyond, least, incode_vf_ratio(a, b));
     }
-    centre[3] = incode_vf_all((float)(nn * sm));
-    incode_vf slack = incode_vf_all((float)(extent * sn) * PLANE_SLACK);
-    struct lanes a, b;
-    a.top = b.top = incode_vf_all(0x1p60F);
-    a.bottom = b.bottom = incode_vf_all(0x1p-40F);
-    a.which = b.which = (incode_vi){-1, -1, -1, -1, -1, -1, -1, -1,
-                                    -1, -1, -1, -1, -1, -1, -1, -1};
-    for (uint32_t i = from; i < to; i += 2 * INCODE_VF_LANES) {
-        best_of(&a, g, i, normal, centre, slack);
-        best_of(&b, g, i + INCODE_VF_LANES, normal, centre, slack);
+    float first = incode_vf_least_of(least);
+    if (!(first < INFINITE))
+        return 0;
+    /* Wider than the ratio's error, as a rule; the caller makes sure. */
+    *t = first + __builtin_fabs((double)first) * 0x1p-12 +
+         pencil->size * 0x1p-16;
+    double length = incode_max_norm(c);
+    length = 4 * length + 2 * g->reach + 2 * __builtin_fabs(*t);
+    float upper = (float)*t;
+    upper += __builtin_fabsf(upper) * 0x1p-23F;
+    *t = upper;
+    incode_vf last = incode_vf_all(-upper),
+              slack = incode_vf_all((float)length);
+    struct bits bits;
+    for (uint32_t i = 0; i < g->near; i += INCODE_VF_LANES) {
+        incode_vf e = incode_vf_load(g->e + i);
+        incode_vf b = incode_vf_load(below + i);
+        incode_vf late = incode_vf_fma(last, b, incode_vf_load(above + i));
+        note(&bits, i, incode_vf_less(slack * e, late) | incode_vf_less(b, -e));
     }
-    incode_vm better = incode_vf_less(a.top * b.bottom, b.top * a.bottom);
-    incode_vf top = incode_vf_pick(better, a.top, b.top);
-    incode_vf bottom = incode_vf_pick(better, a.bottom, b.bottom);
-    incode_vi which = incode_vi_pick(better, a.which, b.which);
-    uint32_t found = ~incode_vf_mask(which) & 0xffff;
-    if (found == 0)
-        return INCODE_GATHER_NONE;
-    uint32_t lane = incode_vf_least(top / bottom, found);
-    return g->at[(uint32_t)which[lane] + lane];
+    return list(g, &bits, out);
 }
 
 static float float_up(double a)
@@ -336,45 +410,33 @@ static float float_up(double a)
     return (float)a * (1 + 0x1p-22F);
 }
 
-uint32_t incode_gather_inside(const struct incode_gather *g, uint32_t from,
-                              uint32_t to, const struct incode_sphere *s,
+uint32_t incode_gather_inside(const struct incode_gather *g,
+                              const struct incode_sphere *s,
                               uint16_t out[INCODE_NEAR_ALL])
 {
     /* One power of two for all coefficients keeps them in range. */
     double largest = incode_max_norm(s->m), det = __builtin_fabs(s->det);
     double scale = incode_scale_for(largest > det ? largest : det);
-    /* Single precision: fewer than 16 roundings of 2^-24 on each term, beside
-     * those of the coefficients themselves. */
-    double slack =
-        0x1p-20 * largest + INCODE_SPHERE_EPS * incode_max_norm(s->pm);
+    /* e is 2^-20 of the length, and twice the doubt in each coordinate. */
+    double slack = 2 * largest + 2 * det * g->reach +
+                   0x1p20 * INCODE_SPHERE_EPS *
+                       (incode_max_norm(s->pm) + s->pdet * g->reach);
     double square = 0x1p-20 * det + INCODE_SPHERE_EPS * s->pdet - s->det;
     /* The last terms: what underflows in single precision. */
     incode_vf mx = incode_vf_all((float)(s->m[0] * scale)),
               my = incode_vf_all((float)(s->m[1] * scale)),
               mz = incode_vf_all((float)(s->m[2] * scale)),
               mw = incode_vf_all((float)(square * scale) + 1e-37F),
-              ml = incode_vf_all(float_up(slack * scale) + 1e-37F),
+              me = incode_vf_all(float_up(slack * scale) + 1e-37F),
               tiny = incode_vf_all(-1e-34F);
-    uint64_t words[INCODE_NEAR_ALL / 64 + 1];
-    words[from / 64] = 0;
-    for (uint32_t i = from; i < to; i += INCODE_VF_LANES) {
+    struct bits bits;
+    for (uint32_t i = 0; i < g->near; i += INCODE_VF_LANES) {
         incode_vf value = incode_vf_fma(mx, incode_vf_load(g->x + i),
                                         my * incode_vf_load(g->y + i)) +
                           incode_vf_fma(mz, incode_vf_load(g->z + i),
                                         mw * incode_vf_load(g->w + i));
-        value = incode_vf_fma(ml, incode_vf_load(g->l + i), value);
-        uint64_t in = ~incode_vm_bits(incode_vf_less(value, tiny)) & 0xffff;
-        if (i % 64 == 0)
-            words[i / 64] = 0;
-        words[i / 64] |= in << (i % 64);
+        value = incode_vf_fma(me, incode_vf_load(g->e + i), value);
+        note(&bits, i, incode_vf_less(value, tiny));
     }
-    uint32_t count = 0;
-    for (uint32_t i = from; i < to; i += 64) {
-        uint64_t word = words[i / 64];
-        if (to - i < 64)
-            word &= (UINT64_C(1) << (to - i)) - 1;
-        for (; word != 0; word &= word - 1)
-            out[count++] = (uint16_t)g->at[i + (uint32_t)__builtin_ctzll(word)];
-    }
-    return count;
+    return list(g, &bits, out);
 }

@@ -25,38 +25,48 @@ enum {
     INCODE_AROUND_POINTS = 768, /* around a leaf */
     INCODE_AROUND_EXTRA = 64,   /* far vertices */
     INCODE_AROUND_ALL = INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA + 16,
-    INCODE_INNER_POINTS = 96, /* around a vertex: the inner box, at most */
-    INCODE_OUTER = 128,       /* where the outer points begin */
-    INCODE_OUTER_END = 448,   /* and end, far vertices included */
-    INCODE_NEAR_ALL = INCODE_OUTER_END + 32,
+    INCODE_NEAR_POINTS = 192, /* around a vertex */
+    INCODE_NEAR_ALL = INCODE_NEAR_POINTS + INCODE_AROUND_EXTRA + 32,
     INCODE_GATHER_NONE = 0xffff
 };
 
 struct incode_gather {
-    /* Around the vertex: relative to p0 and scaled; w = |p|^2, l = |x| + |y| +
-     * |z|; at: the point's index below.  First those of the inner box, from
-     * INCODE_OUTER on the others: most faces need the first alone. */
+    /* Around the vertex: relative to p0 and scaled; w = |p|^2; e: of this the
+     * error of n . p is at most max|n|; at: the point's index below. */
     alignas(64) float x[INCODE_NEAR_ALL];
     alignas(64) float y[INCODE_NEAR_ALL];
     alignas(64) float z[INCODE_NEAR_ALL];
     alignas(64) float w[INCODE_NEAR_ALL];
-    alignas(64) float l[INCODE_NEAR_ALL];
+    alignas(64) float e[INCODE_NEAR_ALL];
     alignas(64) uint32_t at[INCODE_NEAR_ALL];
-    uint32_t inner, outer; /* where each of the two ends */
-    /* Around the leaf, then the far vertices: absolute. */
+    alignas(64) uint32_t near_id[INCODE_NEAR_ALL];
+    uint32_t near; /* how many, with far vertices */
+    double reach;  /* |x| + |y| + |z| of them is at most this */
+    double doubt;  /* absolute error of their coordinates */
+    /* Around the leaf, then the far vertices: absolute, and (the former alone)
+     * in units of 1 / per_unit from origin, cut to whole ones. */
     alignas(64) double p[3][INCODE_AROUND_ALL];
+    alignas(64) int32_t unit[3][INCODE_AROUND_ALL];
     alignas(64) uint32_t id[INCODE_AROUND_ALL];
+    double origin[3], per_unit;
     uint32_t around, count; /* copied from the box; with the far ones */
     uint32_t leaf;          /* vertex number / 8, or INCODE_NONE */
     uint32_t pages_max;     /* that a walk may need */
     double around_lo[3], around_hi[3];
     uint32_t vertex, self; /* its number, its index in p */
     double p0[3], scale, radius;
-    double lo[3], hi[3];   /* absolute: every point within is at hand */
-    double rlo[3], rhi[3]; /* the same, relative; infinite where the domain
-                              ends before */
-    double inner_lo[3], inner_hi[3]; /* the inner box, likewise relative */
+    double lo[3], hi[3];        /* absolute: every point within is at hand */
+    double rlo[3], rhi[3];      /* the same, relative; infinite where the domain
+                                   ends before */
+    alignas(64) double wall[8]; /* rhi, infinity, -rlo, infinity */
     struct incode_query query;
+};
+
+/* The line of spheres through a face's circle, in units of the near points: the
+ * centres are c0 + (t/2) n, n a unit vector. */
+struct incode_pencil {
+    double c0[3], n[3];
+    double size; /* of the face */
 };
 
 enum incode_gathered {
@@ -96,18 +106,19 @@ static inline void incode_gather_relative(const struct incode_gather *g,
         r[d] = (g->p[d][i] - g->p0[d]) * g->scale;
 }
 
-/* Of points [from, to) around the vertex, those clearly on the positive side of
- * the plane with normal n: the one with the least (nn w - m . p) / (n . p), or
- * about it; INCODE_GATHER_NONE: there is none.  m / nn is twice the
- * circumcentre.  from: 0 or INCODE_OUTER. */
-uint32_t incode_gather_first(const struct incode_gather *g, uint32_t from,
-                             uint32_t to, const double n[3], const double m[3],
-                             double nn);
+/* Points around the vertex that may lie beyond the face and no later in the
+ * pencil than a certain one of them: *t is the upper bound.  None that is left
+ * out lies in the closed sphere of that t beyond the face.  The face's own
+ * vertices are among them as a rule.  Returns how many, 0 where none is
+ * certain to be beyond the face. */
+uint32_t incode_gather_first(const struct incode_gather *g,
+                             const struct incode_pencil *pencil, double *t,
+                             uint16_t out[INCODE_NEAR_ALL]);
 
-/* The points [from, to) around the vertex that are not certainly outside the
- * sphere; returns how many. */
-uint32_t incode_gather_inside(const struct incode_gather *g, uint32_t from,
-                              uint32_t to, const struct incode_sphere *s,
+/* The points around the vertex that are not certainly outside the sphere;
+ * returns how many. */
+uint32_t incode_gather_inside(const struct incode_gather *g,
+                              const struct incode_sphere *s,
                               uint16_t out[INCODE_NEAR_ALL]);
 
 #endif

@@ -15,6 +15,7 @@
 
 typedef float incode_vf __attribute__((vector_size(64), may_alias));
 typedef int32_t incode_vi __attribute__((vector_size(64), may_alias));
+typedef uint32_t incode_vu __attribute__((vector_size(64), may_alias));
 typedef double incode_vd __attribute__((vector_size(64), may_alias));
 typedef int64_t incode_vl __attribute__((vector_size(64), may_alias));
 
@@ -34,6 +35,11 @@ INCODE_INLINE incode_vd incode_vd_load(const double *p)
 INCODE_INLINE incode_vf incode_vf_load(const float *p)
 {
     return *(const incode_vf *)p;
+}
+
+INCODE_INLINE incode_vi incode_vi_load(const void *p)
+{
+    return *(const incode_vi *)p;
 }
 
 INCODE_INLINE incode_vd incode_vd_all(double a)
@@ -117,6 +123,74 @@ INCODE_INLINE uint32_t incode_vm_bits(incode_vm m)
 #endif
 }
 
+/* a - lo <= span, in whole numbers modulo 2^32. */
+INCODE_INLINE incode_vm incode_vi_within(incode_vi a, incode_vi lo,
+                                         incode_vi span)
+{
+#ifdef __AVX512DQ__
+    return _mm512_cmple_epu32_mask(_mm512_sub_epi32((__m512i)a, (__m512i)lo),
+                                   (__m512i)span);
+#else
+    return (incode_vu)a - (incode_vu)lo <= (incode_vu)span;
+#endif
+}
+
+/* Whole numbers as floats. */
+INCODE_INLINE incode_vf incode_vf_from(incode_vi a)
+{
+    return __builtin_convertvector(a, incode_vf);
+}
+
+INCODE_INLINE incode_vi incode_vi_all(int32_t a)
+{
+    return (incode_vi){a, a, a, a, a, a, a, a, a, a, a, a, a, a, a, a};
+}
+
+/* Eight numbers below 2^31, cut to whole ones. */
+INCODE_INLINE void incode_vd_cut(int32_t *out, incode_vd a)
+{
+#ifdef __AVX512DQ__
+    _mm256_storeu_si256((__m256i *)(void *)out,
+                        _mm512_cvttpd_epi32((__m512d)a));
+#else
+    for (int i = 0; i < INCODE_VD_LANES; i++)
+        out[i] = (int32_t)a[i];
+#endif
+}
+
+/* About a / b. */
+INCODE_INLINE incode_vf incode_vf_ratio(incode_vf a, incode_vf b)
+{
+#ifdef __AVX512DQ__
+    return a * (incode_vf)_mm512_rcp14_ps((__m512)b);
+#else
+    return a / b;
+#endif
+}
+
+/* The smaller of a and b in lanes of m, else a. */
+INCODE_INLINE incode_vf incode_vf_min_where(incode_vm m, incode_vf a,
+                                            incode_vf b)
+{
+#ifdef __AVX512DQ__
+    return (incode_vf)_mm512_mask_min_ps((__m512)a, m, (__m512)a, (__m512)b);
+#else
+    return incode_vf_pick(m & (b < a), b, a);
+#endif
+}
+
+INCODE_INLINE float incode_vf_least_of(incode_vf a)
+{
+#ifdef __AVX512DQ__
+    return _mm512_reduce_min_ps((__m512)a);
+#else
+    float least = a[0];
+    for (int i = 1; i < INCODE_VF_LANES; i++)
+        least = a[i] < least ? a[i] : least;
+    return least;
+#endif
+}
+
 /* m ? a : b in each lane. */
 INCODE_INLINE incode_vd incode_vd_select(incode_vl m, incode_vd a, incode_vd b)
 {
@@ -170,41 +244,10 @@ INCODE_INLINE void incode_vd_pack(double *out, uint32_t mask, incode_vd a)
 #endif
 }
 
-/* (p[i] - origin) * scale of 16 numbers, in single precision. */
-INCODE_INLINE incode_vf incode_vf_relative(const double *p, incode_vd origin,
-                                           incode_vd scale)
-{
-    incode_vd low = (incode_vd_load(p) - origin) * scale;
-    incode_vd high = (incode_vd_load(p + INCODE_VD_LANES) - origin) * scale;
-#ifdef __AVX512DQ__
-    return (incode_vf)_mm512_insertf32x8(
-        _mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)low)),
-        _mm512_cvtpd_ps((__m512d)high), 1);
-#else
-    incode_vf out = incode_vf_all(0);
-    for (int i = 0; i < INCODE_VD_LANES; i++) {
-        out[i] = (float)low[i];
-        out[i + INCODE_VD_LANES] = (float)high[i];
-    }
-    return out;
-#endif
-}
-
 /* Lanes of sixteen whose bit is set, packed together; the rest is undefined. */
-INCODE_INLINE void incode_vf_pack(float *out, uint32_t mask, incode_vf a)
+INCODE_INLINE void incode_vi_pack(void *to, uint32_t mask, incode_vi a)
 {
-#ifdef __AVX512DQ__
-    _mm512_storeu_ps(out, _mm512_maskz_compress_ps((__mmask16)mask, (__m512)a));
-#else
-    for (uint32_t i = 0, n = 0; i < INCODE_VF_LANES; i++) {
-        out[n] = a[i];
-        n += mask >> i & 1;
-    }
-#endif
-}
-
-INCODE_INLINE void incode_vi_pack(uint32_t *out, uint32_t mask, incode_vi a)
-{
+    uint32_t *out = to;
 #ifdef __AVX512DQ__
     _mm512_storeu_si512(
         out, _mm512_maskz_compress_epi32((__mmask16)mask, (__m512i)a));
@@ -233,25 +276,9 @@ INCODE_INLINE void incode_pack_count(uint32_t *out, uint32_t mask,
 #endif
 }
 
-/* The lane of the least value among those whose bit is set (mask != 0). */
-INCODE_INLINE uint32_t incode_vf_least(incode_vf a, uint32_t mask)
+INCODE_INLINE incode_vf incode_vf_abs(incode_vf a)
 {
-#ifdef __AVX512DQ__
-    __mmask16 m = (__mmask16)mask;
-    float least = _mm512_mask_reduce_min_ps(m, (__m512)a);
-    m = _mm512_mask_cmp_ps_mask(m, (__m512)a, _mm512_set1_ps(least),
-                                _CMP_EQ_OQ);
-    return m == 0 ? (uint32_t)__builtin_ctz(mask)
-                  : (uint32_t)__builtin_ctz((uint32_t)m);
-#else
-    uint32_t best = (uint32_t)__builtin_ctz(mask);
-    for (; mask != 0; mask &= mask - 1) {
-        uint32_t i = (uint32_t)__builtin_ctz(mask);
-        if (a[i] < a[best])
-            best = i;
-    }
-    return best;
-#endif
+    return (incode_vf)((incode_vi)a & incode_vi_all(INT32_MAX));
 }
 
 INCODE_INLINE incode_vd incode_vd_abs(incode_vd a)

@@ -149,7 +149,7 @@ static void star_emit(struct incode_triangulator *t)
 
 /* ---- gathering ---- */
 
-enum { NEAR_WANTED = 176, GATHER_TRIES = 64 };
+enum { NEAR_WANTED = 96, GATHER_TRIES = 64 };
 
 /* Half-width of the box to gather: the extent of the leaf, times what has
  * lately given the wanted number of points around a vertex. */
@@ -221,7 +221,7 @@ static enum incode_outcome star_gather(struct incode_triangulator *t,
     const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
                          f->page.brick.z[slot]};
     incode_gather_centre(g, v, p, g->radius, t->setup.lo, t->setup.hi);
-    learn_spread(t, g->inner + g->outer - INCODE_OUTER);
+    learn_spread(t, g->near);
     return INCODE_OK;
 }
 
