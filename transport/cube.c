@@ -1,33 +1,13 @@
-#include "cube.h"
-
 #include <string.h>
 
 #include "check.h"
+#include "cube_internal.h"
 
 /* A message's own header: dest, source (16 bits, low byte first), type, hops,
- * two bytes of zero. */
-enum { HEAD = 8, MESSAGE_MAX = HEAD + CUBE_PAYLOAD_MAX };
+ * generation (16 bits of it). */
+enum { HEAD = 8, STAMP = 6, MESSAGE_MAX = HEAD + CUBE_PAYLOAD_MAX };
 
 enum { LOCAL = CUBE_LINKS_MAX }; /* bit of this node among the ways */
-
-/* The oldest message of a link, while it is under way. */
-struct arrival {
-    struct link_message message;
-    uint32_t ways; /* bits of links that still need a copy, and LOCAL */
-    bool there;
-};
-
-struct cube {
-    struct cube_config config;
-    struct cube_statistics statistics;
-    struct link *links[CUBE_LINKS_MAX];
-    struct arrival arrivals[CUBE_LINKS_MAX];
-    unsigned count;
-    unsigned turn;      /* link that is served first */
-    unsigned held;      /* link of the message being read, or CUBE_LINKS_MAX */
-    uint32_t kept_back; /* links whose last slot is left to this node once */
-    bool again;         /* a message waits only for that turn to pass */
-};
 
 /* --- which way ----------------------------------------------------------- */
 
@@ -41,18 +21,27 @@ static unsigned nodes(const struct cube *cube)
     return 1u << cube->config.dimension;
 }
 
-/* E-cube: the lowest dimension in which we differ; the host is behind node
- * 0's last link. */
+/* The host's link to the gate. */
+static unsigned link_of_gate(const struct cube *cube)
+{
+    unsigned gate = cube->wiring.gate;
+    return cube->count > 1 && gate == cube->config.spare_node ? 1 : 0;
+}
+
+/* E-cube: the lowest dimension in which we differ; the host is behind the
+ * gate's last link. */
 static uint32_t way_to(const struct cube *cube, unsigned dest)
 {
     unsigned self = cube->config.self;
     if (is_host(cube)) {
-        return 1;
+        return (uint32_t)1 << link_of_gate(cube);
     }
     if (dest == CUBE_HOST) {
-        dest = 0;
-        if (self == 0) {
-            return (uint32_t)1 << cube->config.dimension;
+        dest = cube->wiring.gate;
+        if (self == dest) {
+            return cube->count > cube->config.dimension
+                       ? (uint32_t)1 << cube->config.dimension
+                       : 0;
         }
     }
     return dest == self ? (uint32_t)1 << LOCAL : (self ^ dest) & -(self ^ dest);
@@ -62,10 +51,10 @@ static uint32_t way_to(const struct cube *cube, unsigned dest)
  * at bit h, on along the dimensions above h.  Its paths are those of e-cube. */
 static uint32_t ways_to_all(const struct cube *cube, unsigned source)
 {
-    unsigned root = source == CUBE_HOST ? 0 : source;
+    unsigned root = source == CUBE_HOST ? cube->wiring.gate : source;
     unsigned relative = cube->config.self ^ root;
     if (is_host(cube)) {
-        return 1;
+        return (uint32_t)1 << link_of_gate(cube);
     }
     unsigned above =
         relative == 0 ? 0 : 32u - (unsigned)__builtin_clz(relative);
@@ -101,10 +90,12 @@ static struct link_config link_config_of(const struct cube_config *config,
     c.epoch = config->epoch;
     c.node = config->self;
     c.port = (uint8_t)d;
-    c.peer_node = (uint16_t)(host      ? 0
+    c.peer_node = (uint16_t)(host      ? d == 0 ? 0 : config->spare_node
                              : to_host ? CUBE_HOST
                                        : config->self ^ 1u << d);
-    c.peer_port = host ? config->dimension : to_host ? 0 : (uint8_t)d;
+    c.peer_port = (uint8_t)(host      ? config->dimension
+                            : to_host ? config->self != 0
+                                      : d);
     c.window = (host || to_host) && config->host_window != 0
                    ? config->host_window
                    : config->window;
@@ -119,16 +110,19 @@ static struct link_config link_config_of(const struct cube_config *config,
 static unsigned links_of(const struct cube_config *config)
 {
     if (config->self == CUBE_HOST) {
-        return 1;
+        return config->spare_node != 0 ? 2 : 1;
     }
-    return config->dimension + (config->self == 0 ? 1u : 0u);
+    return config->dimension +
+           (config->self == 0 || config->host_wire ? 1u : 0u);
 }
 
 static bool sound(const struct cube_config *config)
 {
     return config->dimension <= CUBE_DIMENSION_MAX &&
-           (config->self == CUBE_HOST ||
-            config->self < 1u << config->dimension);
+           (config->self == CUBE_HOST
+                ? config->gate == 0 || config->gate == config->spare_node
+                : config->self < 1u << config->dimension) &&
+           config->spare_node < 1u << config->dimension;
 }
 
 static size_t up64(size_t bytes)
@@ -174,6 +168,7 @@ struct cube *cube_init(void *arena, size_t bytes,
         }
         rest += up64(link_bytes(&c));
     }
+    cube_gossip_start(cube);
     return cube;
 }
 
@@ -184,12 +179,29 @@ static unsigned field16(const uint8_t *bytes)
     return bytes[0] | (unsigned)bytes[1] << 8;
 }
 
+/* Whether a message of another generation is to be dropped.  If not, the
+ * neighbour knows of a generation that it has told us in a note: that comes. */
+static bool outdated(const struct cube *cube, unsigned stamp)
+{
+    return cube->wiring.generation != 0 && (int16_t)(stamp - cube->stamp) < 0;
+}
+
 /* The oldest message of link d, and where it must still go. */
 static bool look_at(struct cube *cube, unsigned d)
 {
-    struct arrival *a = &cube->arrivals[d];
+    struct cube_arrival *a = &cube->arrivals[d];
     while (!a->there && link_read(cube->links[d], &a->message)) {
         const uint8_t *head = a->message.data;
+        unsigned stamp =
+            a->message.size >= HEAD ? field16(head + STAMP) : cube->stamp;
+        if (stamp != cube->stamp || cube->wiring.generation == 0) {
+            if (!outdated(cube, stamp)) {
+                return false;
+            }
+            cube->statistics.outdated++;
+            link_release(cube->links[d]);
+            continue;
+        }
         bool whole = a->message.size >= HEAD;
         unsigned hops_max = cube->config.dimension + 2u;
         a->ways = whole && head[5] < hops_max
@@ -212,6 +224,25 @@ static void done_with(struct cube *cube, unsigned d)
     link_release(cube->links[d]);
 }
 
+/* A message that is being read here stays until it was. */
+void cube_drop_all(struct cube *cube)
+{
+    const uint32_t local = (uint32_t)1 << LOCAL;
+    for (unsigned d = 0; d < cube->count; d++) {
+        struct cube_arrival *a = &cube->arrivals[d];
+        unsigned unsent = link_forget_unsent(cube->links[d]);
+        cube->statistics.outdated += unsent;
+        if (a->there && cube->held == d) {
+            a->ways = local;
+        } else if (a->there) {
+            cube->statistics.outdated++;
+            done_with(cube, d);
+        }
+    }
+    cube->kept_back = 0;
+    cube->again = false;
+}
+
 /* A link's last free slot goes to messages of others and of this node in
  * turn, so that neither starves. */
 static bool may_pass_on(struct cube *cube, unsigned out, size_t size)
@@ -231,7 +262,7 @@ static bool may_pass_on(struct cube *cube, unsigned out, size_t size)
     return true;
 }
 
-static void pass_on(struct cube *cube, struct arrival *a, unsigned out)
+static void pass_on(struct cube *cube, struct cube_arrival *a, unsigned out)
 {
     uint8_t head[HEAD];
     const struct link_message *m = &a->message;
@@ -247,7 +278,7 @@ static void pass_on(struct cube *cube, struct arrival *a, unsigned out)
  * ahead, or for this node to read it. */
 static int pass_on_from(struct cube *cube, unsigned d)
 {
-    struct arrival *a = &cube->arrivals[d];
+    struct cube_arrival *a = &cube->arrivals[d];
     int passed = 0;
     unsigned most = LINK_WINDOW_MAX;
     while (most-- > 0 && look_at(cube, d)) {
@@ -276,6 +307,7 @@ int cube_poll(struct cube *cube, uint64_t now_us)
     for (unsigned d = 0; d < cube->count; d++) {
         count += link_poll_receive(cube->links[d], now_us);
     }
+    cube_gossip(cube, now_us);
     cube->turn = cube->turn + 1 >= cube->count ? 0 : cube->turn + 1;
     uint32_t kept_before = cube->kept_back;
     for (unsigned i = 0; i < cube->count; i++) {
@@ -304,7 +336,7 @@ static uint32_t ways_out(const struct cube *cube, uint16_t dest)
 
 static unsigned room_on(const struct cube *cube, uint32_t ways, size_t size)
 {
-    unsigned room = LINK_WINDOW_MAX;
+    unsigned room = cube->wiring.generation != 0 ? LINK_WINDOW_MAX : 0;
     for (unsigned d = 0; d < cube->count; d++) {
         unsigned here = link_room(cube->links[d], size);
         if ((ways & (uint32_t)1 << d) != 0 && here < room) {
@@ -325,8 +357,8 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                           (uint8_t)(self >> 8),
                           type,
                           0,
-                          0,
-                          0};
+                          (uint8_t)cube->stamp,
+                          (uint8_t)(cube->stamp >> 8)};
     LINK_ASSERT(size <= CUBE_PAYLOAD_MAX);
     if (room_on(cube, ways, HEAD + size) == 0) {
         return CUBE_AGAIN;
@@ -354,7 +386,7 @@ bool cube_read(struct cube *cube, struct cube_message *message)
         unsigned d = cube->turn + i;
         d = d < cube->count ? d : d - cube->count;
         pass_on_from(cube, d);
-        struct arrival *a = &cube->arrivals[d];
+        struct cube_arrival *a = &cube->arrivals[d];
         if (!a->there || (a->ways & (uint32_t)1 << LOCAL) == 0) {
             continue;
         }
@@ -373,7 +405,7 @@ void cube_release(struct cube *cube)
 {
     unsigned d = cube->held;
     LINK_ASSERT(d < cube->count);
-    struct arrival *a = &cube->arrivals[d];
+    struct cube_arrival *a = &cube->arrivals[d];
     cube->held = CUBE_LINKS_MAX;
     cube->statistics.read++;
     a->ways &= ~((uint32_t)1 << LOCAL);
@@ -416,7 +448,7 @@ const struct cube_statistics *cube_statistics(const struct cube *cube)
 bool cube_idle(const struct cube *cube)
 {
     for (unsigned d = 0; d < cube->count; d++) {
-        const struct arrival *a = &cube->arrivals[d];
+        const struct cube_arrival *a = &cube->arrivals[d];
         bool under_way = a->there && (a->ways & ~((uint32_t)1 << LOCAL)) != 0;
         if (under_way || !link_idle(cube->links[d])) {
             return false;
@@ -439,5 +471,6 @@ uint64_t cube_next_due_us(const struct cube *cube, uint64_t now_us)
         uint64_t link = link_next_due_us(cube->links[d], now_us);
         due = link < due ? link : due;
     }
-    return due;
+    uint64_t gossip = cube_gossip_due_us(cube, now_us);
+    return gossip < due ? gossip : due;
 }

@@ -1,8 +1,15 @@
-/* A hypercube of nodes wired point to point, and a host attached to node 0.
+/* A hypercube of nodes wired point to point, and a host attached to node 0,
+ * or by a second wire to one more.
  * Messages of up to CUBE_PAYLOAD_MAX bytes travel hop by hop along the e-cube
  * path (lowest differing dimension first), in order between any two ends;
  * broadcasts run along binomial trees.  Link d of a node leads to node
  * self ^ (1 << d); link `dimension` of node 0 leads to the host.
+ *
+ * Generations make every loss survivable: the host begins a new one
+ * (cube_renew) when something was lost, and all messages of the old one are
+ * dropped wherever they are.  The generation, the gate (the node by which the
+ * host speaks) and the dead links are gossiped from link to link; a node that
+ * starts is told by its neighbours, and neither sends nor reads before.
  *
  * Memory: one arena of cube_arena_bytes(): a send and a receive window for each
  * link, nothing shared between links (Dally and Seitz, 1987: e-cube routing is
@@ -26,8 +33,37 @@ enum {
     CUBE_DIMENSION_MAX = 10,
     CUBE_LINKS_MAX = CUBE_DIMENSION_MAX + 1, /* node 0 has the host's too */
     CUBE_PAYLOAD_MAX = 1600,
+    CUBE_DEAD_MAX = 16,     /* dead links and nodes that are remembered */
+    CUBE_WRONG_MAX = 4,     /* wrong wires */
+    CUBE_WHOLE_NODE = 0xff, /* as the dimension of struct cube_dead */
     CUBE_HOST = 0xfffe,
     CUBE_ALL = 0xffff
+};
+
+/* A link that is dead for the run, named by its lower end (its host's wire:
+ * `dimension` of the cube), or a node with all its links. */
+struct cube_dead {
+    uint16_t node;
+    uint8_t dimension; /* or CUBE_WHOLE_NODE */
+};
+
+/* A link whose peer does not fit. */
+struct cube_wrong {
+    uint16_t node, peer_node; /* or CUBE_HOST */
+    uint8_t link, peer_link;
+    uint8_t refusal; /* enum link_refusal */
+};
+
+/* What all ends of a cube agree on, in time. */
+struct cube_wiring {
+    uint32_t generation; /* 1 at the start; 0: not told yet */
+    uint32_t host_epoch; /* of the host that began it */
+    uint16_t gate;       /* the node by which the host speaks */
+    uint16_t settled;    /* dead[0 .. settled) were so when it began: routes
+                            avoid them; the others were found since */
+    uint16_t dead_count, wrong_count;
+    struct cube_dead dead[CUBE_DEAD_MAX];
+    struct cube_wrong wrong[CUBE_WRONG_MAX];
 };
 
 struct cube_config {
@@ -36,7 +72,14 @@ struct cube_config {
     uint16_t window; /* frames a link and direction, 1 .. LINK_WINDOW_MAX */
     uint32_t epoch;  /* of this start of the node, never repeated */
     struct link_pipe pipes[CUBE_LINKS_MAX]; /* the bytes of each link; the host
-                                               uses pipes[0] alone */
+                                               uses pipes[0], to node 0 */
+    /* A second wire to the host: at the host pipes[1], to this node; at that
+     * node its link `dimension`, as node 0 has it. */
+    uint16_t spare_node; /* host's; 0: none */
+    bool host_wire;      /* node's; node 0 has one always */
+    uint16_t gate;       /* host's: of the first generation */
+    uint32_t dead_us;    /* a link that was up, and then was down or silent for
+                            so long, is dead; 0: never */
     /* Zero means the default. */
     uint16_t host_window;   /* of the host's link, at both ends; `window` */
     uint16_t frame_payload; /* bytes, a multiple of 8, the same on both ends of
@@ -57,6 +100,7 @@ struct cube_statistics {
     uint64_t passed_on;     /* copies of messages of others */
     uint64_t misrouted;     /* dropped: no such node, or too many hops */
     uint64_t blocked;       /* polls in which a message found no room ahead */
+    uint64_t outdated;      /* dropped: of an older generation */
 };
 
 struct cube; /* opaque: lives at the start of its arena */
@@ -91,6 +135,16 @@ enum link_state cube_link_state(const struct cube *cube, unsigned d);
 const struct link_peer *cube_link_peer(const struct cube *cube, unsigned d);
 unsigned cube_links(const struct cube *cube);
 const struct cube_statistics *cube_statistics(const struct cube *cube);
+
+/* What this end knows.  The generation changes in cube_poll and cube_renew
+ * alone: who looks at it after them, and drops what it was about to write,
+ * never sends in a generation what it decided in another. */
+const struct cube_wiring *cube_wiring(const struct cube *cube);
+
+/* At the host: begins a generation with next's gate and dead links, and drops
+ * all messages of the old one here and, as it spreads, everywhere.  Its number
+ * is next's, or one more than the present where that is higher. */
+void cube_renew(struct cube *cube, const struct cube_wiring *next);
 
 /* True when the neighbours have acknowledged all that is written here and no
  * message waits to be passed on: a node may leave then. */

@@ -59,7 +59,7 @@ static size_t up8(size_t bytes)
  * not whole yet. */
 static size_t buffer_bytes(const struct link_config *c)
 {
-    return up8(c->staging * FRAME_ENCODED(c->frame_payload) + FRAME_SLACK +
+    return up8(c->staging * link_frame_bytes(c) + FRAME_SLACK +
                FRAME_ENCODED(LINK_HELLO_SIZE) + 2);
 }
 
@@ -236,6 +236,50 @@ void link_release(struct link *link)
     }
 }
 
+unsigned link_forget_unsent(struct link *link)
+{
+    struct link_sender *s = &link->send;
+    unsigned offset = (uint16_t)(s->next - s->first), count = 0;
+    bool inside = s->inside;
+    /* What is begun must end. */
+    while (inside) {
+        LINK_ASSERT(offset < used(link));
+        unsigned at = s->head + offset++;
+        at = at >= link->config.window ? at - link->config.window : at;
+        inside = (s->slots[at].flags & LINK_MORE) != 0;
+    }
+    for (unsigned i = offset; i < used(link); i++) {
+        unsigned at = s->head + i;
+        at = at >= link->config.window ? at - link->config.window : at;
+        count += (s->slots[at].flags & LINK_MORE) == 0;
+    }
+    s->end = (uint16_t)(s->first + offset);
+    link->statistics.messages_dropped += count;
+    return count;
+}
+
+void link_note(struct link *link, const void *note, size_t size, bool ask)
+{
+    LINK_ASSERT(size >= 1 && size <= LINK_NOTE_MAX);
+    link->notes.out = note;
+    link->notes.out_size = (uint16_t)size;
+    link->notes.asks = ask;
+    link->notes.due = true;
+}
+
+bool link_take_note(struct link *link, struct link_message *note, bool *ask)
+{
+    struct link_notes *n = &link->notes;
+    if (!n->heard) {
+        return false;
+    }
+    n->heard = false;
+    note->data = n->in;
+    note->size = n->in_size;
+    *ask = n->asked;
+    return true;
+}
+
 /* --- state --------------------------------------------------------------- */
 
 int link_poll(struct link *link, uint64_t now_us)
@@ -313,7 +357,8 @@ uint64_t link_next_due_us(const struct link *link, uint64_t now_us)
         return link->pipe_up ? until(link->hello_us, c->hello_us, now_us)
                              : c->hello_us;
     }
-    if (link_may_send(link) || link_ack_due(link) || link_hello_due(link)) {
+    if (link_may_send(link) || link_ack_due(link) || link_hello_due(link) ||
+        link->notes.due) {
         return 0;
     }
     due = until(link->sent_us, c->keep_alive_us, now_us);

@@ -19,7 +19,7 @@ enum {
     LINK_CANDIDATE_HELLOS = 20 /* then an unconfirmed peer is forgotten */
 };
 
-enum link_kind { LINK_HELLO = 1, LINK_DATA, LINK_ACK, LINK_BYE };
+enum link_kind { LINK_HELLO = 1, LINK_DATA, LINK_ACK, LINK_BYE, LINK_NOTE };
 
 /* LINK_MORE: the message goes on in the next frame.  LINK_ASK: please answer
  * at once. */
@@ -63,6 +63,7 @@ struct link_sender {
     uint32_t order;            /* of the next transmission */
     uint64_t timer_us;         /* start of the retransmission timer */
     uint8_t backoff;
+    bool inside; /* the last new frame sent has more of its message behind */
     uint32_t variation_us;
 };
 
@@ -92,6 +93,13 @@ struct link_bytes_out {
     size_t begin, end;
 };
 
+struct link_notes {
+    const uint8_t *out; /* the caller's */
+    uint16_t out_size, in_size;
+    bool due, asks, heard, asked;
+    uint8_t in[LINK_NOTE_MAX];
+};
+
 struct link {
     struct link_config config;
     struct link_statistics statistics;
@@ -101,6 +109,7 @@ struct link {
     struct link_receiver receive;
     struct link_bytes_in in;
     struct link_bytes_out out;
+    struct link_notes notes;
     size_t buffer_bytes; /* of in and out, each */
     uint16_t fragments_max;
     uint16_t peer_window;
@@ -110,6 +119,14 @@ struct link {
     bool pipe_up, up, hello_now, stalled;
     bool closing, closed, bye_due;
 };
+
+/* Of one encoded frame, of any kind. */
+static inline size_t link_frame_bytes(const struct link_config *config)
+{
+    return FRAME_ENCODED(config->frame_payload > LINK_NOTE_MAX
+                             ? config->frame_payload
+                             : LINK_NOTE_MAX);
+}
 
 /* session.c */
 void link_greet(struct link *link);

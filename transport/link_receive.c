@@ -145,17 +145,28 @@ static void on_bye(struct link *link, const struct frame_header *header)
     link->up = false;
 }
 
+static void on_note(struct link *link, const struct frame_header *header,
+                    const uint8_t *bytes)
+{
+    struct link_notes *n = &link->notes;
+    memcpy(n->in, bytes, header->size);
+    n->in_size = header->size;
+    n->asked = (header->flags & LINK_ASK) != 0;
+    n->heard = link->up;
+}
+
 /* Frames without data: a few bytes of payload at most. */
 static enum frame_result take_control(struct link *link,
                                       struct frame_reader *reader,
                                       const struct frame_header *header)
 {
-    uint8_t bytes[LINK_HELLO_SIZE];
+    uint8_t bytes[LINK_NOTE_MAX];
     uint64_t sack = 0;
     unsigned size = header->size;
     bool fits = header->kind == LINK_HELLO ? size == LINK_HELLO_SIZE
                 : header->kind == LINK_ACK ? size == 0 || size == LINK_SACK_SIZE
-                                           : size == 0;
+                : header->kind == LINK_NOTE ? size >= 1 && size <= LINK_NOTE_MAX
+                                            : size == 0;
     if (!fits) {
         return FRAME_BAD_CODE;
     }
@@ -166,6 +177,11 @@ static enum frame_result take_control(struct link *link,
     link->statistics.frames_received++;
     if (header->kind == LINK_HELLO) {
         link_on_hello(link, header, bytes);
+        return FRAME_GOOD;
+    }
+    if (header->kind == LINK_NOTE) {
+        link_on_acknowledge(link, header, 0);
+        on_note(link, header, bytes);
         return FRAME_GOOD;
     }
     for (unsigned i = 0; i < size; i++) {
@@ -200,7 +216,8 @@ static enum frame_result take_frame(struct link *link, const uint8_t *in,
     if (header.kind == LINK_DATA) {
         return link->up ? take_data(link, &reader, &header) : FRAME_GOOD;
     }
-    if (header.kind == LINK_ACK || header.kind == LINK_BYE) {
+    if (header.kind == LINK_ACK || header.kind == LINK_BYE ||
+        header.kind == LINK_NOTE) {
         return take_control(link, &reader, &header);
     }
     return FRAME_BAD_CODE;
@@ -246,7 +263,7 @@ static int take_frames(struct link *link, int most)
 static void make_room(struct link *link)
 {
     struct link_bytes_in *in = &link->in;
-    size_t frame_max = FRAME_ENCODED(link->config.frame_payload);
+    size_t frame_max = link_frame_bytes(&link->config);
     size_t left = in->end - in->begin;
     if (in->pending) {
         return;

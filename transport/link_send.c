@@ -167,6 +167,7 @@ void link_send_reset(struct link *link, uint8_t credit)
     s->limit = (uint16_t)(s->first + credit);
     s->lost = s->arrived = 0;
     s->head = 0;
+    s->inside = false;
 }
 
 /* What was on its way when the pipe broke is not coming. */
@@ -288,6 +289,7 @@ static void stage_next(struct link *link)
         s->timer_us = link->now_us;
     }
     s->slots[slot_at(link, offset)].again = false;
+    s->inside = (s->slots[slot_at(link, offset)].flags & LINK_MORE) != 0;
     stage_slot(link, offset);
     s->next++;
 }
@@ -304,6 +306,15 @@ static void stage_hello(struct link *link)
     if (c->epoch != 0 && c->hellos_left-- == 0) {
         c->epoch = 0;
     }
+}
+
+static void stage_note(struct link *link)
+{
+    struct link_notes *n = &link->notes;
+    stage(link, LINK_NOTE, n->asks ? LINK_ASK : 0, link->send.next, n->out,
+          n->out_size);
+    n->due = false;
+    link->statistics.notes_sent++;
 }
 
 static void stage_bye(struct link *link, unsigned flags)
@@ -390,7 +401,7 @@ static bool flush(struct link *link)
 static bool staging_room(const struct link *link)
 {
     return link->buffer_bytes - link->out.end >=
-           FRAME_ENCODED(link->config.frame_payload) + FRAME_SLACK + 1;
+           link_frame_bytes(&link->config) + FRAME_SLACK + 1;
 }
 
 /* Something to say without data. */
@@ -424,7 +435,9 @@ static bool stage_one(struct link *link)
     if (!link->up) {
         return false;
     }
-    if (link->receive.ack_now && link->receive.early > 0) {
+    if (link->notes.due) {
+        stage_note(link);
+    } else if (link->receive.ack_now && link->receive.early > 0) {
         stage_ack(link, 0);
     } else if (link->send.lost > 0) {
         stage_again(link);

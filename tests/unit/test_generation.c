@@ -1,0 +1,229 @@
+/* Generations of a cube: all learn of a new one, and nothing of an old one is
+ * read after it, however much was on its way. */
+#include "cube_machine.h"
+
+enum { WRITTEN = 0, READ = 1 };
+
+static const struct cube_wiring *wiring_of(const struct machine *m, unsigned i)
+{
+    return cube_wiring(m->places[i].cube);
+}
+
+static bool all_in(const struct machine *m, uint32_t generation)
+{
+    for (unsigned i = 0; i < m->count; i++) {
+        if (wiring_of(m, i)->generation != generation) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void poll_all(struct machine *m, uint32_t us)
+{
+    m->now_us += us;
+    for (unsigned i = 0; i < m->count; i++) {
+        cube_poll(m->places[i].cube, m->now_us);
+    }
+}
+
+static void settle(struct machine *m, uint32_t generation)
+{
+    for (unsigned i = 0; !all_in(m, generation); i++) {
+        assert_true(i < 20000);
+        poll_all(m, 100);
+    }
+}
+
+/* A new arena and epoch, as after a reset. */
+static void reboot(struct machine *m, unsigned i)
+{
+    free(m->places[i].arena);
+    m->places[i].config.epoch = draw(m) | 1;
+    open_place(m, i);
+}
+
+/* Writes to all, the generation as payload; reads and checks that. */
+static void chatter(struct machine *m, unsigned i, bool reads,
+                    uint64_t counts[2])
+{
+    struct cube *cube = m->places[i].cube;
+    struct cube_message message;
+    uint32_t generation = cube_wiring(cube)->generation, heard;
+    unsigned to = draw(m) % m->count;
+    if (to != i && cube_write(cube, m->places[to].self, 1, &generation,
+                              sizeof generation) == 0) {
+        assert_true(generation > 0);
+        counts[WRITTEN]++;
+    }
+    while (reads && cube_read(cube, &message)) {
+        assert_int_equal(message.size, sizeof heard);
+        memcpy(&heard, message.data, sizeof heard);
+        assert_int_equal(heard, generation);
+        cube_release(cube);
+        counts[READ]++;
+    }
+}
+
+/* The host begins anew while windows are full and nobody reads. */
+static void nothing_of_an_old_generation_is_read(void **unused)
+{
+    (void)unused;
+    for (unsigned d = 0; d <= 4; d++) {
+        struct cube_config c = {.window = (uint16_t)(d % 2 == 0 ? 1 : 4)};
+        c.frame_payload = d % 2 == 0 ? 0 : 408;
+        struct machine *m = build(d, &c, &perfect, d);
+        struct cube *host = m->places[m->nodes].cube;
+        uint64_t counts[2] = {0, 0};
+        for (uint32_t round = 0; round < 30; round++) {
+            bool reads = round % 3 != 0;
+            for (unsigned i = 0; i < 300; i++) {
+                m->now_us += 40;
+                for (unsigned k = 0; k < m->count; k++) {
+                    unsigned who = draw(m) % m->count;
+                    cube_poll(m->places[who].cube, m->now_us);
+                    chatter(m, who, reads, counts);
+                }
+            }
+            struct cube_wiring next = *cube_wiring(host);
+            cube_renew(host, &next);
+        }
+        settle(m, 31);
+        assert_true(counts[READ] > 100 && counts[READ] < counts[WRITTEN]);
+        m->broadcasts = 2;
+        run(m, 5, 1000000000); /* and the cube is as good as new */
+        check_statistics(m, false);
+        destroy(m);
+    }
+}
+
+/* On lines that lose every third frame or so. */
+static void notes_that_are_lost_are_told_again(void **unused)
+{
+    struct line_quality bad = perfect;
+    struct cube_config c = {.window = 2};
+    (void)unused;
+    bad.drop = 0.005;
+    struct machine *m = build(4, &c, &bad, 3);
+    for (uint32_t generation = 1; generation <= 10; generation++) {
+        uint64_t start_us = m->now_us;
+        settle(m, generation);
+        assert_true(m->now_us - start_us < 2000000);
+        struct cube_wiring next = *wiring_of(m, m->nodes);
+        cube_renew(m->places[m->nodes].cube, &next);
+    }
+    destroy(m);
+}
+
+/* Notes cost nothing once all agree. */
+static void all_is_quiet_when_all_agree(void **unused)
+{
+    struct cube_config c = {.window = 2};
+    uint64_t notes[2] = {0, 0};
+    (void)unused;
+    struct machine *m = build(3, &c, &perfect, 3);
+    settle(m, 1);
+    for (unsigned round = 0; round < 2; round++) {
+        for (unsigned i = 0; i < 1000; i++) {
+            poll_all(m, 1000);
+        }
+        for (unsigned i = 0; i < m->count; i++) {
+            for (unsigned d = 0; d < cube_links(m->places[i].cube); d++) {
+                notes[round] +=
+                    cube_link_statistics(m->places[i].cube, d)->notes_sent;
+            }
+        }
+    }
+    assert_true(notes[0] > 0 && notes[0] < 200);
+    assert_int_equal(notes[1], notes[0]);
+    destroy(m);
+}
+
+static void a_node_that_restarts_is_told(void **unused)
+{
+    struct cube_config c = {.window = 2};
+    uint8_t byte = 1;
+    (void)unused;
+    struct machine *m = build(3, &c, &perfect, 3);
+    struct cube *host = m->places[m->nodes].cube;
+    struct cube_wiring next = *cube_wiring(host);
+    settle(m, 1);
+    next.generation = 70000; /* more than a message's header holds */
+    cube_renew(host, &next);
+    settle(m, 70000);
+    for (unsigned i = 0; i < m->nodes; i++) {
+        reboot(m, i);
+        assert_int_equal(wiring_of(m, i)->generation, 0);
+        assert_int_equal(cube_room(m->places[i].cube, CUBE_HOST), 0);
+        assert_int_equal(cube_write(m->places[i].cube, CUBE_HOST, 1, &byte, 1),
+                         CUBE_AGAIN);
+        settle(m, 70000);
+        assert_true(cube_room(m->places[i].cube, CUBE_HOST) > 0);
+    }
+    destroy(m);
+}
+
+/* A host that starts again finds the nodes in generations of its former self,
+ * and outdoes them. */
+static void a_host_that_restarts_is_in_charge(void **unused)
+{
+    struct cube_config c = {.window = 2};
+    (void)unused;
+    for (uint32_t before = 1; before < 5; before++) {
+        struct machine *m = build(3, &c, &perfect, before);
+        struct place *host = &m->places[m->nodes];
+        settle(m, 1);
+        for (uint32_t g = 2; g <= before; g++) {
+            struct cube_wiring next = *cube_wiring(host->cube);
+            cube_renew(host->cube, &next);
+            settle(m, g);
+        }
+        reboot(m, m->nodes);
+        for (unsigned i = 0; i < 1000; i++) {
+            poll_all(m, 1000);
+        }
+        assert_true(all_in(m, before + 1));
+        for (unsigned i = 0; i < m->count; i++) {
+            assert_int_equal(wiring_of(m, i)->host_epoch, host->config.epoch);
+        }
+        m->broadcasts = 2;
+        run(m, 5, 1000000000);
+        destroy(m);
+    }
+}
+
+/* The message in hand stays until it is released. */
+static void a_message_being_read_outlives_its_generation(void **unused)
+{
+    struct cube_config c = {.window = 1};
+    struct cube_message message;
+    (void)unused;
+    struct machine *m = build(1, &c, &perfect, 1);
+    struct cube *host = m->places[m->nodes].cube;
+    settle(m, 1);
+    assert_int_equal(cube_write(m->places[1].cube, CUBE_HOST, 7, "held", 4), 0);
+    while (!cube_read(host, &message)) {
+        poll_all(m, 100);
+    }
+    struct cube_wiring next = *cube_wiring(host);
+    cube_renew(host, &next);
+    poll_all(m, 100);
+    assert_memory_equal(message.data, "held", 4);
+    cube_release(host);
+    settle(m, 2);
+    run(m, 5, 1000000000);
+    destroy(m);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nothing_of_an_old_generation_is_read),
+        cmocka_unit_test(notes_that_are_lost_are_told_again),
+        cmocka_unit_test(all_is_quiet_when_all_agree),
+        cmocka_unit_test(a_node_that_restarts_is_told),
+        cmocka_unit_test(a_host_that_restarts_is_in_charge),
+        cmocka_unit_test(a_message_being_read_outlives_its_generation),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,54 @@
+/* What the parts of a cube share: cube.c (memory, messages), gossip.c (what
+ * neighbours tell each other).  Not for others.
+ *
+ * Memory and work: see cube.h.
+ *
+ *     cube_gossip(cube, now_us);
+ */
+#ifndef TRANSPORT_CUBE_INTERNAL_H
+#define TRANSPORT_CUBE_INTERNAL_H
+
+#include "wiring.h"
+
+enum { CUBE_GOSSIP_US = 50000 }; /* between notes that are not answered */
+
+/* The oldest message of a link, while it is under way. */
+struct cube_arrival {
+    struct link_message message;
+    uint32_t ways; /* bits of links that still need a copy, and of this node */
+    bool there;
+};
+
+/* What is known of a neighbour. */
+struct cube_neighbour {
+    uint64_t comings; /* times that the link came up, as of the last look */
+    uint64_t told_us; /* when it was last told our wiring */
+    bool agreed;      /* it has said what we would say */
+};
+
+struct cube {
+    struct cube_config config;
+    struct cube_statistics statistics;
+    struct cube_wiring wiring;
+    struct link *links[CUBE_LINKS_MAX];
+    struct cube_arrival arrivals[CUBE_LINKS_MAX];
+    struct cube_neighbour neighbours[CUBE_LINKS_MAX];
+    unsigned count;
+    unsigned turn;      /* link that is served first */
+    unsigned held;      /* link of the message being read, or CUBE_LINKS_MAX */
+    uint32_t kept_back; /* links whose last slot is left to this node once */
+    uint16_t stamp;     /* of messages: the generation's low bits */
+    bool again;         /* a message waits only for that turn to pass */
+    uint8_t note[WIRING_BYTES_MAX]; /* the wiring, as it is told */
+    size_t note_size;
+};
+
+/* cube.c: the messages of the generation before go. */
+void cube_drop_all(struct cube *cube);
+
+/* gossip.c */
+void cube_gossip_start(struct cube *cube);
+void cube_gossip(struct cube *cube, uint64_t now_us);
+uint64_t cube_gossip_due_us(const struct cube *cube, uint64_t now_us);
+
+#endif
