@@ -32,12 +32,15 @@ HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
 # V=1 shows every command.
 Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
-HOST_LIBS = -ljansson -lnettle -lexpat -lz -lm
+HOST_LIBS = -lserialport -ljansson -lnettle -lexpat -lz -lm
 
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
 # drivers, boards and the host have a system beneath them.
 freestanding := $(wildcard incode/*.c transport/*.c node/*.c)
 drivers      := $(wildcard transport/drivers/*.c)
+# Those that need what a static node has not.
+host_drivers := transport/drivers/serial_port.c
+node_drivers := $(filter-out $(host_drivers),$(drivers))
 board        := $(wildcard boards/linux/*.c)
 host         := $(wildcard host/*.c)
 unit         := $(wildcard tests/unit/test_*.c)
@@ -48,7 +51,7 @@ core_objects := $(freestanding:%.c=$(obj)/%.o)
 host_objects := $(filter-out $(obj)/host/main.o,$(host:%.c=$(obj)/%.o)) \
 	$(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
-	$(drivers:%.c=$(BUILD)/node/%.o)
+	$(node_drivers:%.c=$(BUILD)/node/%.o)
 unit_tests   := $(unit:tests/unit/%.c=$(BUILD)/tests/%)
 fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
@@ -214,7 +217,7 @@ help:
 # --- packages --------------------------------------------------------------
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-dev \
-	libjansson-dev libexpat1-dev
+	libjansson-dev libserialport-dev
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi

@@ -28,6 +28,7 @@ enum {
     KEY_HOST_STALL,
     KEY_HOST_RATE,
     KEY_HOST_RATE_TIME,
+    KEY_HOST_UNPLUG,
     KEY_SEED,
     KEY_NODE_PROGRAM
 };
@@ -59,7 +60,8 @@ static const struct argp_option options_of_run[] = {
      "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
     {"memory", KEY_MEMORY, "BYTES", 0,
      "Data memory of a node, stack included: 256K .. 1G. Default: 4M", 1},
-    {"link", KEY_LINK, "NAME", 0, "Wires between nodes: tcp", 1},
+    {"link", KEY_LINK, "NAME", 0,
+     "Wires between nodes: tcp, the default, or serial (pseudo-terminals)", 1},
     {"board", KEY_BOARD, "NAME", 0, "What a node runs on: linux", 1},
     {"cube", KEY_CUBE, "FILE", 0, "Real nodes: not in this version", 1},
     {NULL, 0, NULL, 0, "What to report:", 2},
@@ -83,6 +85,9 @@ static const struct argp_option options_of_run[] = {
      3},
     {"host-rate-time", KEY_HOST_RATE_TIME, "S", 0,
      ".. for its first S seconds. Default: 30", 3},
+    {"host-unplug", KEY_HOST_UNPLUG, "MS", 0,
+     "The host closes its serial wire every MS milliseconds, for half a second",
+     3},
     {"seed", KEY_SEED, "N", 0, "Seed of --host-stall", 3},
     {"node-program", KEY_NODE_PROGRAM, "FILE", 0,
      "Start FILE for a node instead of incode-node", 3},
@@ -219,7 +224,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
     static const char *const partitions[] = {"adaptive", "uniform", NULL};
     static const char *const indexes[] = {"naive", "grid", "kd", NULL};
     static const char *const rules[] = {"own", "paper", NULL};
-    static const char *const links[] = {"tcp", NULL};
+    static const char *const links[] = {"tcp", "serial", NULL};
     static const char *const boards[] = {"linux", NULL};
     struct host_run_options *o = p->options;
     switch (key) {
@@ -240,7 +245,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
             (enum incode_face_rule)choose(p, "face-rule", value, rules, NULL);
         return true;
     case KEY_LINK:
-        (void)choose(p, "link", value, links, ",serial,mpi,");
+        o->link = (enum host_wire_kind)choose(p, "link", value, links, ",mpi,");
         return true;
     case KEY_BOARD:
         (void)choose(p, "board", value, boards, ",mps2-an500,mps2-an385,");
@@ -273,6 +278,10 @@ static bool parse_testing(int key, const char *value, struct parse *p)
     case KEY_HOST_RATE_TIME:
         (void)number(p, "host-rate-time", value, 0, 86400, &n);
         o->hindrance.slow_us = 1000000 * n;
+        return true;
+    case KEY_HOST_UNPLUG:
+        (void)number(p, "host-unplug", value, 50, 86400000, &n);
+        o->unplug_us = 1000 * n;
         return true;
     case KEY_SEED:
         (void)number(p, "seed", value, 0, UINT64_MAX, &o->hindrance.seed);

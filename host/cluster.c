@@ -152,6 +152,26 @@ static int start_node(struct host_cluster *c,
     return 0;
 }
 
+/* The host's end of its wire.  A terminal is opened by its name as a real port
+ * would be. */
+static int take_wire(struct host_cluster *c,
+                     const struct host_cluster_options *options,
+                     struct host_wires *wires, struct host_error *error)
+{
+    struct serial_port_settings settings = {.dtr = true, .rts = true};
+    if (options->link != HOST_WIRE_SERIAL) {
+        host_port_socket(&c->port, wires->host);
+        wires->host = -1;
+        return 0;
+    }
+    memcpy(settings.name, wires->host_path, sizeof wires->host_path);
+    int status = host_port_serial(&c->port, &settings, error);
+    c->port.unplug_us = options->unplug_us;
+    close(wires->host);
+    wires->host = -1;
+    return status;
+}
+
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,
                        struct host_error *error)
@@ -159,7 +179,6 @@ int host_cluster_start(struct host_cluster *cluster,
     char path[4096];
     struct host_wires wires;
     memset(cluster, 0, sizeof *cluster);
-    cluster->wire = -1;
     cluster->nodes = options->nodes;
     cluster->limited = LIMITED;
     for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
@@ -175,9 +194,11 @@ int host_cluster_start(struct host_cluster *cluster,
     if (find_program(options->program, path, sizeof path, error) != 0) {
         return error->code;
     }
-    int status = host_wires_make(&wires, HOST_WIRE_TCP, cluster->nodes,
+    int status = host_wires_make(&wires, options->link, cluster->nodes,
                                  cluster->dimension, error);
-    cluster->wire = wires.host;
+    if (status == 0) {
+        status = take_wire(cluster, options, &wires, error);
+    }
     for (unsigned i = 0; status == 0 && i < cluster->nodes; i++) {
         status = start_node(cluster, options, path, i, &wires, error);
     }
@@ -250,10 +271,7 @@ void host_cluster_stop(struct host_cluster *cluster)
     for (unsigned i = 0; i < cluster->nodes; i++) {
         reap(&cluster->process[i], 0);
     }
-    if (cluster->wire >= 0) {
-        close(cluster->wire);
-        cluster->wire = -1;
-    }
+    host_port_close(&cluster->port);
 }
 
 /* --- as a machine --------------------------------------------------------- */
@@ -267,10 +285,7 @@ static uint64_t machine_now_us(void *context)
 static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_cluster *cluster = context;
-    struct pollfd fd = {cluster->wire, tcp_events(&cluster->pipe), 0};
-    struct timespec wait = {(time_t)(wait_us / 1000000),
-                            (long)(wait_us % 1000000) * 1000};
-    (void)ppoll(&fd, fd.events != 0, &wait, NULL);
+    host_port_idle(&cluster->port, 1, wait_us);
 }
 
 static int machine_check(void *context, struct host_error *error)
@@ -292,12 +307,11 @@ struct host_machine host_cluster_machine(struct host_cluster *cluster)
 {
     struct host_machine machine;
     memset(&machine, 0, sizeof machine);
-    tcp_pipe_init(&cluster->pipe, cluster->wire);
     machine.context = cluster;
     machine.nodes = cluster->nodes;
     machine.dimension = cluster->dimension;
     machine.epoch = cluster->epoch - 1;
-    machine.pipe = tcp_link_pipe(&cluster->pipe);
+    machine.pipe = host_port_pipe(&cluster->port);
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;

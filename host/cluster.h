@@ -17,9 +17,9 @@
 #include <stdint.h>
 #include <sys/types.h>
 
-#include "../transport/drivers/tcp.h"
 #include "error.h"
 #include "machine.h"
+#include "port.h"
 #include "wires.h"
 
 enum {
@@ -29,8 +29,10 @@ enum {
 };
 
 struct host_cluster_options {
-    unsigned nodes;      /* a power of two, at most HOST_PROCESSES_MAX */
-    uint64_t memory;     /* bytes of data memory a node, stack included */
+    unsigned nodes;  /* a power of two, at most HOST_PROCESSES_MAX */
+    uint64_t memory; /* bytes of data memory a node, stack included */
+    enum host_wire_kind link;
+    uint64_t unplug_us;  /* for tests: see port.h */
     unsigned window;     /* frames a link and direction; 0: node's choice */
     const char *program; /* NULL: incode-node beside this executable */
 };
@@ -43,10 +45,9 @@ struct host_process {
 
 struct host_cluster {
     unsigned nodes, dimension;
-    uint32_t epoch;       /* of this start of the cube */
-    struct tcp_pipe pipe; /* of wire */
-    int wire;     /* a connected socket to node 0, non-blocking; -1: none */
-    bool limited; /* the kernel holds the nodes to their memory */
+    uint32_t epoch;        /* of this start of the cube */
+    struct host_port port; /* the wire to node 0 */
+    bool limited;          /* the kernel holds the nodes to their memory */
     struct host_process process[HOST_PROCESSES_MAX];
 };
 

@@ -15,6 +15,7 @@
 static const char *const strategies[] = {"sequential", "spatial", "auto"};
 static const char *const partitions[] = {"adaptive", "uniform"};
 static const char *const indexes[] = {"naive", "grid", "kd"};
+static const char *const links[] = {"tcp", "serial"};
 
 const char *host_strategy_name(enum host_strategy strategy)
 {
@@ -29,6 +30,11 @@ const char *host_partition_name(enum host_partition partition)
 const char *host_index_name(enum incode_index index)
 {
     return indexes[index];
+}
+
+const char *host_link_name(enum host_wire_kind link)
+{
+    return links[link];
 }
 
 void host_run_defaults(struct host_run_options *options)
@@ -65,6 +71,7 @@ static void settle(const struct host_run_options *options,
     result->strategy = options->strategy;
     result->partition = options->partition;
     result->index = options->index;
+    result->link = options->link;
     result->memory = options->memory;
     result->nodes = options->nodes;
     if (result->nodes == 0) {
@@ -245,6 +252,8 @@ int host_triangulate(const struct host_run_options *options,
     nodes.nodes = result->nodes;
     nodes.memory = options->memory;
     nodes.window = options->window;
+    nodes.link = options->link;
+    nodes.unplug_us = options->unplug_us;
     nodes.program = options->node_program;
     if (check_memory(options, result->nodes, 1, no_cells, error) != 0 ||
         host_cluster_start(&cluster, &nodes, error) != 0) {
@@ -252,7 +261,7 @@ int host_triangulate(const struct host_run_options *options,
     }
     struct host_machine machine = host_cluster_machine(&cluster);
     result->limited = cluster.limited;
-    (void)tcp_buffers(cluster.wire, &result->socket_send_bytes,
+    (void)tcp_buffers(cluster.port.tcp.fd, &result->socket_send_bytes,
                       &result->socket_receive_bytes);
     result->time_start_up_s = seconds_since(start);
     return host_triangulate_on(options, &machine, points, tets, result, error);

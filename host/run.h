@@ -31,6 +31,7 @@ struct host_run_options {
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;
+    enum host_wire_kind link;
     unsigned nodes; /* 0: what suits this machine */
     uint64_t memory;
     const char *stats; /* a file for the statistics, or NULL */
@@ -38,6 +39,7 @@ struct host_run_options {
     /* For tests. */
     unsigned window;
     uint64_t shuffle_seed;
+    uint64_t unplug_us;
     struct host_hindrance hindrance;
     const char *node_program;
 };
@@ -48,6 +50,7 @@ struct host_run_result {
     enum host_strategy strategy; /* the one taken */
     enum host_partition partition;
     enum incode_index index;
+    enum host_wire_kind link;
     unsigned nodes;
     uint64_t memory;
     double time_total_s, time_read_s, time_order_s, time_io_s;
@@ -71,6 +74,7 @@ void host_run_defaults(struct host_run_options *options);
 const char *host_strategy_name(enum host_strategy strategy);
 const char *host_partition_name(enum host_partition partition);
 const char *host_index_name(enum incode_index index);
+const char *host_link_name(enum host_wire_kind link);
 
 /* Triangulates points: tets become rows of points, in no order. */
 int host_triangulate(const struct host_run_options *options,

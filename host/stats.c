@@ -103,7 +103,7 @@ static json_t *run_object(const struct host_run_result *r)
     put_text(o, "strategy", host_strategy_name(r->strategy));
     put_text(o, "partition", host_partition_name(r->partition));
     put_text(o, "index", host_index_name(r->index));
-    put_text(o, "link", "tcp");
+    put_text(o, "link", host_link_name(r->link));
     put_text(o, "board", "linux");
     put(o, "nodes", r->nodes);
     put(o, "memory_bytes", r->memory);

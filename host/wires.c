@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "../transport/drivers/serial.h"
 #include "../transport/drivers/tcp.h"
 
 /* How a wire of each kind is made, and what it may lack. */
@@ -12,6 +13,7 @@ static const struct {
     const char *needs;
 } kinds[] = {
     [HOST_WIRE_TCP] = {tcp_pair, "loopback connections"},
+    [HOST_WIRE_SERIAL] = {serial_pair, "pseudo-terminals"},
 };
 
 static void close_end(int *end)
@@ -53,6 +55,7 @@ int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
 {
     int pair[2];
     memset(wires, -1, sizeof *wires);
+    wires->host_path[0] = '\0';
     if (make_between_nodes(wires, kind, nodes, dimension, error) != 0) {
         host_wires_close(wires);
         return error->code;
@@ -66,6 +69,13 @@ int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
     }
     wires->end[0][dimension] = pair[0];
     wires->host = pair[1];
+    if (kind == HOST_WIRE_SERIAL &&
+        ttyname_r(pair[1], wires->host_path, sizeof wires->host_path) != 0) {
+        host_wires_close(wires);
+        return host_fail(error, HOST_CUBE,
+                         "wire between host and node 0: a pseudo-terminal "
+                         "without a name; is /dev/pts mounted?");
+    }
     return 0;
 }
 

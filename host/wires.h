@@ -16,10 +16,11 @@
 
 enum { HOST_PROCESSES_MAX = 64 }; /* nodes on one machine */
 
-enum host_wire_kind { HOST_WIRE_TCP };
+enum host_wire_kind { HOST_WIRE_TCP, HOST_WIRE_SERIAL };
 
 struct host_wires {
-    int host; /* the host's end of its wire to node 0; -1: none */
+    int host;           /* the host's end of its wire to node 0; -1: none */
+    char host_path[64]; /* of it, where it is a terminal */
     int end[HOST_PROCESSES_MAX][CUBE_LINKS_MAX]; /* [node][link]; -1: none */
 };
 

@@ -1,13 +1,13 @@
 /* A node as a process of Linux.  Its straps are arguments, its links are
- * connected sockets that it inherits, its arena is one mapping made at start:
- * arena, .data, .bss and stack together are --memory.  The one who starts it
- * sets RLIMIT_DATA and RLIMIT_STACK, so that the kernel holds it to that.
+ * connected sockets or open terminals that it inherits, its arena is one
+ * mapping made at start: arena, .data, .bss and stack together are --memory.
+ * The one who starts it sets RLIMIT_DATA and RLIMIT_STACK, so that the kernel
+ * holds it to that.
  *
  *     incode-node --node 3 --dimension 3 --memory 4194304 --stack 65536 \
  *                 --window 8 --epoch 17 --links 5,6,7
  */
 #include <link.h>
-#include <poll.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #include "../../node/node.h"
-#include "../../transport/drivers/tcp.h"
+#include "wire.h"
 
 enum { PAGE = 4096, SANITIZED_STATIC = 8192 };
 
@@ -28,7 +28,7 @@ struct straps {
 };
 
 struct linux_board {
-    struct tcp_pipe tcp[CUBE_LINKS_MAX];
+    struct linux_wire wire[CUBE_LINKS_MAX];
     unsigned links_count;
 };
 
@@ -146,18 +146,7 @@ static uint64_t busy_us(void *context)
 static void idle(void *context, uint64_t wait_us)
 {
     struct linux_board *board = context;
-    struct pollfd fds[CUBE_LINKS_MAX];
-    struct timespec wait = {(time_t)(wait_us / 1000000),
-                            (long)(wait_us % 1000000) * 1000};
-    nfds_t count = 0;
-    for (unsigned i = 0; i < board->links_count; i++) {
-        short events = tcp_events(&board->tcp[i]);
-        if (events != 0) {
-            fds[count].fd = board->tcp[i].fd;
-            fds[count++].events = events;
-        }
-    }
-    (void)ppoll(fds, count, &wait, NULL);
+    linux_wires_idle(board->wire, board->links_count, wait_us);
 }
 
 static void reset(void *context, int status)
@@ -195,8 +184,8 @@ int main(int argc, char **argv)
     }
     linux_board.links_count = straps.links_count;
     for (unsigned i = 0; i < straps.links_count; i++) {
-        tcp_pipe_init(&linux_board.tcp[i], straps.links[i]);
-        board.pipes[i] = tcp_link_pipe(&linux_board.tcp[i]);
+        linux_wire_inherit(&linux_board.wire[i], straps.links[i]);
+        board.pipes[i] = linux_wire_pipe(&linux_board.wire[i]);
     }
     board.context = &linux_board;
     board.identity.self = (uint16_t)straps.node;

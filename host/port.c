@@ -1,0 +1,86 @@
+#include "port.h"
+
+#include <poll.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "progress.h"
+
+void host_port_socket(struct host_port *port, int fd)
+{
+    memset(port, 0, sizeof *port);
+    port->kind = fd < 0 ? HOST_PORT_NONE : HOST_PORT_SOCKET;
+    tcp_pipe_init(&port->tcp, fd);
+}
+
+int host_port_serial(struct host_port *port,
+                     const struct serial_port_settings *settings,
+                     struct host_error *error)
+{
+    memset(port, 0, sizeof *port);
+    if (serial_port_open(&port->serial, settings) != 0) {
+        return host_fail(error, HOST_CUBE, "%s", port->serial.fault);
+    }
+    port->kind = HOST_PORT_SERIAL;
+    return 0;
+}
+
+struct link_pipe host_port_pipe(struct host_port *port)
+{
+    return port->kind == HOST_PORT_SERIAL ? serial_link_pipe(&port->serial.pipe)
+                                          : tcp_link_pipe(&port->tcp);
+}
+
+static void unplug(struct host_port *port)
+{
+    uint64_t now_us = host_now_us();
+    if (port->unplugged_us == 0 || port->serial.pipe.fd < 0) {
+        port->unplugged_us = now_us;
+    }
+    if (now_us - port->unplugged_us >= port->unplug_us) {
+        port->unplugged_us = now_us;
+        serial_close(port->serial.pipe.fd);
+        port->serial.pipe.fd = -1;
+        port->serial.pipe.closed = true;
+        port->serial.look_us = now_us;
+    }
+}
+
+void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
+{
+    struct pollfd fds[HOST_PORTS_MAX];
+    nfds_t used = 0;
+    for (unsigned i = 0; i < count; i++) {
+        struct host_port *port = &ports[i];
+        struct serial_pipe *pipe = &port->serial.pipe;
+        bool serial = port->kind == HOST_PORT_SERIAL;
+        short events = serial                           ? serial_events(pipe)
+                       : port->kind == HOST_PORT_SOCKET ? tcp_events(&port->tcp)
+                                                        : 0;
+        if (serial && serial_wait_us(pipe) < wait_us) {
+            wait_us = serial_wait_us(pipe);
+        }
+        if (events != 0) {
+            fds[used].fd = serial ? pipe->fd : port->tcp.fd;
+            fds[used++].events = events;
+        }
+        if (serial && port->unplug_us != 0) {
+            unplug(port);
+        }
+    }
+    struct timespec wait = {(time_t)(wait_us / 1000000),
+                            (long)(wait_us % 1000000) * 1000};
+    (void)ppoll(fds, used, &wait, NULL);
+}
+
+void host_port_close(struct host_port *port)
+{
+    if (port->kind == HOST_PORT_SERIAL) {
+        serial_port_close(&port->serial);
+    } else if (port->kind == HOST_PORT_SOCKET) {
+        close(port->tcp.fd);
+        port->tcp.closed = true;
+    }
+    port->kind = HOST_PORT_NONE;
+}

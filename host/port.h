@@ -1,0 +1,46 @@
+/* The host's end of a wire, whatever its kind: a connected socket, or a serial
+ * port that may vanish and come back.
+ *
+ * Memory: struct host_port.  Work: as the drivers'.
+ *
+ *     host_port_socket(&port, fd);
+ *     machine.pipe = host_port_pipe(&port);
+ *     host_port_idle(&port, 1, wait_us);
+ *     host_port_close(&port);
+ */
+#ifndef HOST_PORT_H
+#define HOST_PORT_H
+
+#include "../transport/drivers/serial_port.h"
+#include "../transport/drivers/tcp.h"
+#include "error.h"
+
+enum host_port_kind { HOST_PORT_NONE, HOST_PORT_SOCKET, HOST_PORT_SERIAL };
+
+struct host_port {
+    enum host_port_kind kind;
+    struct tcp_pipe tcp; /* its socket is the port's */
+    struct serial_port serial;
+    /* For tests: the port is closed after it was open so long, and opened when
+     * it is next looked for. */
+    uint64_t unplug_us, unplugged_us;
+};
+
+/* Takes a connected socket; -1: none. */
+void host_port_socket(struct host_port *port, int fd);
+
+/* Opens a serial port: 0, or HOST_CUBE. */
+int host_port_serial(struct host_port *port,
+                     const struct serial_port_settings *settings,
+                     struct host_error *error);
+
+struct link_pipe host_port_pipe(struct host_port *port);
+
+/* Sleeps until one of the ports has bytes, or room for them where there was
+ * none, but no longer than wait_us.  At most HOST_PORTS_MAX ports. */
+enum { HOST_PORTS_MAX = 2 };
+void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us);
+
+void host_port_close(struct host_port *port);
+
+#endif
