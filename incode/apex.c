@@ -197,17 +197,17 @@ INCODE_INLINE incode_vd both_ways(const double a[3])
 }
 
 /* Whether the closed cap, beyond the face, of the sphere at t of the pencil
- * lies strictly within the gathered box.  Where an extreme point of the sphere
+ * lies strictly within a box.  Where an extreme point of the sphere
  * is on the known side, the rim of the face's circle is the extreme.
  * Everything is widened by 1e-6 of the sphere's size. */
-static bool cap_is_gathered(const struct incode_gather *g,
-                            const struct incode_pencil *pencil, double t)
+static bool cap_fits(const double walls[8], const struct incode_pencil *pencil,
+                     double t)
 {
     incode_vd zero = incode_vd_all(0), n = both_ways(pencil->n);
     incode_vd c0 = both_ways(pencil->c0);
     double circle = incode_dot(pencil->c0, pencil->c0);
     double square = circle + 0.25 * t * t, radius = __builtin_sqrt(square);
-    incode_vd wall = incode_vd_load(g->wall);
+    incode_vd wall = incode_vd_load(walls);
     incode_vd gap = wall - (c0 + incode_vd_all(0.5 * t) * n);
     incode_vl in =
         (gap > zero) & (gap * gap > incode_vd_all(square * (1 + 4e-6)));
@@ -231,8 +231,7 @@ struct near {
 
 /* The same for a sphere of any face; an ill-conditioned one is never accepted.
  * The centre is m / (2 det), the radius its length. */
-static bool cap_is_within(const struct incode_gather *g,
-                          const struct incode_sphere *s)
+static bool cap_is_within(const double wall[8], const struct incode_sphere *s)
 {
     if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
         !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
@@ -254,7 +253,7 @@ static bool cap_is_within(const struct incode_gather *g,
         pencil.n[d] = s->n[d] * unit;
         pencil.c0[d] = centre[d] - 0.5 * t * unit * pencil.n[d];
     }
-    return cap_is_gathered(g, &pencil, t * unit);
+    return cap_fits(wall, &pencil, t * unit);
 }
 
 static void copy_point(double p[3], const struct incode_gather *g, uint32_t i)
@@ -366,7 +365,7 @@ static enum incode_near contest_all(struct near *n)
     if (n->face.regular)
         count = incode_gather_first(g, &n->face.pencil, &t, first);
     if (count > 0 && is_plain(n, first, count, &t)) {
-        if (cap_is_gathered(g, &n->face.pencil, t))
+        if (cap_fits(g->wall, &n->face.pencil, t))
             return INCODE_NEAR_FOUND;
         set_sphere(n);
         return INCODE_NEAR_SEARCH;
@@ -377,8 +376,95 @@ static enum incode_near contest_all(struct near *n)
         return incode_hull_known(n->t, n->pv, n->pb, n->pc)
                    ? INCODE_NEAR_HULL
                    : INCODE_NEAR_SEARCH;
-    return cap_is_within(g, &n->sphere) ? INCODE_NEAR_FOUND
+    return cap_is_within(g->wall, &n->sphere) ? INCODE_NEAR_FOUND
                                         : INCODE_NEAR_SEARCH;
+}
+
+/* ---- among the bricks around ---- */
+
+/* The query that goes on from the points at hand. */
+static void begin(struct near *n, struct incode_search *s)
+{
+    const struct incode_gather *g = &n->t->gather;
+    struct incode_query *q = &s->query;
+    memset(q, 0, sizeof *q);
+    q->question = INCODE_QUERY_APEX;
+    q->v = g->vertex;
+    q->b = g->id[n->b];
+    q->c = g->id[n->c];
+    memcpy(q->pv, n->pv, sizeof q->pv);
+    memcpy(q->pb, n->pb, sizeof q->pb);
+    memcpy(q->pc, n->pc, sizeof q->pc);
+    q->scale = g->scale;
+    memcpy(q->rb, n->face.b, sizeof q->rb);
+    memcpy(q->rc, n->face.c, sizeof q->rc);
+    q->sphere = n->sphere;
+    q->best = INCODE_NONE;
+    s->radius = g->radius > DBL_MIN ? g->radius : DBL_MIN;
+    s->looked = g->near;
+    s->final = false;
+    if (n->best == INCODE_GATHER_NONE)
+        return;
+    incode_query_start(q, g->id[n->best], n->store[3]);
+    set_final(s);
+    q->done = true;
+    memcpy(q->done_lo, g->lo, sizeof g->lo);
+    memcpy(q->done_hi, g->hi, sizeof g->hi);
+}
+
+/* Box after box, up to that of the list, for a first candidate. */
+static enum incode_walk find_first(struct incode_triangulator *t,
+                                   struct incode_search *s)
+{
+    struct incode_query *q = &s->query;
+    enum incode_walk r = INCODE_WALK_DONE;
+    while (r == INCODE_WALK_DONE && q->best == INCODE_NONE) {
+        s->radius *= 2;
+        set_box(t, s);
+        if (!q->boxed || !incode_vicinity_holds(&t->vicinity, q->lo, q->hi))
+            return INCODE_WALK_STOP;
+        r = incode_vicinity_apex(&t->vicinity, &t->walker, q);
+        q->done = true;
+        memcpy(q->done_lo, q->lo, sizeof q->lo);
+        memcpy(q->done_hi, q->hi, sizeof q->hi);
+    }
+    if (r == INCODE_WALK_DONE)
+        set_final(s);
+    return r;
+}
+
+/* Whether the list decides; where it does not, the search is ready to go on
+ * with the tree. */
+static bool search_list(struct near *n, struct incode_search *s)
+{
+    struct incode_triangulator *t = n->t;
+    const struct incode_vicinity *list = &t->vicinity;
+    struct incode_query *q = &s->query;
+    alignas(64) double wall[8];
+    if (list->count == 0)
+        return false;
+    uint64_t before = t->stats.candidates;
+    enum incode_walk r = INCODE_WALK_DONE;
+    if (q->best == INCODE_NONE)
+        r = find_first(t, s);
+    /* An ill-conditioned sphere has no ball: the list is of no use. */
+    if (r == INCODE_WALK_DONE)
+        r = q->round ? incode_vicinity_apex(list, &t->walker, q)
+                     : INCODE_WALK_STOP;
+    s->looked += t->stats.candidates - before;
+    if (r != INCODE_WALK_DONE)
+        return false;
+    for (int d = 0; d < 3; d++) {
+        wall[d] = (list->box_hi[d] - q->pv[d]) * q->scale;
+        wall[4 + d] = (q->pv[d] - list->box_lo[d]) * q->scale;
+    }
+    wall[3] = wall[7] = __builtin_inf();
+    if (cap_is_within(wall, &q->sphere))
+        return true;
+    q->done = true;
+    memcpy(q->done_lo, list->box_lo, sizeof q->done_lo);
+    memcpy(q->done_hi, list->box_hi, sizeof q->done_hi);
+    return false;
 }
 
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
@@ -405,22 +491,19 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
         incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, g->scale);
     set_face(&n.face, &n.sphere);
     enum incode_near r = contest_all(&n);
-    uint64_t looked = g->near;
     *apex = n.best;
     if (r != INCODE_NEAR_SEARCH) {
-        incode_count_candidates(t, looked);
+        incode_count_candidates(t, g->near);
         return r;
     }
-    const uint32_t f[3] = {g->vertex, g->id[b], g->id[c]};
-    incode_search_begin(t, s, f, n.pv, n.pb, n.pc, g->radius * 4);
-    s->looked = looked;
-    if (n.best == INCODE_GATHER_NONE)
+    begin(&n, s);
+    if (!search_list(&n, s))
         return INCODE_NEAR_SEARCH;
-    struct incode_query *q = &s->query;
-    set_final(s);
-    incode_query_consider(q, &t->stats.tally, g->id[n.best], n.store[3]);
-    q->done = true;
-    memcpy(q->done_lo, g->lo, sizeof g->lo);
-    memcpy(q->done_hi, g->hi, sizeof g->hi);
-    return INCODE_NEAR_SEARCH;
+    *apex = incode_gather_find(g, s->query.best);
+    if (*apex == INCODE_GATHER_NONE)
+        *apex = incode_gather_append(g, s->query.best, s->query.best_p);
+    if (*apex == INCODE_GATHER_NONE)
+        return INCODE_NEAR_SEARCH; /* the search will find it again */
+    incode_count_candidates(t, s->looked);
+    return INCODE_NEAR_FOUND;
 }

@@ -49,6 +49,7 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
 
 enum incode_gathered incode_gather_around(struct incode_gather *g,
                                           struct incode_walker *walker,
+                                          const struct incode_vicinity *vicinity,
                                           uint32_t leaf, const double lo[3],
                                           const double hi[3], double radius)
 {
@@ -64,7 +65,10 @@ enum incode_gathered incode_gather_around(struct incode_gather *g,
         q->lo[d] = g->around_lo[d] = lo[d] - radius;
         q->hi[d] = g->around_hi[d] = hi[d] + radius;
     }
-    enum incode_walk r = incode_walk(walker, q, copy_leaves, g);
+    enum incode_walk r =
+        incode_vicinity_holds(vicinity, q->lo, q->hi)
+            ? incode_vicinity_box(vicinity, walker, q, copy_leaves, g)
+            : incode_walk(walker, q, copy_leaves, g);
     g->count = g->around;
     g->per_unit = 0;
     if (r == INCODE_WALK_WAIT)
@@ -243,8 +247,8 @@ static void give_up_near(struct incode_gather *g)
 {
     g->near = 0;
     for (int d = 0; d < 3; d++) {
-        g->rlo[d] = __builtin_inf();
-        g->rhi[d] = -__builtin_inf();
+        g->lo[d] = g->rlo[d] = __builtin_inf();
+        g->hi[d] = g->rhi[d] = -__builtin_inf();
         g->wall[d] = g->wall[4 + d] = -__builtin_inf();
     }
 }

@@ -8,7 +8,7 @@
  * precision, and leaves what its error bound cannot tell to the exact
  * predicates.
  *
- *     incode_gather_around(&g, &walker, leaf, lo, hi, radius);
+ *     incode_gather_around(&g, &walker, &vicinity, leaf, lo, hi, radius);
  *     incode_gather_centre(&g, v, p, radius, domain_lo, domain_hi);
  *     i = incode_gather_first(&g, 0, g.inner, n, m, nn);   first by distance
  *     count = incode_gather_inside(&g, 0, g.inner, &sphere, out);
@@ -19,7 +19,7 @@
 #include <stdalign.h>
 #include <stdint.h>
 
-#include "query.h"
+#include "vicinity.h"
 
 enum {
     INCODE_AROUND_POINTS = 768, /* around a leaf */
@@ -79,8 +79,9 @@ enum incode_gathered {
 void incode_gather_reset(struct incode_gather *g);
 
 /* Copies every point of the box lo..hi widened by radius on all sides. */
-enum incode_gathered incode_gather_around(struct incode_gather *g,
-                                          struct incode_walker *walker,
+enum incode_gathered
+incode_gather_around(struct incode_gather *g, struct incode_walker *walker,
+                                          const struct incode_vicinity *vicinity,
                                           uint32_t leaf, const double lo[3],
                                           const double hi[3], double radius);
 

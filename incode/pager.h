@@ -36,6 +36,21 @@ struct incode_frame {
     uint8_t count; /* points of a brick */
 };
 
+/* The tight box of a brick. */
+static inline void incode_frame_box(const struct incode_frame *f, double lo[3],
+                                    double hi[3])
+{
+    unsigned leaves = (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
+    for (int d = 0; d < 3; d++) {
+        lo[d] = f->leaf_lo[d][0];
+        hi[d] = f->leaf_hi[d][0];
+        for (unsigned i = 1; i < leaves; i++) {
+            lo[d] = f->leaf_lo[d][i] < lo[d] ? f->leaf_lo[d][i] : lo[d];
+            hi[d] = f->leaf_hi[d][i] > hi[d] ? f->leaf_hi[d][i] : hi[d];
+        }
+    }
+}
+
 struct incode_pager {
     struct incode_frame *frames;
     uint16_t *heads; /* hash of page numbers to frames */

@@ -51,7 +51,7 @@ void incode_query_face(struct incode_query *q)
 static void bound_sphere(struct incode_query *q)
 {
     const struct incode_sphere *s = &q->sphere;
-    q->boxed = false;
+    q->boxed = q->round = false;
     if (!s->has_apex || !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
         !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
         return;
@@ -68,13 +68,25 @@ static void bound_sphere(struct incode_query *q)
         if (!(q->lo[d] <= q->hi[d]))
             return;
     }
-    q->boxed = true;
+    q->square = radius * radius;
+    q->boxed = q->round = true;
 }
 
 void incode_query_shrink(struct incode_query *q)
 {
     q->shrinking = true;
     bound_sphere(q);
+}
+
+void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
+{
+    double half = 0.5 / q->sphere.det;
+    q->best = id;
+    memcpy(q->best_p, p, sizeof q->best_p);
+    for (int d = 0; d < 3; d++)
+        q->centre[d] = q->sphere.m[d] * half;
+    if (q->shrinking)
+        bound_sphere(q);
 }
 
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
@@ -85,18 +97,12 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     if (q->best != INCODE_NONE &&
         incode_in_sphere(tally, q->pv, q->pb, q->pc, q->best_p, p) < 0)
         return;
-    q->best = id;
-    memcpy(q->best_p, p, sizeof q->best_p);
     double r[3];
     relative(r, q, p);
     incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
     if (incode_sphere_is_blurred(&q->sphere))
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, p, q->scale);
-    double half = 0.5 / q->sphere.det;
-    for (int d = 0; d < 3; d++)
-        q->centre[d] = q->sphere.m[d] * half;
-    if (q->shrinking)
-        bound_sphere(q);
+    incode_query_start(q, id, p);
 }
 
 /* ---- which of up to 32 boxes a question concerns ---- */
@@ -166,6 +172,30 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
     return ~out;
 }
 
+/* What meets the ball and is not certainly on the known side of the plane. */
+INCODE_INLINE incode_vl meets_ball(const struct incode_query *q,
+                                   const struct boxes *boxes, unsigned i)
+{
+    const struct incode_sphere *s = &q->sphere;
+    incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
+    incode_vd square = zero, scale = incode_vd_all(q->scale);
+    for (int d = 0; d < 3; d++) {
+        incode_vd v = incode_vd_all(q->pv[d]), c = incode_vd_all(q->centre[d]);
+        incode_vd lo = (incode_vd_load(boxes->lo[d] + i) - v) * scale;
+        incode_vd hi = (incode_vd_load(boxes->hi[d] + i) - v) * scale;
+        incode_vd n = incode_vd_all(s->n[d]);
+        plane += incode_vd_max(n * lo, n * hi);
+        plane_error += incode_vd_all(s->pn[d]) *
+                       incode_vd_max(incode_vd_abs(lo), incode_vd_abs(hi));
+        incode_vd gap = incode_vd_max(incode_vd_max(lo - c, c - hi), zero);
+        square += gap * gap;
+    }
+    incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
+    incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
+    return ~((plane + (plane_error * eps + tiny) < zero) |
+             (square > incode_vd_all(q->square)));
+}
+
 INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
                                     const struct boxes *boxes, unsigned i)
 {
@@ -194,7 +224,9 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
         }
         if (q->done)
             in &= not_done(q, boxes, i);
-        if (q->question == INCODE_QUERY_APEX)
+        if (q->question == INCODE_QUERY_APEX && q->round)
+            in &= meets_ball(q, boxes, i);
+        else if (q->question == INCODE_QUERY_APEX)
             in &= may_hold_apex(q, boxes, i);
         else if (q->question != INCODE_QUERY_BOX)
             in &= may_be_near(q, boxes, i);
@@ -272,6 +304,11 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
         boxes.hi[d] = frame->page.boxes.hi[d];
     }
     uint32_t mask = passing(w->q, &boxes, count);
+    if (level == 1 && w->q->boxes_only)
+        return mask == 0 || w->visit(w->walker, w->q, frame, first, mask,
+                                     w->context)
+                   ? INCODE_WALK_DONE
+                   : INCODE_WALK_STOP;
     for (uint32_t left = mask; left != 0; left &= left - 1) {
         unsigned child = (unsigned)__builtin_ctz(left);
         uint64_t end = brick_end(level - 1, (uint64_t)first + child);
@@ -309,6 +346,16 @@ enum incode_walk incode_walk(struct incode_walker *walker,
         return INCODE_WALK_WAIT;
     }
     return descend(&w, top, 0, root);
+}
+
+enum incode_walk incode_walk_brick(struct incode_walker *walker,
+                                   struct incode_query *q, uint32_t brick,
+                                   incode_visit *visit, void *context)
+{
+    struct walk w = {walker, q, visit, context};
+    const struct incode_frame *f = incode_pager_get(walker->pager, brick);
+    q->missing = brick;
+    return f == NULL ? INCODE_WALK_WAIT : visit_brick(&w, brick, f);
 }
 
 /* ---- points ---- */

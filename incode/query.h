@@ -34,6 +34,8 @@ struct incode_query {
     bool timid;          /* APEX: only points clearly beyond the face */
     bool ahead;          /* BOX: asks for missing bricks and passes them over */
     bool shrinking;      /* APEX: the box is that of the best's sphere */
+    bool round;          /* APEX: shrinking, and the ball below holds it */
+    bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
     bool done;           /* not what lies within [done_lo, done_hi] */
     double lo[3], hi[3]; /* absolute coordinates */
     double done_lo[3], done_hi[3];
@@ -43,6 +45,7 @@ struct incode_query {
     double rb[3], rc[3];        /* b and c, relative */
     struct incode_sphere sphere;
     double centre[3]; /* of the sphere: where its value peaks */
+    double square;    /* of its radius, widened */
     double limit;     /* NEAREST, CIRCLE: squared, relative */
     uint32_t best;    /* vertex number, or INCODE_NONE */
     double best_p[3];
@@ -60,8 +63,8 @@ struct incode_walker {
     uint64_t *candidates;
 };
 
-/* Called with a brick and its leaves that pass, one bit each; false stops the
- * walk. */
+/* Called with a brick and its leaves that pass, one bit each (boxes_only: the
+ * first brick of a page and its boxes that pass); false stops the walk. */
 typedef bool incode_visit(struct incode_walker *walker, struct incode_query *q,
                           const struct incode_frame *frame, uint32_t brick,
                           uint32_t leaves, void *context);
@@ -70,8 +73,17 @@ enum incode_walk incode_walk(struct incode_walker *walker,
                              struct incode_query *q, incode_visit *visit,
                              void *context);
 
+/* The same for one brick. */
+enum incode_walk incode_walk_brick(struct incode_walker *walker,
+                                   struct incode_query *q, uint32_t brick,
+                                   incode_visit *visit, void *context);
+
 /* Sets the face (v, b, c) of an APEX query: plane and scale. */
 void incode_query_face(struct incode_query *q);
+
+/* The first candidate, known to be beyond the face; the sphere is that through
+ * it already. */
+void incode_query_start(struct incode_query *q, uint32_t id, const double p[3]);
 
 /* From now on only what meets the sphere of the best so far matters. */
 void incode_query_shrink(struct incode_query *q);

@@ -212,6 +212,15 @@ INCODE_INLINE incode_vd incode_vd_max(incode_vd a, incode_vd b)
 #endif
 }
 
+INCODE_INLINE incode_vf incode_vf_max(incode_vf a, incode_vf b)
+{
+#ifdef __AVX512DQ__
+    return (incode_vf)_mm512_max_ps((__m512)a, (__m512)b);
+#else
+    return incode_vf_select(a > b, a, b);
+#endif
+}
+
 INCODE_INLINE incode_vd incode_vd_min(incode_vd a, incode_vd b)
 {
 #ifdef __AVX512DQ__

@@ -194,7 +194,7 @@ static enum incode_outcome gather_leaf(struct incode_triangulator *t,
     double radius = first_radius(t, lo, hi);
     for (int tries = 0;; tries++) {
         enum incode_gathered r = incode_gather_around(
-            g, &t->walker, task->v / INCODE_LEAF_POINTS, lo, hi, radius);
+            g, &t->walker, &t->vicinity, task->v / INCODE_LEAF_POINTS, lo, hi, radius);
         task->page = g->query.missing;
         if (r == INCODE_GATHER_WAIT)
             return INCODE_WAIT;
@@ -203,6 +203,55 @@ static enum incode_outcome gather_leaf(struct incode_triangulator *t,
         radius *= 0.75;
         t->spread *= 0.99;
     }
+}
+
+enum {
+    VICINITY_WANTED = 64, /* bricks, at least */
+    VICINITY_TRIES = 12
+};
+
+/* Lists the bricks around that of a vertex: more of them where there are few,
+ * none where there are too many whatever the box. */
+static enum incode_outcome list_bricks(struct incode_triangulator *t,
+                                       struct incode_task *task,
+                                       const struct incode_frame *f)
+{
+    struct incode_vicinity *v = &t->vicinity;
+    uint32_t brick = task->v / INCODE_BRICK_POINTS;
+    double lo[3], hi[3], extent = 0;
+    bool full = false;
+    incode_frame_box(f, lo, hi);
+    for (int d = 0; d < 3; d++)
+        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
+    for (int tries = 0; tries < VICINITY_TRIES; tries++) {
+        double radius = extent * t->reach, wide_lo[3], wide_hi[3];
+        bool all = true;
+        for (int d = 0; d < 3; d++) {
+            wide_lo[d] = lo[d] - radius;
+            wide_hi[d] = hi[d] + radius;
+            all = all && wide_lo[d] <= t->setup.lo[d] &&
+                  wide_hi[d] >= t->setup.hi[d];
+        }
+        enum incode_listed r = incode_vicinity_make(
+            v, &t->walker, brick, wide_lo, wide_hi, &task->page);
+        if (r == INCODE_LIST_WAIT)
+            return INCODE_WAIT;
+        if (r == INCODE_LISTED &&
+            (full || all || v->count >= VICINITY_WANTED))
+            break;
+        full = full || r == INCODE_LIST_FULL;
+        t->reach *= full ? 0.75 : 1.25;
+        t->reach = t->reach < 0x1p-10 ? 0x1p-10
+                   : t->reach > 0x1p10 ? 0x1p10
+                                       : t->reach;
+    }
+    for (int d = 0; d < 3; d++) {
+        if (v->box_lo[d] <= t->setup.lo[d])
+            v->box_lo[d] = -__builtin_inf();
+        if (v->box_hi[d] >= t->setup.hi[d])
+            v->box_hi[d] = __builtin_inf();
+    }
+    return INCODE_OK;
 }
 
 static enum incode_outcome star_gather(struct incode_triangulator *t,
@@ -214,6 +263,9 @@ static enum incode_outcome star_gather(struct incode_triangulator *t,
         incode_pager_get(&t->pager, v / INCODE_BRICK_POINTS);
     task->page = v / INCODE_BRICK_POINTS;
     if (f == NULL)
+        return INCODE_WAIT;
+    if (t->vicinity.centre != v / INCODE_BRICK_POINTS &&
+        list_bricks(t, task, f) == INCODE_WAIT)
         return INCODE_WAIT;
     if (g->leaf != v / INCODE_LEAF_POINTS &&
         gather_leaf(t, task, f) == INCODE_WAIT)

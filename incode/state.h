@@ -120,11 +120,13 @@ struct incode_triangulator {
     uint32_t room_faces, room_bricks; /* kept free before a star */
     uint32_t built_max;
     double spread;  /* gather radius in units of the leaf's extent */
+    double reach;   /* of the vicinity, in units of the brick's extent */
     uint32_t sweep; /* index `naive`: the brick last looked at */
     struct incode_task tasks[INCODE_TASKS];
     struct incode_hull_plane planes[INCODE_HULL_PLANES];
     uint32_t plane_count, plane_next;
     struct incode_star star;
+    struct incode_vicinity vicinity;
     struct incode_gather gather;
 };
 

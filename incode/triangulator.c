@@ -104,7 +104,9 @@ incode_triangulator_init(void *arena, size_t bytes,
                                        &t->stats.candidates};
     t->gather.pages_max = (uint32_t)map.frame_count / 2;
     incode_gather_reset(&t->gather);
+    t->vicinity.centre = INCODE_NONE;
     t->spread = 1.6;
+    t->reach = 2;
     t->window = 4;
     t->lookahead = (uint32_t)map.frame_count / 24;
     t->lookahead = t->lookahead < 1               ? 1

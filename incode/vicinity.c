@@ -1,0 +1,200 @@
+#include "vicinity.h"
+
+#include <string.h>
+
+#include "simd.h"
+
+/* ---- the list ---- */
+
+/* Rounding outward, in units in which the box is of size 1 or 2. */
+#define OUTWARD 0x1p-20
+
+/* Boxes of one page of level 1; leaves: one bit a box that meets the list's. */
+static bool copy_boxes(struct incode_walker *walker, struct incode_query *q,
+                       const struct incode_frame *frame, uint32_t first,
+                       uint32_t boxes, void *context)
+{
+    struct incode_vicinity *v = context;
+    (void)walker, (void)q;
+    for (; boxes != 0; boxes &= boxes - 1) {
+        unsigned i = (unsigned)__builtin_ctz(boxes);
+        if (v->count == INCODE_VICINITY_BRICKS)
+            return false;
+        for (int d = 0; d < 3; d++) {
+            double lo = (frame->page.boxes.lo[d][i] - v->origin[d]) * v->scale;
+            double hi = (frame->page.boxes.hi[d][i] - v->origin[d]) * v->scale;
+            lo -= OUTWARD * (1 + __builtin_fabs(lo));
+            hi += OUTWARD * (1 + __builtin_fabs(hi));
+            v->lo[d][v->count] = (float)(lo > -1e30 ? lo : -1e30);
+            v->hi[d][v->count] = (float)(hi < 1e30 ? hi : 1e30);
+        }
+        v->brick[v->count++] = first + i;
+    }
+    return true;
+}
+
+static void set_empty(struct incode_vicinity *v)
+{
+    v->count = 0;
+    for (int d = 0; d < 3; d++) {
+        v->box_lo[d] = __builtin_inf();
+        v->box_hi[d] = -__builtin_inf();
+    }
+}
+
+enum incode_listed incode_vicinity_make(struct incode_vicinity *v,
+                                        struct incode_walker *walker,
+                                        uint32_t brick, const double lo[3],
+                                        const double hi[3], uint32_t *missing)
+{
+    struct incode_query q;
+    double extent = 0;
+    memset(&q, 0, sizeof q);
+    q.question = INCODE_QUERY_BOX;
+    q.boxed = q.boxes_only = true;
+    set_empty(v);
+    v->centre = INCODE_NONE;
+    for (int d = 0; d < 3; d++) {
+        double half = hi[d] * 0.5 - lo[d] * 0.5;
+        v->origin[d] = lo[d] * 0.5 + hi[d] * 0.5;
+        extent = half > extent ? half : extent;
+        q.lo[d] = lo[d];
+        q.hi[d] = hi[d];
+    }
+    v->scale = incode_scale_for(extent);
+    enum incode_walk r = incode_walk(walker, &q, copy_boxes, v);
+    *missing = q.missing;
+    if (r == INCODE_WALK_WAIT)
+        return INCODE_LIST_WAIT;
+    v->centre = brick;
+    if (r == INCODE_WALK_STOP) {
+        set_empty(v);
+        return INCODE_LIST_FULL;
+    }
+    memcpy(v->box_lo, lo, sizeof v->box_lo);
+    memcpy(v->box_hi, hi, sizeof v->box_hi);
+    return INCODE_LISTED;
+}
+
+/* ---- which bricks ---- */
+
+struct chosen {
+    uint64_t word[INCODE_VICINITY_BRICKS / 64];
+};
+
+/* Boxes [i, i + 16) that are in doubt. */
+INCODE_INLINE void note(struct chosen *chosen, uint32_t i, uint32_t in)
+{
+    if (i % 64 == 0)
+        chosen->word[i / 64] = 0;
+    chosen->word[i / 64] |= (uint64_t)in << (i % 64);
+}
+
+static incode_vf all_of(double a)
+{
+    return incode_vf_all((float)a);
+}
+
+static void in_box(const struct incode_vicinity *v,
+                   const struct incode_query *q, struct chosen *chosen)
+{
+    incode_vf lo[3], hi[3];
+    for (int d = 0; d < 3; d++) {
+        double a = (q->lo[d] - v->origin[d]) * v->scale;
+        double b = (q->hi[d] - v->origin[d]) * v->scale;
+        lo[d] = all_of(a - OUTWARD * (1 + __builtin_fabs(a)));
+        hi[d] = all_of(b + OUTWARD * (1 + __builtin_fabs(b)));
+    }
+    for (uint32_t i = 0; i < v->count; i += INCODE_VF_LANES) {
+        incode_vm out = incode_vf_less(hi[0], incode_vf_load(v->lo[0] + i)) |
+                        incode_vf_less(incode_vf_load(v->hi[0] + i), lo[0]);
+        for (int d = 1; d < 3; d++)
+            out |= incode_vf_less(hi[d], incode_vf_load(v->lo[d] + i)) |
+                   incode_vf_less(incode_vf_load(v->hi[d] + i), lo[d]);
+        note(chosen, i, ~incode_vm_bits(out) & 0xffff);
+    }
+}
+
+/* What meets the ball and is not certainly on the known side of the face. */
+static void in_ball(const struct incode_vicinity *v,
+                    const struct incode_query *q, struct chosen *chosen)
+{
+    incode_vf c[3], n[3], zero = incode_vf_all(0);
+    double ratio = v->scale / q->scale, most = 1, level = 0;
+    double extent = incode_max_norm(q->sphere.n);
+    double radius = __builtin_sqrt(q->square) * ratio;
+    for (int d = 0; d < 3; d++) {
+        double at = (q->pv[d] - v->origin[d]) * v->scale;
+        double centre = at + q->centre[d] * ratio;
+        double normal = q->sphere.n[d] / extent;
+        double far = __builtin_fabs(centre);
+        most = far > most ? far : most;
+        c[d] = all_of(centre);
+        n[d] = all_of(normal);
+        level += normal * at;
+    }
+    radius += (radius + most) * OUTWARD;
+    incode_vf square = all_of(radius * radius * (1 + 0x1p-18));
+    incode_vf floor = all_of(level - 0x1p-17);
+    for (uint32_t i = 0; i < v->count; i += INCODE_VF_LANES) {
+        incode_vf sum = zero, top = zero;
+        for (int d = 0; d < 3; d++) {
+            incode_vf lo = incode_vf_load(v->lo[d] + i);
+            incode_vf hi = incode_vf_load(v->hi[d] + i);
+            incode_vf gap =
+                incode_vf_max(incode_vf_max(lo - c[d], c[d] - hi), zero);
+            sum = incode_vf_fma(gap, gap, sum);
+            top += incode_vf_max(n[d] * lo, n[d] * hi);
+        }
+        note(chosen, i,
+             ~incode_vm_bits(incode_vf_less(square, sum) |
+                             incode_vf_less(top, floor)) &
+                 0xffff);
+    }
+}
+
+/* Visits the leaves of the chosen bricks. */
+static enum incode_walk visit_chosen(const struct incode_vicinity *v,
+                                     struct incode_walker *walker,
+                                     struct incode_query *q,
+                                     const struct chosen *chosen,
+                                     incode_visit *visit, void *context)
+{
+    for (uint32_t i = 0; i < v->count; i += 64) {
+        uint64_t left = chosen->word[i / 64];
+        if (v->count - i < 64)
+            left &= (UINT64_C(1) << (v->count - i)) - 1;
+        for (; left != 0; left &= left - 1) {
+            uint32_t brick = v->brick[i + (uint32_t)__builtin_ctzll(left)];
+            if (q->pages_max != 0 && q->pages++ == q->pages_max)
+                return INCODE_WALK_STOP;
+            enum incode_walk r =
+                incode_walk_brick(walker, q, brick, visit, context);
+            if (r != INCODE_WALK_DONE)
+                return r;
+        }
+    }
+    return INCODE_WALK_DONE;
+}
+
+enum incode_walk incode_vicinity_apex(const struct incode_vicinity *v,
+                                      struct incode_walker *walker,
+                                      struct incode_query *q)
+{
+    struct chosen chosen;
+    if (q->round)
+        in_ball(v, q, &chosen);
+    else
+        in_box(v, q, &chosen);
+    return visit_chosen(v, walker, q, &chosen, incode_visit_points, NULL);
+}
+
+enum incode_walk incode_vicinity_box(const struct incode_vicinity *v,
+                                     struct incode_walker *walker,
+                                     struct incode_query *q,
+                                     incode_visit *visit, void *context)
+{
+    struct chosen chosen;
+    in_box(v, q, &chosen);
+    return visit_chosen(v, walker, q, &chosen, visit, context);
+}
