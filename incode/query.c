@@ -69,6 +69,8 @@ static void bound_sphere(struct incode_query *q)
             return;
     }
     q->square = radius * radius;
+    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 * radius *
+                                              incode_max_norm(s->pn);
     q->boxed = q->round = true;
 }
 
@@ -172,28 +174,23 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
     return ~out;
 }
 
-/* What meets the ball and is not certainly on the known side of the plane. */
+/* What meets the ball and is not certainly on the known side of the plane.  The
+ * bound of the plane's rounding holds within the ball. */
 INCODE_INLINE incode_vl meets_ball(const struct incode_query *q,
                                    const struct boxes *boxes, unsigned i)
 {
-    const struct incode_sphere *s = &q->sphere;
-    incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
+    incode_vd zero = incode_vd_all(0), plane = incode_vd_all(q->plane_slack);
     incode_vd square = zero, scale = incode_vd_all(q->scale);
     for (int d = 0; d < 3; d++) {
         incode_vd v = incode_vd_all(q->pv[d]), c = incode_vd_all(q->centre[d]);
         incode_vd lo = (incode_vd_load(boxes->lo[d] + i) - v) * scale;
         incode_vd hi = (incode_vd_load(boxes->hi[d] + i) - v) * scale;
-        incode_vd n = incode_vd_all(s->n[d]);
+        incode_vd n = incode_vd_all(q->sphere.n[d]);
         plane += incode_vd_max(n * lo, n * hi);
-        plane_error += incode_vd_all(s->pn[d]) *
-                       incode_vd_max(incode_vd_abs(lo), incode_vd_abs(hi));
         incode_vd gap = incode_vd_max(incode_vd_max(lo - c, c - hi), zero);
         square += gap * gap;
     }
-    incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
-    incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
-    return ~((plane + (plane_error * eps + tiny) < zero) |
-             (square > incode_vd_all(q->square)));
+    return (plane >= zero) & (square <= incode_vd_all(q->square));
 }
 
 INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
@@ -409,6 +406,21 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     return ~incode_vd_mask(out) & 0xff;
 }
 
+/* Points of a leaf that lie in the ball and not certainly on the known side of
+ * the plane: a coarser test, and a cheaper one. */
+INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
+                                  const struct lane_points *p)
+{
+    incode_vd plane = incode_vd_all(q->plane_slack), square = incode_vd_all(0);
+    for (int d = 0; d < 3; d++) {
+        incode_vd gap = p->r[d] - incode_vd_all(q->centre[d]);
+        square += gap * gap;
+        plane += incode_vd_all(q->sphere.n[d]) * p->r[d];
+    }
+    return incode_vd_mask((square <= incode_vd_all(q->square)) &
+                          (plane >= incode_vd_all(0)));
+}
+
 uint32_t incode_query_lanes(const struct incode_query *q,
                             const double *const axis[3])
 {
@@ -474,7 +486,10 @@ static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
     if (q->question == INCODE_QUERY_APEX) {
         struct lane_points points;
         load_leaf(&points, q, frame, first);
-        lanes &= apex_lanes(q, &points);
+        if (q->round)
+            lanes &= ball_lanes(q, &points);
+        if (lanes != 0)
+            lanes &= apex_lanes(q, &points);
     }
     for (; lanes != 0; lanes &= lanes - 1) {
         unsigned slot = first + (unsigned)__builtin_ctz(lanes);

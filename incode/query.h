@@ -46,6 +46,7 @@ struct incode_query {
     struct incode_sphere sphere;
     double centre[3]; /* of the sphere: where its value peaks */
     double square;    /* of its radius, widened */
+    double plane_slack; /* of n . p within the ball */
     double limit;     /* NEAREST, CIRCLE: squared, relative */
     uint32_t best;    /* vertex number, or INCODE_NONE */
     double best_p[3];
