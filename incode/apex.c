@@ -298,55 +298,7 @@ static void consider(struct near *n, uint32_t i)
         incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, p, g->scale);
 }
 
-/* The points at hand against each other, by the predicates where their bounds
- * do not tell. */
-static void contest(struct near *n, const uint16_t *first, uint32_t count)
-{
-    const struct incode_gather *g = &n->t->gather;
-    uint16_t inside[INCODE_NEAR_ALL];
-    for (uint32_t i = 0; i < count; i++)
-        consider(n, first[i]);
-    if (!n->face.regular)
-        for (uint32_t i = 0; i < g->near; i++)
-            consider(n, g->at[i]);
-    if (n->best == INCODE_GATHER_NONE)
-        return;
-    count = incode_gather_inside(g, &n->sphere, inside);
-    for (uint32_t i = 0; i < count; i++)
-        consider(n, inside[i]);
-}
-
-/* Takes the only candidate if it is clearly beyond the face, and no point at
- * hand can be inside its sphere, at *t of the pencil; false: that takes
- * predicates. */
-static bool is_plain(struct near *n, const uint16_t *first, uint32_t count,
-                     double *t)
-{
-    const struct incode_gather *g = &n->t->gather;
-    const struct incode_sphere *s = &n->sphere;
-    uint32_t only = INCODE_GATHER_NONE;
-    for (uint32_t i = 0; i < count; i++) {
-        if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
-            continue;
-        if (only != INCODE_GATHER_NONE)
-            return false;
-        only = first[i];
-    }
-    if (only == INCODE_GATHER_NONE)
-        return false;
-    double r[3], most = *t;
-    incode_gather_relative(g, only, r);
-    if (!(incode_dot(s->n, r) >
-          1e10 * INCODE_SPHERE_EPS * incode_max_norm(r) * s->lb * s->lc))
-        return false;
-    const struct incode_pencil *pencil = &n->face.pencil;
-    *t = (incode_dot(r, r) - 2 * incode_dot(pencil->c0, r)) /
-         incode_dot(pencil->n, r);
-    n->best = only;
-    return *t < most;
-}
-
-/* The sphere of the only candidate, for what lies beyond the points at hand. */
+/* The sphere of a best that needed no predicate. */
 static void set_sphere(struct near *n)
 {
     double r[3];
@@ -355,29 +307,87 @@ static void set_sphere(struct near *n)
     incode_sphere_apex(&n->sphere, n->face.b, n->face.c, r);
 }
 
+/* Where in the pencil of a regular face a point lies, right to 1e-8; false: it
+ * is not clearly beyond the face. */
+static bool is_placed(const struct near *n, uint32_t i, double *t)
+{
+    const struct incode_pencil *pencil = &n->face.pencil;
+    const struct incode_sphere *s = &n->sphere;
+    double r[3];
+    incode_gather_relative(&n->t->gather, i, r);
+    if (!(incode_dot(s->n, r) >
+          1e10 * INCODE_SPHERE_EPS * incode_max_norm(r) * s->lb * s->lc))
+        return false;
+    *t = (incode_dot(r, r) - 2 * incode_dot(pencil->c0, r)) /
+         incode_dot(pencil->n, r);
+    return true;
+}
+
+/* The best of the first in the pencil, at *t of it; false: it does not stand
+ * against the other points at hand yet.  *bare: its sphere is not set. */
+static bool contest_first(struct near *n, double *t, bool *bare)
+{
+    const struct incode_gather *g = &n->t->gather;
+    uint16_t first[INCODE_NEAR_ALL];
+    double most;
+    uint32_t only = INCODE_GATHER_NONE, others = 0;
+    uint32_t count = incode_gather_first(g, &n->face.pencil, &most, first);
+    for (uint32_t i = 0; i < count; i++) {
+        if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
+            continue;
+        only = first[i];
+        others++;
+    }
+    *bare = others == 1;
+    if (*bare)
+        n->best = only;
+    else
+        for (uint32_t i = 0; i < count; i++)
+            consider(n, first[i]);
+    if (n->best != INCODE_GATHER_NONE && is_placed(n, n->best, t) &&
+        *t + 1e-7 * (__builtin_fabs(*t) + n->face.pencil.size) < most)
+        return true;
+    if (*bare)
+        n->best = INCODE_GATHER_NONE;
+    for (uint32_t i = 0; i < count && *bare; i++)
+        consider(n, first[i]);
+    return false;
+}
+
+/* The best of all points at hand, by the predicates where bounds do not tell.
+ * Of an irregular face's candidates none has been looked at. */
+static void contest(struct near *n)
+{
+    const struct incode_gather *g = &n->t->gather;
+    uint16_t inside[INCODE_NEAR_ALL];
+    for (uint32_t i = 0; i < g->near && !n->face.regular; i++)
+        consider(n, g->at[i]);
+    if (n->best == INCODE_GATHER_NONE)
+        return;
+    uint32_t count = incode_gather_inside(g, &n->sphere, inside);
+    for (uint32_t i = 0; i < count; i++)
+        consider(n, inside[i]);
+}
+
 static enum incode_near contest_all(struct near *n)
 {
-    struct incode_gather *g = &n->t->gather;
-    uint16_t first[INCODE_NEAR_ALL];
-    uint32_t count = 0;
-    double t = 0;
+    const struct incode_gather *g = &n->t->gather;
+    bool fits, bare = false;
+    double t;
     n->t->stats.candidates += g->near;
-    if (n->face.regular)
-        count = incode_gather_first(g, &n->face.pencil, &t, first);
-    if (count > 0 && is_plain(n, first, count, &t)) {
-        if (cap_fits(g->wall, &n->face.pencil, t))
-            return INCODE_NEAR_FOUND;
-        set_sphere(n);
-        return INCODE_NEAR_SEARCH;
+    if (n->face.regular && contest_first(n, &t, &bare)) {
+        fits = cap_fits(g->wall, &n->face.pencil, t);
+        if (bare && !fits)
+            set_sphere(n);
+        return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
     }
-    n->best = INCODE_GATHER_NONE;
-    contest(n, first, count);
+    contest(n);
     if (n->best == INCODE_GATHER_NONE)
         return incode_hull_known(n->t, n->pv, n->pb, n->pc)
                    ? INCODE_NEAR_HULL
                    : INCODE_NEAR_SEARCH;
-    return cap_is_within(g->wall, &n->sphere) ? INCODE_NEAR_FOUND
-                                        : INCODE_NEAR_SEARCH;
+    fits = cap_is_within(g->wall, &n->sphere);
+    return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
 }
 
 /* ---- among the bricks around ---- */

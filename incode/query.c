@@ -475,6 +475,14 @@ static void consider_circle(struct incode_query *q, uint32_t id,
     memcpy(q->best_p, p, sizeof q->best_p);
 }
 
+static bool is_done(const struct incode_query *q, const double p[3])
+{
+    bool done = true;
+    for (int d = 0; d < 3; d++)
+        done = done && p[d] >= q->done_lo[d] && p[d] <= q->done_hi[d];
+    return done;
+}
+
 static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
                        const struct incode_frame *frame, uint32_t brick,
                        unsigned leaf)
@@ -498,6 +506,8 @@ static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
             continue;
         double p[3];
         point_of(p, frame, slot);
+        if (q->done && is_done(q, p))
+            continue;
         if (q->question == INCODE_QUERY_APEX)
             incode_query_consider(q, walker->tally, id, p);
         else if (q->question == INCODE_QUERY_NEAREST)
