@@ -1,9 +1,9 @@
 #include <float.h>
 #include <string.h>
 
+#include "apex.h"
 #include "check.h"
 #include "simd.h"
-#include "state.h"
 
 /* MakeTetra: the apex of a face.  Among the gathered points, single precision
  * proposes and the sphere's rigorous bound leaves the few that the predicates
@@ -73,7 +73,7 @@ static void remember_plane(struct incode_triangulator *t,
 
 /* The box of the next look: only points that are clearly beyond the face count
  * there, so that those in its plane need not be told apart in vain. */
-static void set_box(struct incode_triangulator *t, struct incode_search *s)
+void incode_search_box(struct incode_triangulator *t, struct incode_search *s)
 {
     struct incode_query *q = &s->query;
     bool all = true;
@@ -87,9 +87,7 @@ static void set_box(struct incode_triangulator *t, struct incode_search *s)
     q->cursor = 0;
 }
 
-/* The last look: every point that the best so far does not clearly beat, or
- * every point if there is none. */
-static void set_final(struct incode_search *s)
+void incode_search_last(struct incode_search *s)
 {
     struct incode_query *q = &s->query;
     s->final = true;
@@ -117,7 +115,7 @@ void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,
     s->radius = radius > DBL_MIN ? radius : DBL_MIN;
     s->final = false;
     s->looked = 0;
-    set_box(t, s);
+    incode_search_box(t, s);
 }
 
 void incode_count_candidates(struct incode_triangulator *t, uint64_t looked)
@@ -149,44 +147,38 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
             return INCODE_OK;
         }
         if (q->best != INCODE_NONE || !q->boxed) {
-            set_final(s);
+            incode_search_last(s);
             continue;
         }
         q->done = true;
         memcpy(q->done_lo, q->lo, sizeof q->lo);
         memcpy(q->done_hi, q->hi, sizeof q->hi);
         s->radius *= 4;
-        set_box(t, s);
+        incode_search_box(t, s);
     }
 }
 
 /* ---- among the gathered points ---- */
 
-struct face {
-    double b[3], c[3]; /* relative to v */
-    bool regular;      /* neither thin nor out of the range of floats */
-    struct incode_pencil pencil;
-};
-
-/* A regular face's circumcentre is right to 1e-9 of its size: the sine of its
- * angle at v is 1e-3 at least. */
-static void set_face(struct face *f, const struct incode_sphere *s)
+/* A regular face's circumcentre is right to 1e-9 of its distance: the sine of
+ * its angle at v is at least 1/100. */
+static void set_pencil(struct incode_make *f, const struct incode_sphere *s)
 {
     double cn[3], nb[3], nn = incode_dot(s->n, s->n);
-    double product = s->lb * s->lc;
-    f->pencil.size = s->lb > s->lc ? s->lb : s->lc;
-    f->regular = nn > 1e-6 * product * product && product > 1e-12 &&
-                 f->pencil.size < 1e6;
+    double product = s->lb * s->lc, size = s->lb > s->lc ? s->lb : s->lc;
+    f->regular = nn > 1e-4 * product * product && product > 1e-12 && size < 1e6;
     if (!f->regular)
         return;
-    incode_cross(cn, f->c, s->n);
-    incode_cross(nb, s->n, f->b);
+    incode_cross(cn, f->rc, s->n);
+    incode_cross(nb, s->n, f->rb);
     double inverse = 1 / nn, unit = __builtin_sqrt(inverse);
     double sb = 0.5 * inverse * s->bb, sc = 0.5 * inverse * s->cc;
     for (int d = 0; d < 3; d++) {
         f->pencil.c0[d] = sb * cn[d] + sc * nb[d];
         f->pencil.n[d] = s->n[d] * unit;
     }
+    double far = incode_max_norm(f->pencil.c0);
+    f->pencil.size = far > size ? far : size;
 }
 
 /* Six numbers along the axes' two directions each: what stands for the walls of
@@ -196,11 +188,7 @@ INCODE_INLINE incode_vd both_ways(const double a[3])
     return (incode_vd){a[0], a[1], a[2], 0, -a[0], -a[1], -a[2], 0};
 }
 
-/* Whether the closed cap, beyond the face, of the sphere at t of the pencil
- * lies strictly within a box.  Where an extreme point of the sphere
- * is on the known side, the rim of the face's circle is the extreme.
- * Everything is widened by 1e-6 of the sphere's size. */
-static bool cap_fits(const double walls[8], const struct incode_pencil *pencil,
+bool incode_cap_fits(const double walls[8], const struct incode_pencil *pencil,
                      double t)
 {
     incode_vd zero = incode_vd_all(0), n = both_ways(pencil->n);
@@ -220,18 +208,8 @@ static bool cap_fits(const double walls[8], const struct incode_pencil *pencil,
     return incode_vd_mask(in) == 0xff;
 }
 
-struct near {
-    struct incode_triangulator *t;
-    const double *pv, *pb, *pc;
-    double store[4][3];
-    uint32_t b, c, best;
-    struct face face;
-    struct incode_sphere sphere;
-};
-
-/* The same for a sphere of any face; an ill-conditioned one is never accepted.
- * The centre is m / (2 det), the radius its length. */
-static bool cap_is_within(const double wall[8], const struct incode_sphere *s)
+/* The centre is m / (2 det), the radius its length. */
+bool incode_sphere_fits(const double wall[8], const struct incode_sphere *s)
 {
     if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
         !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
@@ -253,7 +231,7 @@ static bool cap_is_within(const double wall[8], const struct incode_sphere *s)
         pencil.n[d] = s->n[d] * unit;
         pencil.c0[d] = centre[d] - 0.5 * t * unit * pencil.n[d];
     }
-    return cap_fits(wall, &pencil, t * unit);
+    return incode_cap_fits(wall, &pencil, t * unit);
 }
 
 static void copy_point(double p[3], const struct incode_gather *g, uint32_t i)
@@ -265,7 +243,7 @@ static void copy_point(double p[3], const struct incode_gather *g, uint32_t i)
 
 /* Takes i as the best if it is strictly beyond the face and inside the best's
  * sphere. */
-static void consider(struct near *n, uint32_t i)
+static void consider(struct incode_make *n, uint32_t i)
 {
     struct incode_gather *g = &n->t->gather;
     struct incode_tally *tally = &n->t->stats.tally;
@@ -293,74 +271,64 @@ static void consider(struct near *n, uint32_t i)
         return;
     n->best = i;
     memcpy(n->store[3], p, sizeof p);
-    incode_sphere_apex(&n->sphere, n->face.b, n->face.c, r);
+    incode_sphere_apex(&n->sphere, n->rb, n->rc, r);
     if (incode_sphere_is_blurred(&n->sphere))
         incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, p, g->scale);
 }
 
-/* The sphere of a best that needed no predicate. */
-static void set_sphere(struct near *n)
+void incode_make_sphere(struct incode_make *n)
 {
     double r[3];
     copy_point(n->store[3], &n->t->gather, n->best);
     incode_gather_relative(&n->t->gather, n->best, r);
-    incode_sphere_apex(&n->sphere, n->face.b, n->face.c, r);
-}
-
-/* Where in the pencil of a regular face a point lies, right to 1e-8; false: it
- * is not clearly beyond the face. */
-static bool is_placed(const struct near *n, uint32_t i, double *t)
-{
-    const struct incode_pencil *pencil = &n->face.pencil;
-    const struct incode_sphere *s = &n->sphere;
-    double r[3];
-    incode_gather_relative(&n->t->gather, i, r);
-    if (!(incode_dot(s->n, r) >
-          1e10 * INCODE_SPHERE_EPS * incode_max_norm(r) * s->lb * s->lc))
-        return false;
-    *t = (incode_dot(r, r) - 2 * incode_dot(pencil->c0, r)) /
-         incode_dot(pencil->n, r);
-    return true;
+    incode_sphere_apex(&n->sphere, n->rb, n->rc, r);
+    n->bare = false;
 }
 
 /* The best of the first in the pencil, at *t of it; false: it does not stand
- * against the other points at hand yet.  *bare: its sphere is not set. */
-static bool contest_first(struct near *n, double *t, bool *bare)
+ * against the other points at hand yet. */
+static bool contest_first(struct incode_make *n, double *t)
 {
     const struct incode_gather *g = &n->t->gather;
     uint16_t first[INCODE_NEAR_ALL];
     double most;
     uint32_t only = INCODE_GATHER_NONE, others = 0;
-    uint32_t count = incode_gather_first(g, &n->face.pencil, &most, first);
+    uint32_t count = incode_gather_first(g, &n->pencil, &most, first);
     for (uint32_t i = 0; i < count; i++) {
         if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
             continue;
         only = first[i];
         others++;
     }
-    *bare = others == 1;
-    if (*bare)
+    n->bare = others == 1;
+    if (n->bare)
         n->best = only;
     else
         for (uint32_t i = 0; i < count; i++)
             consider(n, first[i]);
-    if (n->best != INCODE_GATHER_NONE && is_placed(n, n->best, t) &&
-        *t + 1e-7 * (__builtin_fabs(*t) + n->face.pencil.size) < most)
-        return true;
-    if (*bare)
+    if (n->best != INCODE_GATHER_NONE) {
+        double r[3];
+        incode_gather_relative(g, n->best, r);
+        if (incode_pencil_place(&n->pencil, r, t) &&
+            incode_pencil_later(&n->pencil, *t) < most)
+            return true;
+    }
+    if (n->bare) {
+        n->bare = false;
         n->best = INCODE_GATHER_NONE;
-    for (uint32_t i = 0; i < count && *bare; i++)
-        consider(n, first[i]);
+        for (uint32_t i = 0; i < count; i++)
+            consider(n, first[i]);
+    }
     return false;
 }
 
 /* The best of all points at hand, by the predicates where bounds do not tell.
  * Of an irregular face's candidates none has been looked at. */
-static void contest(struct near *n)
+static void contest(struct incode_make *n)
 {
     const struct incode_gather *g = &n->t->gather;
     uint16_t inside[INCODE_NEAR_ALL];
-    for (uint32_t i = 0; i < g->near && !n->face.regular; i++)
+    for (uint32_t i = 0; i < g->near && !n->regular; i++)
         consider(n, g->at[i]);
     if (n->best == INCODE_GATHER_NONE)
         return;
@@ -369,16 +337,14 @@ static void contest(struct near *n)
         consider(n, inside[i]);
 }
 
-static enum incode_near contest_all(struct near *n)
+static enum incode_near contest_all(struct incode_make *n)
 {
     const struct incode_gather *g = &n->t->gather;
-    bool fits, bare = false;
+    bool fits;
     double t;
     n->t->stats.candidates += g->near;
-    if (n->face.regular && contest_first(n, &t, &bare)) {
-        fits = cap_fits(g->wall, &n->face.pencil, t);
-        if (bare && !fits)
-            set_sphere(n);
+    if (n->regular && contest_first(n, &t)) {
+        fits = incode_cap_fits(g->wall, &n->pencil, t);
         return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
     }
     contest(n);
@@ -386,14 +352,11 @@ static enum incode_near contest_all(struct near *n)
         return incode_hull_known(n->t, n->pv, n->pb, n->pc)
                    ? INCODE_NEAR_HULL
                    : INCODE_NEAR_SEARCH;
-    fits = cap_is_within(g->wall, &n->sphere);
+    fits = incode_sphere_fits(g->wall, &n->sphere);
     return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
 }
 
-/* ---- among the bricks around ---- */
-
-/* The query that goes on from the points at hand. */
-static void begin(struct near *n, struct incode_search *s)
+void incode_search_from(struct incode_make *n, struct incode_search *s)
 {
     const struct incode_gather *g = &n->t->gather;
     struct incode_query *q = &s->query;
@@ -406,75 +369,24 @@ static void begin(struct near *n, struct incode_search *s)
     memcpy(q->pb, n->pb, sizeof q->pb);
     memcpy(q->pc, n->pc, sizeof q->pc);
     q->scale = g->scale;
-    memcpy(q->rb, n->face.b, sizeof q->rb);
-    memcpy(q->rc, n->face.c, sizeof q->rc);
-    q->sphere = n->sphere;
+    memcpy(q->rb, n->rb, sizeof q->rb);
+    memcpy(q->rc, n->rc, sizeof q->rc);
     q->best = INCODE_NONE;
     s->radius = g->radius > DBL_MIN ? g->radius : DBL_MIN;
     s->looked = g->near;
     s->final = false;
-    if (n->best == INCODE_GATHER_NONE)
+    if (n->best == INCODE_GATHER_NONE) {
+        q->sphere = n->sphere;
         return;
+    }
+    if (n->bare)
+        incode_make_sphere(n);
+    q->sphere = n->sphere;
     incode_query_start(q, g->id[n->best], n->store[3]);
-    set_final(s);
+    incode_search_last(s);
     q->done = true;
     memcpy(q->done_lo, g->lo, sizeof g->lo);
     memcpy(q->done_hi, g->hi, sizeof g->hi);
-}
-
-/* Box after box, up to that of the list, for a first candidate. */
-static enum incode_walk find_first(struct incode_triangulator *t,
-                                   struct incode_search *s)
-{
-    struct incode_query *q = &s->query;
-    enum incode_walk r = INCODE_WALK_DONE;
-    while (r == INCODE_WALK_DONE && q->best == INCODE_NONE) {
-        s->radius *= 2;
-        set_box(t, s);
-        if (!q->boxed || !incode_vicinity_holds(&t->vicinity, q->lo, q->hi))
-            return INCODE_WALK_STOP;
-        r = incode_vicinity_apex(&t->vicinity, &t->walker, q);
-        q->done = true;
-        memcpy(q->done_lo, q->lo, sizeof q->lo);
-        memcpy(q->done_hi, q->hi, sizeof q->hi);
-    }
-    if (r == INCODE_WALK_DONE)
-        set_final(s);
-    return r;
-}
-
-/* Whether the list decides; where it does not, the search is ready to go on
- * with the tree. */
-static bool search_list(struct near *n, struct incode_search *s)
-{
-    struct incode_triangulator *t = n->t;
-    const struct incode_vicinity *list = &t->vicinity;
-    struct incode_query *q = &s->query;
-    alignas(64) double wall[8];
-    if (list->count == 0)
-        return false;
-    uint64_t before = t->stats.candidates;
-    enum incode_walk r = INCODE_WALK_DONE;
-    if (q->best == INCODE_NONE)
-        r = find_first(t, s);
-    /* An ill-conditioned sphere has no ball: the list is of no use. */
-    if (r == INCODE_WALK_DONE)
-        r = q->round ? incode_vicinity_apex(list, &t->walker, q)
-                     : INCODE_WALK_STOP;
-    s->looked += t->stats.candidates - before;
-    if (r != INCODE_WALK_DONE)
-        return false;
-    for (int d = 0; d < 3; d++) {
-        wall[d] = (list->box_hi[d] - q->pv[d]) * q->scale;
-        wall[4 + d] = (q->pv[d] - list->box_lo[d]) * q->scale;
-    }
-    wall[3] = wall[7] = __builtin_inf();
-    if (cap_is_within(wall, &q->sphere))
-        return true;
-    q->done = true;
-    memcpy(q->done_lo, list->box_lo, sizeof q->done_lo);
-    memcpy(q->done_hi, list->box_hi, sizeof q->done_hi);
-    return false;
 }
 
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
@@ -482,11 +394,12 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
                                   struct incode_search *s)
 {
     struct incode_gather *g = &t->gather;
-    struct near n;
+    struct incode_make n;
     n.t = t;
     n.b = b;
     n.c = c;
     n.best = INCODE_GATHER_NONE;
+    n.bare = false;
     n.sphere = (struct incode_sphere){.has_apex = false};
     memcpy(n.store[0], g->p0, sizeof g->p0);
     copy_point(n.store[1], g, b);
@@ -494,20 +407,19 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     n.pv = n.store[0];
     n.pb = n.store[1];
     n.pc = n.store[2];
-    incode_gather_relative(g, b, n.face.b);
-    incode_gather_relative(g, c, n.face.c);
-    incode_sphere_plane(&n.sphere, n.face.b, n.face.c);
+    incode_gather_relative(g, b, n.rb);
+    incode_gather_relative(g, c, n.rc);
+    incode_sphere_plane(&n.sphere, n.rb, n.rc);
     if (incode_plane_is_blurred(&n.sphere))
         incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, g->scale);
-    set_face(&n.face, &n.sphere);
+    set_pencil(&n, &n.sphere);
     enum incode_near r = contest_all(&n);
     *apex = n.best;
     if (r != INCODE_NEAR_SEARCH) {
         incode_count_candidates(t, g->near);
         return r;
     }
-    begin(&n, s);
-    if (!search_list(&n, s))
+    if (!incode_apex_around(&n, s))
         return INCODE_NEAR_SEARCH;
     *apex = incode_gather_find(g, s->query.best);
     if (*apex == INCODE_GATHER_NONE)

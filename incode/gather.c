@@ -47,11 +47,10 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
     return true;
 }
 
-enum incode_gathered incode_gather_around(struct incode_gather *g,
-                                          struct incode_walker *walker,
-                                          const struct incode_vicinity *vicinity,
-                                          uint32_t leaf, const double lo[3],
-                                          const double hi[3], double radius)
+enum incode_gathered
+incode_gather_around(struct incode_gather *g, struct incode_walker *walker,
+                     const struct incode_vicinity *vicinity, uint32_t leaf,
+                     const double lo[3], const double hi[3], double radius)
 {
     struct incode_query *q = &g->query;
     memset(q, 0, sizeof *q);
@@ -67,7 +66,7 @@ enum incode_gathered incode_gather_around(struct incode_gather *g,
     }
     enum incode_walk r =
         incode_vicinity_holds(vicinity, q->lo, q->hi)
-            ? incode_vicinity_box(vicinity, walker, q, copy_leaves, g)
+            ? incode_vicinity_visit(vicinity, walker, q, copy_leaves, g)
             : incode_walk(walker, q, copy_leaves, g);
     g->count = g->around;
     g->per_unit = 0;

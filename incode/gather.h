@@ -62,13 +62,6 @@ struct incode_gather {
     struct incode_query query;
 };
 
-/* The line of spheres through a face's circle, in units of the near points: the
- * centres are c0 + (t/2) n, n a unit vector. */
-struct incode_pencil {
-    double c0[3], n[3];
-    double size; /* of the face */
-};
-
 enum incode_gathered {
     INCODE_GATHER_READY,
     INCODE_GATHER_WAIT,   /* for page query.missing */
@@ -81,9 +74,8 @@ void incode_gather_reset(struct incode_gather *g);
 /* Copies every point of the box lo..hi widened by radius on all sides. */
 enum incode_gathered
 incode_gather_around(struct incode_gather *g, struct incode_walker *walker,
-                                          const struct incode_vicinity *vicinity,
-                                          uint32_t leaf, const double lo[3],
-                                          const double hi[3], double radius);
+                     const struct incode_vicinity *vicinity, uint32_t leaf,
+                     const double lo[3], const double hi[3], double radius);
 
 /* Selects the points of the box of half-width radius, at most that of the
  * leaf's box, around the vertex at p; a crowded box is made smaller.  domain:

@@ -69,8 +69,8 @@ static void bound_sphere(struct incode_query *q)
             return;
     }
     q->square = radius * radius;
-    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 * radius *
-                                              incode_max_norm(s->pn);
+    q->plane_slack = INCODE_SPHERE_TINY +
+                     INCODE_SPHERE_EPS * 6 * radius * incode_max_norm(s->pn);
     q->boxed = q->round = true;
 }
 
@@ -302,8 +302,8 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
     }
     uint32_t mask = passing(w->q, &boxes, count);
     if (level == 1 && w->q->boxes_only)
-        return mask == 0 || w->visit(w->walker, w->q, frame, first, mask,
-                                     w->context)
+        return mask == 0 ||
+                       w->visit(w->walker, w->q, frame, first, mask, w->context)
                    ? INCODE_WALK_DONE
                    : INCODE_WALK_STOP;
     for (uint32_t left = mask; left != 0; left &= left - 1) {
@@ -524,5 +524,91 @@ bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
     (void)context;
     for (; leaves != 0; leaves &= leaves - 1)
         visit_leaf(walker, q, frame, brick, (unsigned)__builtin_ctz(leaves));
+    return true;
+}
+
+/* ---- along a pencil ---- */
+
+/* The ball of the pencil's sphere at t, widened by 1e-6 of its size. */
+static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
+                    double t)
+{
+    double square = 0.25 * t * t;
+    for (int d = 0; d < 3; d++) {
+        q->centre[d] = pencil->c0[d] + 0.5 * t * pencil->n[d];
+        square += pencil->c0[d] * pencil->c0[d];
+    }
+    q->t = t;
+    q->square = square * (1 + 4e-6);
+    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 *
+                                              q->sphere.pn[0] *
+                                              __builtin_sqrt(q->square);
+    q->round = true;
+}
+
+bool incode_query_holds(const struct incode_query *q, const double p[3])
+{
+    double r[3], square = 0;
+    relative(r, q, p);
+    for (int d = 0; d < 3; d++)
+        square += (r[d] - q->centre[d]) * (r[d] - q->centre[d]);
+    return square <= q->square;
+}
+
+/* Drops what has fallen out of the ball. */
+static void thin_out(const struct incode_query *q, struct incode_hits *hits)
+{
+    double last = incode_pencil_later(hits->pencil, q->t);
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < hits->count; i++)
+        if (hits->hit[i].placed ? hits->hit[i].t <= last
+                                : incode_query_holds(q, hits->hit[i].p))
+            hits->hit[kept++] = hits->hit[i];
+    hits->count = kept;
+}
+
+void incode_hit_add(struct incode_query *q, struct incode_hits *hits,
+                    uint32_t id, const double p[3])
+{
+    const struct incode_pencil *pencil = hits->pencil;
+    if (hits->count == INCODE_HITS)
+        thin_out(q, hits);
+    if (hits->count == INCODE_HITS) {
+        hits->full = true;
+        return;
+    }
+    struct incode_hit *hit = &hits->hit[hits->count++];
+    double r[3];
+    relative(r, q, p);
+    hit->id = id;
+    memcpy(hit->p, p, sizeof hit->p);
+    hit->placed = incode_pencil_place(pencil, r, &hit->t);
+    if (hit->placed && hit->t < q->t)
+        draw_in(q, pencil, hit->t);
+}
+
+bool incode_visit_pencil(struct incode_walker *walker, struct incode_query *q,
+                         const struct incode_frame *frame, uint32_t brick,
+                         uint32_t leaves, void *context)
+{
+    struct incode_hits *hits = context;
+    struct lane_points points;
+    for (; leaves != 0; leaves &= leaves - 1) {
+        unsigned first = (unsigned)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
+        unsigned count = frame->count - first;
+        uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
+        *walker->candidates += (unsigned)__builtin_popcount(lanes);
+        load_leaf(&points, q, frame, first);
+        lanes &= q->round ? ball_lanes(q, &points) : apex_lanes(q, &points);
+        for (; lanes != 0; lanes &= lanes - 1) {
+            unsigned slot = first + (unsigned)__builtin_ctz(lanes);
+            uint32_t id = brick * INCODE_BRICK_POINTS + slot;
+            double p[3];
+            point_of(p, frame, slot);
+            if (id != q->v && id != q->b && id != q->c && id != q->best &&
+                !(q->done && is_done(q, p)))
+                incode_hit_add(q, hits, id, p);
+        }
+    }
     return true;
 }

@@ -44,16 +44,33 @@ struct incode_query {
     double scale;               /* relative = (p - pv) * scale */
     double rb[3], rc[3];        /* b and c, relative */
     struct incode_sphere sphere;
-    double centre[3]; /* of the sphere: where its value peaks */
-    double square;    /* of its radius, widened */
+    double centre[3];   /* of the sphere: where its value peaks */
+    double square;      /* of its radius, widened */
     double plane_slack; /* of n . p within the ball */
-    double limit;     /* NEAREST, CIRCLE: squared, relative */
-    uint32_t best;    /* vertex number, or INCODE_NONE */
+    double t; /* where in a pencil the ball is, of the first candidate so far */
+    double limit;  /* NEAREST, CIRCLE: squared, relative */
+    uint32_t best; /* vertex number, or INCODE_NONE */
     double best_p[3];
     uint32_t pages, pages_max; /* needed so far; a walk stops at more than that,
                                   unless it is 0 */
     uint32_t cursor;           /* bricks below this one are done */
     uint32_t missing;          /* the page a suspended walk waits for */
+};
+
+/* Candidates for the apex of a regular face, by their place in its pencil. */
+struct incode_hit {
+    uint32_t id;
+    bool placed; /* clearly beyond the face */
+    double t, p[3];
+};
+
+enum { INCODE_HITS = 48 };
+
+struct incode_hits {
+    const struct incode_pencil *pencil;
+    struct incode_hit hit[INCODE_HITS];
+    uint32_t count;
+    bool full; /* some are missing */
 };
 
 /* What a walk runs on. */
@@ -107,6 +124,18 @@ uint32_t incode_query_lanes(const struct incode_query *q,
 
 /* Visits the points of the leaves for APEX, NEAREST and CIRCLE. */
 incode_visit incode_visit_points;
+
+/* Whether a point lies in the ball. */
+bool incode_query_holds(const struct incode_query *q, const double p[3]);
+
+/* Adds a candidate, and draws the ball in to its sphere if it is clearly beyond
+ * the face and the first in the pencil so far. */
+void incode_hit_add(struct incode_query *q, struct incode_hits *hits,
+                    uint32_t id, const double p[3]);
+
+/* Adds the points of the leaves (context: struct incode_hits) that lie in the
+ * ball; while there is none, only points clearly beyond the face. */
+incode_visit incode_visit_pencil;
 
 /* 2^k with k such that 2^k * extent is about 1; exact, never 0 or infinite. */
 double incode_scale_for(double extent);

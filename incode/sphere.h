@@ -25,6 +25,13 @@ struct incode_sphere {
     bool has_apex;
 };
 
+/* The line of spheres through a face's circle, in the same coordinates: the
+ * centres are c0 + (t/2) n, n a unit vector. */
+struct incode_pencil {
+    double c0[3], n[3];
+    double size; /* of the face, or how far c0 is */
+};
+
 /* Rounding of every step from the coordinates on stays below 20 units; what
  * underflows stays below the absolute term, for points within 2^200. */
 #define INCODE_SPHERE_EPS 3.6e-15
@@ -53,6 +60,25 @@ static inline double incode_max_norm(const double a[3])
            z = __builtin_fabs(a[2]);
     double l = x > y ? x : y;
     return l > z ? l : z;
+}
+
+/* Where in the pencil a point lies; false: it is not clearly beyond the face.
+ */
+static inline bool incode_pencil_place(const struct incode_pencil *pencil,
+                                       const double r[3], double *t)
+{
+    double beyond = incode_dot(pencil->n, r);
+    if (!(beyond > 2e-3 * incode_max_norm(r)))
+        return false;
+    *t = (incode_dot(r, r) - 2 * incode_dot(pencil->c0, r)) / beyond;
+    return true;
+}
+
+/* A place that is certainly not before that of a point placed at t. */
+static inline double incode_pencil_later(const struct incode_pencil *pencil,
+                                         double t)
+{
+    return t + 1e-6 * (__builtin_fabs(t) + pencil->size);
 }
 
 void incode_sphere_plane(struct incode_sphere *s, const double b[3],

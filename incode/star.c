@@ -193,8 +193,9 @@ static enum incode_outcome gather_leaf(struct incode_triangulator *t,
     }
     double radius = first_radius(t, lo, hi);
     for (int tries = 0;; tries++) {
-        enum incode_gathered r = incode_gather_around(
-            g, &t->walker, &t->vicinity, task->v / INCODE_LEAF_POINTS, lo, hi, radius);
+        enum incode_gathered r =
+            incode_gather_around(g, &t->walker, &t->vicinity,
+                                 task->v / INCODE_LEAF_POINTS, lo, hi, radius);
         task->page = g->query.missing;
         if (r == INCODE_GATHER_WAIT)
             return INCODE_WAIT;
@@ -236,12 +237,11 @@ static enum incode_outcome list_bricks(struct incode_triangulator *t,
             v, &t->walker, brick, wide_lo, wide_hi, &task->page);
         if (r == INCODE_LIST_WAIT)
             return INCODE_WAIT;
-        if (r == INCODE_LISTED &&
-            (full || all || v->count >= VICINITY_WANTED))
+        if (r == INCODE_LISTED && (full || all || v->count >= VICINITY_WANTED))
             break;
         full = full || r == INCODE_LIST_FULL;
         t->reach *= full ? 0.75 : 1.25;
-        t->reach = t->reach < 0x1p-10 ? 0x1p-10
+        t->reach = t->reach < 0x1p-10  ? 0x1p-10
                    : t->reach > 0x1p10 ? 0x1p10
                                        : t->reach;
     }

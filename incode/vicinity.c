@@ -177,24 +177,15 @@ static enum incode_walk visit_chosen(const struct incode_vicinity *v,
     return INCODE_WALK_DONE;
 }
 
-enum incode_walk incode_vicinity_apex(const struct incode_vicinity *v,
-                                      struct incode_walker *walker,
-                                      struct incode_query *q)
+enum incode_walk incode_vicinity_visit(const struct incode_vicinity *v,
+                                       struct incode_walker *walker,
+                                       struct incode_query *q,
+                                       incode_visit *visit, void *context)
 {
     struct chosen chosen;
     if (q->round)
         in_ball(v, q, &chosen);
     else
         in_box(v, q, &chosen);
-    return visit_chosen(v, walker, q, &chosen, incode_visit_points, NULL);
-}
-
-enum incode_walk incode_vicinity_box(const struct incode_vicinity *v,
-                                     struct incode_walker *walker,
-                                     struct incode_query *q,
-                                     incode_visit *visit, void *context)
-{
-    struct chosen chosen;
-    in_box(v, q, &chosen);
     return visit_chosen(v, walker, q, &chosen, visit, context);
 }

@@ -6,8 +6,7 @@
  * leaves of those that it cannot rule out.
  *
  *     incode_vicinity_make(&vicinity, &walker, brick, lo, hi, pages_max);
- *     r = incode_vicinity_apex(&vicinity, &walker, &query);
- *     r = incode_vicinity_box(&vicinity, &walker, &query, visit, context);
+ *     r = incode_vicinity_visit(&vicinity, &walker, &query, visit, context);
  */
 #ifndef INCODE_VICINITY_H
 #define INCODE_VICINITY_H
@@ -42,24 +41,17 @@ enum incode_listed incode_vicinity_make(struct incode_vicinity *vicinity,
                                         uint32_t brick, const double lo[3],
                                         const double hi[3], uint32_t *missing);
 
-/* Goes on with an APEX query among the listed bricks: its ball where it has
- * one, else its box.  INCODE_WALK_WAIT: query.missing is not there; what was
- * considered so far stands. */
-enum incode_walk incode_vicinity_apex(const struct incode_vicinity *vicinity,
-                                      struct incode_walker *walker,
-                                      struct incode_query *q);
-
-/* Visits the leaves that meet a BOX query's box, which lies in that of the
- * list. */
-enum incode_walk incode_vicinity_box(const struct incode_vicinity *vicinity,
-                                     struct incode_walker *walker,
-                                     struct incode_query *q,
-                                     incode_visit *visit, void *context);
+/* Visits the leaves among the listed bricks that a query concerns: by its ball
+ * where it is round, else by its box.  INCODE_WALK_WAIT: query.missing is not
+ * there. */
+enum incode_walk incode_vicinity_visit(const struct incode_vicinity *vicinity,
+                                       struct incode_walker *walker,
+                                       struct incode_query *q,
+                                       incode_visit *visit, void *context);
 
 /* Whether a box lies in that of the list. */
-static inline bool
-incode_vicinity_holds(const struct incode_vicinity *vicinity,
-                      const double lo[3], const double hi[3])
+static inline bool incode_vicinity_holds(const struct incode_vicinity *vicinity,
+                                         const double lo[3], const double hi[3])
 {
     bool holds = true;
     for (int d = 0; d < 3; d++)
