@@ -7,6 +7,7 @@
  * generation (16 bits of it). */
 enum { HEAD = 8, STAMP = 6, MESSAGE_MAX = HEAD + CUBE_PAYLOAD_MAX };
 
+enum { HOPS_MAX = 255 };         /* off the e-cube paths */
 enum { LOCAL = CUBE_LINKS_MAX }; /* bit of this node among the ways */
 
 /* --- which way ----------------------------------------------------------- */
@@ -28,8 +29,7 @@ static unsigned link_of_gate(const struct cube *cube)
     return cube->count > 1 && gate == cube->config.spare_node ? 1 : 0;
 }
 
-/* E-cube: the lowest dimension in which we differ; the host is behind the
- * gate's last link. */
+/* The host is behind the gate's last link; 0: there is no way. */
 static uint32_t way_to(const struct cube *cube, unsigned dest)
 {
     unsigned self = cube->config.self;
@@ -44,22 +44,22 @@ static uint32_t way_to(const struct cube *cube, unsigned dest)
                        : 0;
         }
     }
-    return dest == self ? (uint32_t)1 << LOCAL : (self ^ dest) & -(self ^ dest);
+    if (dest == self) {
+        return (uint32_t)1 << LOCAL;
+    }
+    unsigned link = routes_way(&cube->routes, self, dest);
+    return link == ROUTES_NONE ? 0 : (uint32_t)1 << link;
 }
 
-/* The binomial tree rooted at source: from a node whose relative address ends
- * at bit h, on along the dimensions above h.  Its paths are those of e-cube. */
 static uint32_t ways_to_all(const struct cube *cube, unsigned source)
 {
+    unsigned self = cube->config.self;
     unsigned root = source == CUBE_HOST ? cube->wiring.gate : source;
-    unsigned relative = cube->config.self ^ root;
     if (is_host(cube)) {
         return (uint32_t)1 << link_of_gate(cube);
     }
-    unsigned above =
-        relative == 0 ? 0 : 32u - (unsigned)__builtin_clz(relative);
-    uint32_t ways = (nodes(cube) - 1) >> above << above;
-    return cube->config.self == source ? ways : ways | (uint32_t)1 << LOCAL;
+    uint32_t ways = routes_to_all(&cube->routes, self, root);
+    return self == source ? ways : ways | (uint32_t)1 << LOCAL;
 }
 
 /* Of a message that came in; 0: it has lost its way. */
@@ -132,10 +132,11 @@ static size_t up64(size_t bytes)
 
 size_t cube_arena_bytes(const struct cube_config *config)
 {
-    size_t bytes = up64(sizeof(struct cube));
     if (!sound(config)) {
         return 0;
     }
+    size_t bytes =
+        up64(sizeof(struct cube)) + up64(routes_bytes(config->dimension));
     for (unsigned d = 0; d < links_of(config); d++) {
         struct link_config c = link_config_of(config, d);
         size_t link = link_bytes(&c);
@@ -160,6 +161,8 @@ struct cube *cube_init(void *arena, size_t bytes,
     cube->config = *config;
     cube->count = links_of(config);
     cube->held = CUBE_LINKS_MAX;
+    routes_init(&cube->routes, rest, config->dimension);
+    rest += up64(routes_bytes(config->dimension));
     for (unsigned d = 0; d < cube->count; d++) {
         struct link_config c = link_config_of(config, d);
         cube->links[d] = link_init(rest, link_bytes(&c), &c);
@@ -203,7 +206,8 @@ static bool look_at(struct cube *cube, unsigned d)
             continue;
         }
         bool whole = a->message.size >= HEAD;
-        unsigned hops_max = cube->config.dimension + 2u;
+        unsigned hops_max =
+            cube->routes.tree ? HOPS_MAX : cube->config.dimension + 2u;
         a->ways = whole && head[5] < hops_max
                       ? ways_of(cube, field16(head + 2), field16(head))
                       : 0;
@@ -360,6 +364,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                           (uint8_t)cube->stamp,
                           (uint8_t)(cube->stamp >> 8)};
     LINK_ASSERT(size <= CUBE_PAYLOAD_MAX);
+    cube->statistics.unreachable += ways == 0;
     if (room_on(cube, ways, HEAD + size) == 0) {
         return CUBE_AGAIN;
     }
@@ -450,7 +455,8 @@ bool cube_idle(const struct cube *cube)
     for (unsigned d = 0; d < cube->count; d++) {
         const struct cube_arrival *a = &cube->arrivals[d];
         bool under_way = a->there && (a->ways & ~((uint32_t)1 << LOCAL)) != 0;
-        if (under_way || !link_idle(cube->links[d])) {
+        bool idle = link_idle(cube->links[d]) || cube_link_is_dead(cube, d);
+        if (under_way || !idle) {
             return false;
         }
     }

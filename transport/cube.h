@@ -100,6 +100,7 @@ struct cube_statistics {
     uint64_t passed_on;     /* copies of messages of others */
     uint64_t misrouted;     /* dropped: no such node, or too many hops */
     uint64_t blocked;       /* polls in which a message found no room ahead */
+    uint64_t unreachable;   /* written to where no way leads: dropped */
     uint64_t outdated;      /* dropped: of an older generation */
 };
 
@@ -145,6 +146,21 @@ const struct cube_wiring *cube_wiring(const struct cube *cube);
  * all messages of the old one here and, as it spreads, everywhere.  Its number
  * is next's, or one more than the present where that is higher. */
 void cube_renew(struct cube *cube, const struct cube_wiring *next);
+
+/* Whether a node can be reached, by what was dead when the generation began. */
+bool cube_reaches(const struct cube *cube, uint16_t node);
+
+/* Whether link d is dead, by all that is known. */
+bool cube_link_is_dead(const struct cube *cube, unsigned d);
+
+/* The first wrong wire as a sentence, "node 5 link 2 is wired to node 3,
+ * expected node 1", wherever in the cube it was found; false: none is known. */
+enum { CUBE_FAULT_BYTES = 80 };
+bool cube_wiring_fault(const struct cube *cube, char text[CUBE_FAULT_BYTES]);
+
+/* The same of any one; dimension is the cube's. */
+void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
+                     uint16_t spare_node, char text[CUBE_FAULT_BYTES]);
 
 /* True when the neighbours have acknowledged all that is written here and no
  * message waits to be passed on: a node may leave then. */

@@ -8,7 +8,7 @@
 #ifndef TRANSPORT_CUBE_INTERNAL_H
 #define TRANSPORT_CUBE_INTERNAL_H
 
-#include "wiring.h"
+#include "routes.h"
 
 enum { CUBE_GOSSIP_US = 50000 }; /* between notes that are not answered */
 
@@ -21,15 +21,18 @@ struct cube_arrival {
 
 /* What is known of a neighbour. */
 struct cube_neighbour {
-    uint64_t comings; /* times that the link came up, as of the last look */
-    uint64_t told_us; /* when it was last told our wiring */
-    bool agreed;      /* it has said what we would say */
+    uint64_t comings;  /* times that the link came up, as of the last look */
+    uint64_t told_us;  /* when it was last told our wiring */
+    bool agreed;       /* it has said what we would say */
+    uint64_t frames;   /* received, as of the last look */
+    uint32_t quiet_us; /* time that the link, once up, is down or silent */
 };
 
 struct cube {
     struct cube_config config;
     struct cube_statistics statistics;
     struct cube_wiring wiring;
+    struct routes routes;
     struct link *links[CUBE_LINKS_MAX];
     struct cube_arrival arrivals[CUBE_LINKS_MAX];
     struct cube_neighbour neighbours[CUBE_LINKS_MAX];
@@ -41,6 +44,7 @@ struct cube {
     bool again;         /* a message waits only for that turn to pass */
     uint8_t note[WIRING_BYTES_MAX]; /* the wiring, as it is told */
     size_t note_size;
+    uint64_t looked_us; /* when links were looked at last */
 };
 
 /* cube.c: the messages of the generation before go. */

@@ -28,6 +28,7 @@ static void spread(struct cube *cube)
 static void begin_generation(struct cube *cube)
 {
     cube->stamp = (uint16_t)cube->wiring.generation;
+    routes_find(&cube->routes, &cube->wiring);
     cube_drop_all(cube);
 }
 
@@ -39,6 +40,7 @@ void cube_gossip_start(struct cube *cube)
         cube->wiring.gate = cube->config.gate;
     }
     cube->stamp = (uint16_t)cube->wiring.generation;
+    routes_find(&cube->routes, &cube->wiring);
     spread(cube);
 }
 
@@ -107,10 +109,90 @@ static void take_note(struct cube *cube, unsigned d,
     }
 }
 
+/* --- what this end finds itself ------------------------------------------ */
+
+/* Link d of this end as others know it. */
+static struct cube_dead name_of(const struct cube *cube, unsigned d)
+{
+    const struct cube_config *c = &cube->config;
+    struct cube_dead name = {c->self, (uint8_t)d};
+    if (is_host(cube)) {
+        name.node = d == 0 ? 0 : c->spare_node;
+        name.dimension = c->dimension;
+    }
+    return name;
+}
+
+/* A peer that was up once and is not heard of any more. */
+static bool look_for_dead(struct cube *cube, unsigned d, uint32_t passed_us)
+{
+    struct cube_neighbour *n = &cube->neighbours[d];
+    enum link_state state = link_state(cube->links[d]);
+    uint64_t frames = link_statistics(cube->links[d])->frames_received;
+    bool spoke = frames != n->frames && state == LINK_SILENT;
+    n->frames = frames;
+    if (spoke || state == LINK_UP || state == LINK_CLOSING ||
+        state == LINK_CLOSED || n->comings == 0 || cube->config.dead_us == 0) {
+        n->quiet_us = 0;
+        return false;
+    }
+    if (n->quiet_us < cube->config.dead_us) {
+        n->quiet_us += passed_us;
+    }
+    return n->quiet_us >= cube->config.dead_us &&
+           wiring_add_dead(&cube->wiring, name_of(cube, d),
+                           cube->config.dimension);
+}
+
+static bool look_for_wrong(struct cube *cube, unsigned d)
+{
+    const struct link_peer *peer = link_peer(cube->links[d]);
+    struct cube_wrong wrong = {cube->config.self, peer->node, (uint8_t)d,
+                               peer->port, (uint8_t)peer->refusal};
+    return peer->refusal != LINK_FITS && wiring_add_wrong(&cube->wiring, wrong);
+}
+
+/* Time in which this end itself stood still counts little: others are not dead
+ * because it slept. */
+static void look(struct cube *cube, uint64_t now_us)
+{
+    uint64_t passed_us = now_us - cube->looked_us;
+    uint32_t most_us = cube->config.dead_us / 4;
+    bool news = false;
+    if (passed_us < CUBE_GOSSIP_US) {
+        return;
+    }
+    cube->looked_us = now_us;
+    passed_us = passed_us < most_us ? passed_us : most_us;
+    for (unsigned d = 0; d < cube->count; d++) {
+        news |= look_for_dead(cube, d, (uint32_t)passed_us);
+        news |= look_for_wrong(cube, d);
+    }
+    if (news) {
+        spread(cube);
+    }
+}
+
+bool cube_link_is_dead(const struct cube *cube, unsigned d)
+{
+    struct cube_dead name = name_of(cube, d);
+    const struct cube_wiring *w = &cube->wiring;
+    return wiring_is_dead(w, w->dead_count, name.node, name.dimension,
+                          cube->config.dimension);
+}
+
+bool cube_reaches(const struct cube *cube, uint16_t node)
+{
+    return routes_reach(&cube->routes, node);
+}
+
+/* --- each poll ----------------------------------------------------------- */
+
 void cube_gossip(struct cube *cube, uint64_t now_us)
 {
     struct link_message note;
     bool ask;
+    look(cube, now_us);
     for (unsigned d = 0; d < cube->count; d++) {
         const struct link_statistics *s = link_statistics(cube->links[d]);
         struct cube_neighbour *n = &cube->neighbours[d];

@@ -40,6 +40,8 @@ struct place {
     uint32_t broadcasts_sent, broadcasts_read[ENDS_MAX];
     uint32_t next; /* place that is written to next */
     uint64_t deaf_until_us, stopped_until_us;
+    struct line_wire *wires[CUBE_LINKS_MAX];
+    bool gone; /* does nothing any more, and nothing is expected of it */
 };
 
 struct machine {
@@ -63,14 +65,16 @@ static inline unsigned place_of(const struct machine *m, uint16_t name)
     return name == CUBE_HOST ? m->nodes : name;
 }
 
-static inline void connect_wire(struct machine *m, struct link_pipe *a,
-                                struct link_pipe *b,
+/* Link d of place i leads to link e of place j. */
+static inline void connect_wire(struct machine *m, unsigned i, unsigned d,
+                                unsigned j, unsigned e,
                                 const struct line_quality *quality)
 {
     struct line_wire *wire = &m->wires[m->wires_count++];
     line_wire(wire, &m->now_us, quality, m->random + m->wires_count);
-    *a = line_pipe(&wire->ends[0]);
-    *b = line_pipe(&wire->ends[1]);
+    m->places[i].config.pipes[d] = line_pipe(&wire->ends[0]);
+    m->places[j].config.pipes[e] = line_pipe(&wire->ends[1]);
+    m->places[i].wires[d] = m->places[j].wires[e] = wire;
 }
 
 static inline void open_place(struct machine *m, unsigned i)
@@ -100,7 +104,7 @@ static inline struct machine *build(unsigned dimension,
     m->nodes = 1u << dimension;
     m->count = m->nodes + 1;
     m->size_max = CUBE_PAYLOAD_MAX;
-    m->wires = calloc(m->nodes * dimension / 2 + 1, sizeof *m->wires);
+    m->wires = calloc(m->nodes * dimension / 2 + 2, sizeof *m->wires);
     assert_non_null(m->wires);
     for (unsigned i = 0; i < m->count; i++) {
         struct place *p = &m->places[i];
@@ -115,13 +119,15 @@ static inline struct machine *build(unsigned dimension,
         for (unsigned d = 0; d < dimension; d++) {
             unsigned other = i ^ 1u << d;
             if (other > i) {
-                connect_wire(m, &m->places[i].config.pipes[d],
-                             &m->places[other].config.pipes[d], quality);
+                connect_wire(m, i, d, other, d, quality);
             }
         }
     }
-    connect_wire(m, &m->places[0].config.pipes[dimension],
-                 &m->places[m->nodes].config.pipes[0], quality);
+    connect_wire(m, 0, dimension, m->nodes, 0, quality);
+    if (config->spare_node != 0) {
+        connect_wire(m, config->spare_node, dimension, m->nodes, 1, quality);
+        m->places[config->spare_node].config.host_wire = true;
+    }
     for (unsigned i = 0; i < m->count; i++) {
         open_place(m, i);
     }
@@ -188,7 +194,7 @@ static inline unsigned give(struct machine *m, unsigned i)
     }
     for (unsigned tried = 0; tried < m->count; tried++) {
         unsigned to = p->next = (p->next + 1) % m->count;
-        if (to == i || p->sent[to] == m->each) {
+        if (to == i || p->sent[to] == m->each || m->places[to].gone) {
             continue;
         }
         unsigned size = content(m, bytes, i, p->sent[to], false);
@@ -208,7 +214,7 @@ static inline void step(struct machine *m, unsigned i)
 {
     struct place *p = &m->places[i];
     struct cube_message message;
-    if (m->now_us < p->stopped_until_us) {
+    if (m->now_us < p->stopped_until_us || p->gone) {
         return;
     }
     cube_poll(p->cube, m->now_us);
@@ -225,16 +231,31 @@ static inline bool finished(const struct machine *m)
         const struct place *p = &m->places[i];
         for (unsigned j = 0; j < m->count; j++) {
             bool reached = j != i && i != m->nodes;
+            if (p->gone || m->places[j].gone) {
+                continue;
+            }
             if ((i != j && p->read[j] != m->each) ||
                 p->broadcasts_read[j] != (reached ? m->broadcasts : 0)) {
                 return false;
             }
         }
-        if (!cube_idle(p->cube)) {
+        if (!p->gone && !cube_idle(p->cube)) {
             return false;
         }
     }
     return true;
+}
+
+/* Forgets what was counted: as many messages again are expected. */
+static inline void count_anew(struct machine *m)
+{
+    for (unsigned i = 0; i < m->count; i++) {
+        struct place *p = &m->places[i];
+        p->broadcasts_sent = 0;
+        memset(p->sent, 0, sizeof p->sent);
+        memset(p->read, 0, sizeof p->read);
+        memset(p->broadcasts_read, 0, sizeof p->broadcasts_read);
+    }
 }
 
 static inline void check_statistics(const struct machine *m, bool clean)
@@ -267,6 +288,74 @@ static inline void run(struct machine *m, uint32_t each, uint64_t most_us)
         if (m->now_us > deadline) {
             fail_msg("dimension %u: not all arrived", m->dimension);
         }
+    }
+}
+
+/* --- generations */
+
+enum { WRITTEN = 0, READ = 1 };
+
+static inline const struct cube_wiring *wiring_of(const struct machine *m,
+                                                  unsigned i)
+{
+    return cube_wiring(m->places[i].cube);
+}
+
+static inline bool all_in(const struct machine *m, uint32_t generation)
+{
+    for (unsigned i = 0; i < m->count; i++) {
+        if (!m->places[i].gone && wiring_of(m, i)->generation != generation) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static inline void poll_all(struct machine *m, uint32_t us)
+{
+    m->now_us += us;
+    for (unsigned i = 0; i < m->count; i++) {
+        if (!m->places[i].gone) {
+            cube_poll(m->places[i].cube, m->now_us);
+        }
+    }
+}
+
+static inline void settle(struct machine *m, uint32_t generation)
+{
+    for (unsigned i = 0; !all_in(m, generation); i++) {
+        assert_true(i < 20000);
+        poll_all(m, 100);
+    }
+}
+
+/* A new arena and epoch, as after a reset. */
+static inline void reboot(struct machine *m, unsigned i)
+{
+    free(m->places[i].arena);
+    m->places[i].config.epoch = draw(m) | 1;
+    open_place(m, i);
+}
+
+/* Writes to all, the generation as payload; reads and checks that. */
+static inline void chatter(struct machine *m, unsigned i, bool reads,
+                           uint64_t counts[2])
+{
+    struct cube *cube = m->places[i].cube;
+    struct cube_message message;
+    uint32_t generation = cube_wiring(cube)->generation, heard;
+    unsigned to = draw(m) % m->count;
+    if (to != i && cube_write(cube, m->places[to].self, 1, &generation,
+                              sizeof generation) == 0) {
+        assert_true(generation > 0);
+        counts[WRITTEN]++;
+    }
+    while (reads && cube_read(cube, &message)) {
+        assert_int_equal(message.size, sizeof heard);
+        memcpy(&heard, message.data, sizeof heard);
+        assert_int_equal(heard, generation);
+        cube_release(cube);
+        counts[READ]++;
     }
 }
 

@@ -211,7 +211,55 @@ static void a_wrong_wire_is_named(void **unused)
     assert_int_equal(peer->node, 3);
     assert_int_equal(peer->port, 2);
     assert_true(cube_link_state(five->cube, 1) == LINK_UP);
+    /* All four ends are known at the host, and everywhere. */
+    static const char *const said[] = {
+        "node 1 link 2 is wired to node 7, expected node 5",
+        "node 3 link 2 is wired to node 5, expected node 7",
+        "node 5 link 2 is wired to node 3, expected node 1",
+        "node 7 link 2 is wired to node 1, expected node 3"};
+    char text[CUBE_FAULT_BYTES];
+    for (unsigned k = 0; k < m->count; k++) {
+        const struct cube_wiring *w = cube_wiring(m->places[k].cube);
+        assert_int_equal(w->wrong_count, 4);
+        assert_true(cube_wiring_fault(m->places[k].cube, text));
+        assert_string_equal(text, said[0]);
+        for (unsigned i = 0; i < 4; i++) {
+            cube_wrong_text(&w->wrong[i], 3, 0, text);
+            assert_string_equal(text, said[i]);
+        }
+    }
     destroy(m);
+}
+
+static void wrong_wires_in_words(void **unused)
+{
+    static const struct {
+        struct cube_wrong wrong;
+        const char *text;
+    } cases[] = {
+        {{1000, 7, 9, 2, LINK_WRONG_WIRE},
+         "node 1000 link 9 is wired to node 7, expected node 488"},
+        {{5, 1, 2, 0, LINK_WRONG_WIRE},
+         "node 5 link 2 is wired to node 1 link 0, expected link 2"},
+        {{0, 3, 10, 1, LINK_WRONG_WIRE},
+         "node 0 link 10 is wired to node 3, expected the host"},
+        {{6, CUBE_HOST, 10, 0, LINK_WRONG_WIRE},
+         "node 6 link 10 is wired to the host link 0, expected link 1"},
+        {{CUBE_HOST, 3, 0, 1, LINK_WRONG_WIRE},
+         "the host link 0 is wired to node 3, expected node 0"},
+        {{CUBE_HOST, 3, 1, 1, LINK_WRONG_WIRE},
+         "the host link 1 is wired to node 3, expected node 6"},
+        {{2, 3, 0, 0, LINK_WRONG_VERSION},
+         "node 2 link 0: node 3 speaks another version of the protocol"},
+        {{2, 3, 0, 0, LINK_WRONG_SIZES},
+         "node 2 link 0: node 3 has other sizes of frames or messages"},
+    };
+    char text[CUBE_FAULT_BYTES];
+    (void)unused;
+    for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        cube_wrong_text(&cases[i].wrong, 10, 6, text);
+        assert_string_equal(text, cases[i].text);
+    }
 }
 
 static void configs_that_make_no_sense(void **unused)
@@ -281,6 +329,7 @@ int main(void)
         cmocka_unit_test(an_unread_message_holds_its_own_link_alone),
         cmocka_unit_test(a_flood_does_not_starve_the_node_it_passes),
         cmocka_unit_test(a_wrong_wire_is_named),
+        cmocka_unit_test(wrong_wires_in_words),
         cmocka_unit_test(configs_that_make_no_sense),
         cmocka_unit_test(all_say_farewell),
     };

@@ -2,69 +2,6 @@
  * read after it, however much was on its way. */
 #include "cube_machine.h"
 
-enum { WRITTEN = 0, READ = 1 };
-
-static const struct cube_wiring *wiring_of(const struct machine *m, unsigned i)
-{
-    return cube_wiring(m->places[i].cube);
-}
-
-static bool all_in(const struct machine *m, uint32_t generation)
-{
-    for (unsigned i = 0; i < m->count; i++) {
-        if (wiring_of(m, i)->generation != generation) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static void poll_all(struct machine *m, uint32_t us)
-{
-    m->now_us += us;
-    for (unsigned i = 0; i < m->count; i++) {
-        cube_poll(m->places[i].cube, m->now_us);
-    }
-}
-
-static void settle(struct machine *m, uint32_t generation)
-{
-    for (unsigned i = 0; !all_in(m, generation); i++) {
-        assert_true(i < 20000);
-        poll_all(m, 100);
-    }
-}
-
-/* A new arena and epoch, as after a reset. */
-static void reboot(struct machine *m, unsigned i)
-{
-    free(m->places[i].arena);
-    m->places[i].config.epoch = draw(m) | 1;
-    open_place(m, i);
-}
-
-/* Writes to all, the generation as payload; reads and checks that. */
-static void chatter(struct machine *m, unsigned i, bool reads,
-                    uint64_t counts[2])
-{
-    struct cube *cube = m->places[i].cube;
-    struct cube_message message;
-    uint32_t generation = cube_wiring(cube)->generation, heard;
-    unsigned to = draw(m) % m->count;
-    if (to != i && cube_write(cube, m->places[to].self, 1, &generation,
-                              sizeof generation) == 0) {
-        assert_true(generation > 0);
-        counts[WRITTEN]++;
-    }
-    while (reads && cube_read(cube, &message)) {
-        assert_int_equal(message.size, sizeof heard);
-        memcpy(&heard, message.data, sizeof heard);
-        assert_int_equal(heard, generation);
-        cube_release(cube);
-        counts[READ]++;
-    }
-}
-
 /* The host begins anew while windows are full and nobody reads. */
 static void nothing_of_an_old_generation_is_read(void **unused)
 {
