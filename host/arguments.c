@@ -13,6 +13,7 @@ enum {
     KEY_FACE_RULE,
     KEY_LINK,
     KEY_BOARD,
+    KEY_PATIENCE,
     KEY_CUBE,
     KEY_MEMORY,
     KEY_CLUSTER,
@@ -63,6 +64,10 @@ static const struct argp_option options_of_run[] = {
     {"link", KEY_LINK, "NAME", 0,
      "Wires between nodes: tcp, the default, or serial (pseudo-terminals)", 1},
     {"board", KEY_BOARD, "NAME", 0, "What a node runs on: linux", 1},
+    {"patience", KEY_PATIENCE, "SECONDS", 0,
+     "Wait so long for a node that does not answer, then start it again or "
+     "go on without it. Default: 60",
+     1},
     {"cube", KEY_CUBE, "FILE", 0, "Real nodes: not in this version", 1},
     {NULL, 0, NULL, 0, "What to report:", 2},
     {"verify", KEY_VERIFY, NULL, 0,
@@ -349,6 +354,9 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_MEMORY:
         parse_memory(p, value);
+        return 0;
+    case KEY_PATIENCE:
+        (void)number(p, "patience", value, 1, 86400, &p->options->patience_s);
         return 0;
     case KEY_CUBE:
         host_fail(p->error, HOST_USAGE,

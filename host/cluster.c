@@ -64,16 +64,14 @@ static void set_limit(int resource, uint64_t bytes, int report)
 }
 
 /* In the child: becomes the node.  A failure's errno goes to `report`. */
-static void become_node(const struct host_cluster *c,
-                        const struct host_cluster_options *options,
-                        const char *path, unsigned node,
-                        const struct host_wires *wires, int report)
+static void become_node(const struct host_cluster *c, unsigned node, int report)
 {
     char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
     char *no_environment[] = {NULL};
     size_t at = 0;
+    (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
     for (unsigned d = 0; d < c->dimension + (node == 0 ? 1u : 0u); d++) {
-        int fd = wires->end[node][d];
+        int fd = c->wires.end[node][d];
         fcntl(fd, F_SETFD, 0);
         at += (size_t)snprintf(links + at, sizeof links - at, "%s%d",
                                d == 0 ? "" : ",", fd);
@@ -84,9 +82,9 @@ static void become_node(const struct host_cluster *c,
     snprintf(text[0], sizeof text[0], "%u", node);
     snprintf(text[1], sizeof text[1], "%u", c->dimension);
     snprintf(text[2], sizeof text[2], "%llu",
-             (unsigned long long)options->memory);
+             (unsigned long long)c->options.memory);
     snprintf(text[3], sizeof text[3], "%d", (int)HOST_STACK_BYTES);
-    snprintf(text[4], sizeof text[4], "%u", options->window);
+    snprintf(text[4], sizeof text[4], "%u", c->options.window);
     snprintf(text[5], sizeof text[5], "%lu", (unsigned long)c->epoch);
     char *argv[] = {(char[]){"incode-node"},
                     (char[]){"--node"},
@@ -107,31 +105,30 @@ static void become_node(const struct host_cluster *c,
     set_limit(RLIMIT_CORE, 0, report);
     if (c->limited) {
         set_limit(RLIMIT_STACK, HOST_STACK_BYTES, report);
-        set_limit(RLIMIT_DATA, options->memory - HOST_STACK_BYTES, report);
+        set_limit(RLIMIT_DATA, c->options.memory - HOST_STACK_BYTES, report);
     }
-    execve(path, argv, c->limited ? no_environment : environ);
+    execve(c->path, argv, c->limited ? no_environment : environ);
     int reason = errno;
     (void)!write(report, &reason, sizeof reason);
     _exit(127);
 }
 
-static int start_node(struct host_cluster *c,
-                      const struct host_cluster_options *options,
-                      const char *path, unsigned node,
-                      const struct host_wires *wires, struct host_error *error)
+static int start_node(struct host_cluster *c, unsigned node,
+                      struct host_error *error)
 {
     int report[2], reason = 0;
     if (pipe2(report, O_CLOEXEC) != 0) {
         return host_fail(error, HOST_BROKEN, "node %u: %s; close some files",
                          node, strerror(errno));
     }
+    c->epoch++;
     pid_t host = getpid(), pid = fork();
     if (pid == 0) {
         prctl(PR_SET_PDEATHSIG, SIGKILL);
         if (getppid() != host) {
             _exit(127); /* the host ended before it could be watched */
         }
-        become_node(c, options, path, node, wires, report[1]);
+        become_node(c, node, report[1]);
     }
     close(report[1]);
     if (pid < 0) {
@@ -147,17 +144,17 @@ static int start_node(struct host_cluster *c,
     if (got == (ssize_t)sizeof reason) {
         return host_fail(error, HOST_CUBE,
                          "node %u: %s: %s; run make to build it anew", node,
-                         path, strerror(reason));
+                         c->path, strerror(reason));
     }
     return 0;
 }
 
 /* The host's end of its wire.  A terminal is opened by its name as a real port
  * would be. */
-static int take_wire(struct host_cluster *c,
-                     const struct host_cluster_options *options,
-                     struct host_wires *wires, struct host_error *error)
+static int take_wire(struct host_cluster *c, struct host_error *error)
 {
+    const struct host_cluster_options *options = &c->options;
+    struct host_wires *wires = &c->wires;
     struct serial_port_settings settings = {.dtr = true, .rts = true};
     if (options->link != HOST_WIRE_SERIAL) {
         host_port_socket(&c->port, wires->host);
@@ -172,37 +169,45 @@ static int take_wire(struct host_cluster *c,
     return status;
 }
 
+/* Half of all numbers may follow, so that no start's epoch is 0. */
+static uint32_t first_epoch(void)
+{
+    uint32_t epoch;
+    if (getrandom(&epoch, sizeof epoch, 0) != (ssize_t)sizeof epoch) {
+        epoch = (uint32_t)host_now_us();
+    }
+    return epoch % (UINT32_MAX / 2) + 1;
+}
+
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,
                        struct host_error *error)
 {
-    char path[4096];
-    struct host_wires wires;
     memset(cluster, 0, sizeof *cluster);
+    cluster->wires.host = -1;
     cluster->nodes = options->nodes;
+    cluster->options = *options;
     cluster->limited = LIMITED;
+    cluster->epoch = first_epoch();
     for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
         cluster->process[i].ended = true;
     }
     while (1u << cluster->dimension < options->nodes) {
         cluster->dimension++;
     }
-    if (getrandom(&cluster->epoch, sizeof cluster->epoch, 0) < 0 ||
-        cluster->epoch <= 1) {
-        cluster->epoch = 2;
-    }
-    if (find_program(options->program, path, sizeof path, error) != 0) {
+    if (find_program(options->program, cluster->path, sizeof cluster->path,
+                     error) != 0) {
         return error->code;
     }
-    int status = host_wires_make(&wires, options->link, cluster->nodes,
+    int status = host_wires_make(&cluster->wires, options->link, cluster->nodes,
                                  cluster->dimension, error);
     if (status == 0) {
-        status = take_wire(cluster, options, &wires, error);
+        status = take_wire(cluster, error);
     }
+    cluster->host_epoch = cluster->epoch;
     for (unsigned i = 0; status == 0 && i < cluster->nodes; i++) {
-        status = start_node(cluster, options, path, i, &wires, error);
+        status = start_node(cluster, i, error);
     }
-    host_wires_close_nodes(&wires);
     if (status != 0) {
         host_cluster_stop(cluster);
     }
@@ -219,34 +224,60 @@ static void reap(struct host_process *process, int flags)
     }
 }
 
-/* A node that ends before it is told to has failed. */
 static int describe(unsigned node, const struct host_process *process,
                     struct host_error *error)
 {
     int status = process->status;
     if (WIFSIGNALED(status)) {
         int number = WTERMSIG(status);
-        return host_fail(error, HOST_CUBE,
-                         "node %u: ended by signal %d (%s)%s; run again, and "
-                         "look for what stopped it",
-                         node, number, strsignal(number),
-                         number == SIGILL    ? ", an invariant failed"
-                         : number == SIGSEGV ? ", perhaps out of its memory"
-                                             : "");
+        return host_fail(
+            error, HOST_CUBE,
+            "node %u: ended %u times, the last by signal %d (%s)%s; "
+            "run again, and look for what stopped it",
+            node, process->deaths, number, strsignal(number),
+            number == SIGILL    ? ", an invariant failed"
+            : number == SIGSEGV ? ", perhaps out of its memory"
+                                : "");
     }
     return host_fail(error, HOST_CUBE,
-                     "node %u: ended with status %d; see what it printed, and "
-                     "run again",
-                     node, WEXITSTATUS(status));
+                     "node %u: ended %u times, the last with status %d; see "
+                     "what it printed, and run again",
+                     node, process->deaths, WEXITSTATUS(status));
+}
+
+/* Whether a node has died too often to be started again.  What kills from
+ * without may stop; a node that ends by itself would do so again. */
+static bool hopeless(struct host_process *process)
+{
+    uint64_t now = host_now_us();
+    bool killed =
+        WIFSIGNALED(process->status) && (WTERMSIG(process->status) == SIGKILL ||
+                                         WTERMSIG(process->status) == SIGTERM);
+    if (now - process->deaths_us > HOST_DEATHS_US) {
+        process->deaths = process->faults;
+        process->deaths_us = now;
+    }
+    process->deaths++;
+    process->faults += !killed;
+    return process->faults >= HOST_FAULTS_MAX ||
+           process->deaths >= HOST_DEATHS_MAX;
 }
 
 int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
 {
     for (unsigned i = 0; i < cluster->nodes; i++) {
-        reap(&cluster->process[i], WNOHANG);
-        if (cluster->process[i].ended) {
-            return describe(i, &cluster->process[i], error);
+        struct host_process *process = &cluster->process[i];
+        reap(process, WNOHANG);
+        if (!process->ended) {
+            continue;
         }
+        if (hopeless(process)) {
+            return describe(i, process, error);
+        }
+        if (start_node(cluster, i, error) != 0) {
+            return error->code;
+        }
+        cluster->restarts++;
     }
     return 0;
 }
@@ -254,6 +285,7 @@ int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
 bool host_cluster_ended(struct host_cluster *cluster)
 {
     bool ended = true;
+    host_wires_close_nodes(&cluster->wires); /* so that an end is heard */
     for (unsigned i = 0; i < cluster->nodes; i++) {
         reap(&cluster->process[i], WNOHANG);
         ended &= cluster->process[i].ended;
@@ -271,6 +303,7 @@ void host_cluster_stop(struct host_cluster *cluster)
     for (unsigned i = 0; i < cluster->nodes; i++) {
         reap(&cluster->process[i], 0);
     }
+    host_wires_close(&cluster->wires);
     host_port_close(&cluster->port);
 }
 
@@ -293,6 +326,23 @@ static int machine_check(void *context, struct host_error *error)
     return host_cluster_check(context, error);
 }
 
+static unsigned machine_restarts(void *context)
+{
+    const struct host_cluster *cluster = context;
+    return cluster->restarts;
+}
+
+/* As it ends, host_cluster_check finds it. */
+static bool machine_kill(void *context, unsigned node)
+{
+    struct host_cluster *cluster = context;
+    struct host_process *process = &cluster->process[node];
+    if (!process->ended) {
+        kill(process->pid, SIGKILL);
+    }
+    return true;
+}
+
 static bool machine_ended(void *context)
 {
     return host_cluster_ended(context);
@@ -310,11 +360,13 @@ struct host_machine host_cluster_machine(struct host_cluster *cluster)
     machine.context = cluster;
     machine.nodes = cluster->nodes;
     machine.dimension = cluster->dimension;
-    machine.epoch = cluster->epoch - 1;
+    machine.epoch = cluster->host_epoch;
     machine.pipe = host_port_pipe(&cluster->port);
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;
+    machine.restarts = machine_restarts;
+    machine.kill = machine_kill;
     machine.ended = machine_ended;
     machine.stop = machine_stop;
     return machine;

@@ -1,9 +1,10 @@
 /* The nodes that the host starts on this machine: processes of incode-node,
  * each with the wires of a hypercube and no others, its data memory limited by
- * the kernel, all gone when the host goes.
+ * the kernel, all gone when the host goes.  One that dies is started again, on
+ * the same wires; one that dies too often is an error.
  *
- * Memory: 24 bytes a node; two sockets a wire until the nodes have them.  Work:
- * a fork and an exec a node.
+ * Memory: 32 bytes a node; both ends of every wire, for nodes that start again.
+ * Work: a fork and an exec a start of a node.
  *
  *     host_cluster_start(&cluster, &options, &error);
  *     machine = host_cluster_machine(&cluster);
@@ -25,7 +26,10 @@
 enum {
     HOST_MEMORY_MIN = 256 * 1024,  /* bytes a node */
     HOST_STATIC_BYTES = 16 * 1024, /* .data and .bss of incode-node, at most */
-    HOST_STACK_BYTES = 64 * 1024   /* of a node's memory */
+    HOST_STACK_BYTES = 64 * 1024,  /* of a node's memory */
+    HOST_FAULTS_MAX = 3,
+    HOST_DEATHS_MAX = 10,
+    HOST_DEATHS_US = 10000000
 };
 
 struct host_cluster_options {
@@ -40,15 +44,23 @@ struct host_cluster_options {
 struct host_process {
     pid_t pid;
     bool ended;
-    int status; /* as waitpid gives it, once ended */
+    int status;         /* as waitpid gives it, once ended */
+    unsigned faults;    /* times that it ended without being killed */
+    unsigned deaths;    /* times that it ended since... */
+    uint64_t deaths_us; /* ...this time */
 };
 
 struct host_cluster {
     unsigned nodes, dimension;
-    uint32_t epoch;        /* of this start of the cube */
-    struct host_port port; /* the wire to node 0 */
-    bool limited;          /* the kernel holds the nodes to their memory */
+    struct host_cluster_options options;
+    uint32_t host_epoch;
+    uint32_t epoch;          /* of the last start of a node */
+    unsigned restarts;       /* of nodes */
+    struct host_wires wires; /* the nodes' ends, for those that start again */
+    struct host_port port;   /* the wire to node 0 */
+    bool limited;            /* the kernel holds the nodes to their memory */
     struct host_process process[HOST_PROCESSES_MAX];
+    char path[4096]; /* of the node program */
 };
 
 int host_cluster_start(struct host_cluster *cluster,
@@ -58,10 +70,13 @@ int host_cluster_start(struct host_cluster *cluster,
 /* The cluster as the service's machine, which points to it. */
 struct host_machine host_cluster_machine(struct host_cluster *cluster);
 
-/* 0 while every node lives; else HOST_CUBE, naming the node. */
+/* Starts nodes again that have died.  0, or HOST_CUBE for one that does so too
+ * often: HOST_FAULTS_MAX times by itself, or HOST_DEATHS_MAX times within
+ * HOST_DEATHS_US however it came. */
 int host_cluster_check(struct host_cluster *cluster, struct host_error *error);
 
-/* Whether every node has ended, however it did. */
+/* Whether every node has ended, however it did.  From here on none is started
+ * again. */
 bool host_cluster_ended(struct host_cluster *cluster);
 
 /* Ends what still runs and waits for it.  Also after a failed start. */

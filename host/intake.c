@@ -3,6 +3,8 @@
 #include <string.h>
 
 #include "../node/result.h"
+#include "../node/totals.h"
+#include "watch.h"
 
 /* A message that no sound node sends. */
 static int unsound(const struct cube_message *message, const char *what,
@@ -48,7 +50,8 @@ static int take_results(struct host_service *s,
         return unsound(message, "sent results without an epoch", error);
     }
     memcpy(&epoch, message->data, sizeof epoch);
-    s->node[message->source].results++;
+    struct host_node *node = &s->node[message->source];
+    node->results++;
     if (!host_ledger_current(&s->ledger, message->source, epoch)) {
         return 0;
     }
@@ -68,6 +71,7 @@ static int take_results(struct host_service *s,
             return unsound(message, "sent results that cannot be", error);
         }
         host_tetrahedra_keep(s->tets, count);
+        node->unreported += count;
         if (event == NODE_RESULT_COMMIT &&
             host_ledger_commit(&s->ledger, message->source, reader.brick) !=
                 0) {
@@ -121,17 +125,24 @@ static int take_unspill_request(struct host_service *s,
     return 0;
 }
 
+/* Statistics tell of all that a start of the node has done: they replace those
+ * that it told before. */
 static int take_finished(struct host_service *s,
                          const struct cube_message *message,
                          struct host_error *error)
 {
     struct host_node_report *report = &s->report[message->source];
     struct host_node *node = &s->node[message->source];
-    if (message->size != sizeof report->statistics || report->finished) {
+    struct node_finished_message finished;
+    if (message->size != sizeof finished) {
+        return unsound(message, "sent statistics in another language", error);
+    }
+    memcpy(&finished, message->data, sizeof finished);
+    if (finished.epoch != 0 &&
+        !host_ledger_current(&s->ledger, message->source, finished.epoch)) {
         return unsound(message, "sent statistics out of turn", error);
     }
-    memcpy(&report->statistics, message->data, sizeof report->statistics);
-    if (message->source < s->workers &&
+    if (finished.epoch != 0 &&
         host_ledger_finish(&s->ledger, message->source) != 0) {
         return host_fail(error, HOST_BROKEN,
                          "node %u: finished with %u bricks of %u committed; "
@@ -140,9 +151,14 @@ static int take_finished(struct host_service *s,
                          s->ledger.job[message->source].committed,
                          node->job.job.last - node->job.job.first);
     }
-    report->finished = true;
-    node->done = true;
-    s->done++;
+    if (finished.epoch != 0) {
+        node->working = false;
+        s->working--;
+    }
+    node->reported = true;
+    node->unreported = 0;
+    report->statistics = node->before;
+    node_totals_add(&report->statistics, &finished);
     return 0;
 }
 
@@ -160,14 +176,10 @@ static int take_fault(const struct cube_message *message,
                          : "please report this with the points");
 }
 
-int host_intake(struct host_service *service,
+static int take(struct host_service *service,
                 const struct cube_message *message, struct host_error *error)
 {
-    struct host_node_report *report;
-    if (message->source >= service->machine->nodes) {
-        return unsound(message, "is not of this cube", error);
-    }
-    report = &service->report[message->source];
+    struct host_node_report *report = &service->report[message->source];
     switch (message->type) {
     case NODE_READY:
         if (message->size != sizeof report->map) {
@@ -178,9 +190,7 @@ int host_intake(struct host_service *service,
         report->ready = true;
         return 0;
     case NODE_HERE:
-        service->here += !report->here;
-        report->here = true;
-        return 0;
+        return host_watch_answer(service, message, error);
     case NODE_PAGE_REQUEST:
         return take_requests(service, message, error);
     case NODE_RESULT:
@@ -196,4 +206,17 @@ int host_intake(struct host_service *service,
     default:
         return unsound(message, "sent what the host does not know", error);
     }
+}
+
+int host_intake(struct host_service *service,
+                const struct cube_message *message, struct host_error *error)
+{
+    if (message->source >= service->machine->nodes) {
+        return unsound(message, "is not of this cube", error);
+    }
+    struct host_node *node = &service->node[message->source];
+    int status = take(service, message, error);
+    node->received++;
+    node->silent_us = 0;
+    return status;
 }

@@ -5,12 +5,17 @@
 
 #include "../incode/predicates.h"
 
+/* Ranges a worker after a loss: they differ in work, and whoever is free takes
+ * the next; but each has a border, which is worked on from both sides. */
+enum { PIECES = 2 };
+
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error)
 {
     memset(ledger, 0, sizeof *ledger);
     ledger->bricks = bricks;
     ledger->nodes = nodes;
+    ledger->piece_max = bricks;
     ledger->bits = calloc((size_t)bricks / 64 + 1, sizeof *ledger->bits);
     ledger->job = calloc(nodes, sizeof *ledger->job);
     if (ledger->bits == NULL || ledger->job == NULL) {
@@ -27,6 +32,42 @@ void host_ledger_free(struct host_ledger *ledger)
     memset(ledger, 0, sizeof *ledger);
 }
 
+/* The end of the region that a brick is in. */
+static uint32_t region_end(const struct host_order *order, uint32_t brick)
+{
+    uint32_t low = 0, high = order->regions;
+    while (high - low > 1) {
+        uint32_t middle = low + (high - low) / 2;
+        if (order->region[middle].first <= brick) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return order->region[low].last;
+}
+
+bool host_ledger_next(struct host_ledger *ledger,
+                      const struct host_order *order, uint32_t *first,
+                      uint32_t *last)
+{
+    uint32_t at = ledger->cursor;
+    while (at < ledger->bricks && host_ledger_committed(ledger, at)) {
+        at++;
+    }
+    *first = at;
+    if (at < ledger->bricks) {
+        uint32_t end = region_end(order, at);
+        while (at < end && at - *first < ledger->piece_max &&
+               !host_ledger_committed(ledger, at)) {
+            at++;
+        }
+    }
+    *last = at;
+    ledger->cursor = at;
+    return *first < *last;
+}
+
 uint32_t host_ledger_open(struct host_ledger *ledger, uint32_t node,
                           uint32_t first, uint32_t last)
 {
@@ -35,7 +76,6 @@ uint32_t host_ledger_open(struct host_ledger *ledger, uint32_t node,
     job->first = first;
     job->last = last;
     job->committed = 0;
-    job->finished = false;
     return job->epoch;
 }
 
@@ -43,7 +83,7 @@ bool host_ledger_current(const struct host_ledger *ledger, uint32_t node,
                          uint32_t epoch)
 {
     return node < ledger->nodes && epoch != 0 &&
-           ledger->job[node].epoch == epoch && !ledger->job[node].finished;
+           ledger->job[node].epoch == epoch;
 }
 
 bool host_ledger_committed(const struct host_ledger *ledger, uint32_t brick)
@@ -55,7 +95,7 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
                        uint32_t brick)
 {
     struct host_job *job = &ledger->job[node];
-    if (brick < job->first || brick >= job->last ||
+    if (job->epoch == 0 || brick < job->first || brick >= job->last ||
         host_ledger_committed(ledger, brick)) {
         return -1;
     }
@@ -68,10 +108,10 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
 int host_ledger_finish(struct host_ledger *ledger, uint32_t node)
 {
     struct host_job *job = &ledger->job[node];
-    if (job->committed != job->last - job->first) {
+    if (job->epoch == 0 || job->committed != job->last - job->first) {
         return -1;
     }
-    job->finished = true;
+    job->epoch = 0;
     return 0;
 }
 
@@ -91,22 +131,23 @@ static uint32_t owner(const struct host_order *order, const uint32_t v[4])
     return smallest / INCODE_BRICK_POINTS;
 }
 
-uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t node,
+uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t workers,
                              const struct host_order *order,
                              struct host_tetrahedra *tets)
 {
-    struct host_job *job = &ledger->job[node];
     uint64_t kept = 0, count = tets->count;
+    uint32_t left = ledger->bricks - ledger->committed;
     for (uint64_t i = 0; i < count; i++) {
-        uint32_t brick = owner(order, tets->v[i]);
-        bool lost = brick >= job->first && brick < job->last &&
-                    !host_ledger_committed(ledger, brick);
-        if (!lost) {
+        if (host_ledger_committed(ledger, owner(order, tets->v[i]))) {
             memmove(tets->v[kept], tets->v[i], sizeof tets->v[0]);
             kept++;
         }
     }
     host_tetrahedra_cut(tets, kept);
-    job->epoch = 0;
+    for (uint32_t i = 0; i < ledger->nodes; i++) {
+        ledger->job[i].epoch = 0;
+    }
+    ledger->cursor = 0;
+    ledger->piece_max = workers <= 1 ? left : left / (PIECES * workers) + 1;
     return count - kept;
 }

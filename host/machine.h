@@ -36,7 +36,13 @@ struct host_machine {
     /* Looks after the nodes, and starts again those that it started itself and
      * that died.  0, or HOST_CUBE where the cube cannot go on. */
     int (*check)(void *context, struct host_error *error);
-    /* Whether every node has ended: true as well where nothing tells. */
+    /* How many nodes `check` has started again so far; NULL: it never does. */
+    unsigned (*restarts)(void *context);
+    /* Ends a node that does not answer, for `check` to start it again; false,
+     * as where it is NULL: the node is not this machine's to start. */
+    bool (*kill)(void *context, unsigned node);
+    /* Whether every node has ended: true as well where nothing tells.  Called
+     * at the end, when no node is to be started again. */
     bool (*ended)(void *context);
     /* Ends what still runs and was started here. */
     void (*stop)(void *context);

@@ -45,6 +45,7 @@ void host_run_defaults(struct host_run_options *options)
     options->index = INCODE_KD;
     options->face_rule = INCODE_FACE_OWN;
     options->memory = 4u << 20;
+    options->patience_s = 60;
     options->progress = true;
 }
 
@@ -97,12 +98,14 @@ static void gather_reports(const struct host_service *service,
     memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
     r->retransmitted = service->retransmitted;
     r->faces_spilled = service->spill.faces_total;
+    r->restarts = service->restarts;
+    r->generations = service->generations;
     for (unsigned i = 0; i < r->nodes; i++) {
         const struct node_finished_message *f = &r->node[i].statistics;
         const struct incode_statistics *s = &f->statistics;
         double wall = 1e-6 * (double)f->wall_us;
         r->retransmitted += f->retransmitted;
-        if (i >= service->workers) {
+        if (i >= service->workers && s->vertices == 0) {
             continue;
         }
         r->t_min_s = i == 0 || wall < r->t_min_s ? wall : r->t_min_s;
@@ -200,6 +203,7 @@ int host_triangulate_on(const struct host_run_options *options,
         service.machine = &slowed;
     }
     service.window = options->window;
+    service.patience_us = options->patience_s * UINT64_C(1000000);
     service.show_progress = options->progress && !options->quiet;
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);

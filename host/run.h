@@ -34,7 +34,8 @@ struct host_run_options {
     enum host_wire_kind link;
     unsigned nodes; /* 0: what suits this machine */
     uint64_t memory;
-    const char *stats; /* a file for the statistics, or NULL */
+    uint64_t patience_s; /* for a node that does not answer */
+    const char *stats;   /* a file for the statistics, or NULL */
     bool verify, quiet, progress, table, map;
     /* For tests. */
     unsigned window;
@@ -59,6 +60,7 @@ struct host_run_result {
     uint64_t host_peak_bytes;
     uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
     uint64_t retransmitted, faces_spilled;
+    unsigned restarts, generations; /* of nodes; of the cube's wiring */
     uint64_t candidates, candidates_histogram[24];
     uint64_t vertices, vertices_waited;
     int socket_send_bytes, socket_receive_bytes; /* buffers of a wire's end */

@@ -1,15 +1,17 @@
 #include "service.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "../transport/wiring.h"
 #include "intake.h"
+#include "watch.h"
 
 enum {
     WINDOW_DEFAULT = 32,
-    CHECK_EVERY_US = 20000, /* looks after the nodes' lives */
-    WIRE_LOST_US = 2000000,
-    BRING_UP_US_MAX = 9000000,
+    IDLE_US_MAX = 20000,
+    PATIENCE_US = 60000000,
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
     CREDITS_SHARED = 128
@@ -32,6 +34,8 @@ static int make_cube(struct host_service *s, struct host_error *error)
     }
     config.epoch = s->machine->epoch;
     config.pipes[0] = s->machine->pipe;
+    config.pipes[1] = s->machine->spare;
+    config.spare_node = s->machine->spare_node;
     size_t bytes = cube_arena_bytes(&config);
     s->cube_memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
     if (s->cube_memory == NULL) {
@@ -52,31 +56,7 @@ static void wait_for_wire(struct host_service *s, uint64_t now_us)
 {
     uint64_t due = cube_next_due_us(s->cube, now_us);
     s->machine->idle(s->machine->context,
-                     due > CHECK_EVERY_US ? CHECK_EVERY_US : due);
-}
-
-/* Whether nodes live, and the wire to node 0 holds.  A wire that closes is as a
- * rule that of a node about to be reaped: it is given a moment. */
-static int check(struct host_service *s, uint64_t now_us,
-                 struct host_error *error)
-{
-    if (now_us < s->check_us) {
-        return 0;
-    }
-    s->check_us = now_us + CHECK_EVERY_US;
-    if (cube_link_state(s->cube, 0) != LINK_DOWN) {
-        s->wire_seen_us = now_us;
-    }
-    if (s->machine->check(s->machine->context, error) != 0) {
-        return error->code;
-    }
-    if (now_us - s->wire_seen_us > WIRE_LOST_US) {
-        return host_fail(error, HOST_CUBE,
-                         "node 0 link %u: the wire to the host is closed; run "
-                         "again, and look for what closed it",
-                         s->machine->dimension);
-    }
-    return 0;
+                     due > IDLE_US_MAX ? IDLE_US_MAX : due);
 }
 
 /* Reads all that has come: bytes first, then messages. */
@@ -93,6 +73,14 @@ static int read_all(struct host_service *s, unsigned *moved,
     return status;
 }
 
+static bool send_letter(struct host_service *s, uint16_t to, uint8_t type,
+                        const void *data, size_t size)
+{
+    bool sent = cube_write(s->cube, to, type, data, size) == 0;
+    s->node[to].sent += sent;
+    return sent;
+}
+
 static bool send_page(struct host_service *s, uint16_t to)
 {
     struct {
@@ -102,7 +90,7 @@ static bool send_page(struct host_service *s, uint16_t to)
     struct host_node *node = &s->node[to];
     body.page = node->pages[node->pages_first];
     size_t size = host_page(s->order, body.page, body.data);
-    if (cube_write(s->cube, to, NODE_PAGE, &body, 4 + size) != 0) {
+    if (!send_letter(s, to, NODE_PAGE, &body, 4 + size)) {
         return false;
     }
     node->pages_first = (node->pages_first + 1) % HOST_PAGES_QUEUED_MAX;
@@ -134,31 +122,147 @@ static bool send_unspill(struct host_service *s, uint16_t to,
         node->unspills_first = (node->unspills_first + 1) % HOST_UNSPILLS_MAX;
         node->unspills_count--;
     }
-    return cube_write(s->cube, to, NODE_UNSPILL, &body,
-                      sizeof body.header +
-                          body.header.count * sizeof body.faces[0]) == 0;
+    return send_letter(s, to, NODE_UNSPILL, &body,
+                       sizeof body.header +
+                           body.header.count * sizeof body.faces[0]);
 }
+
+/* --- jobs ----------------------------------------------------------------- */
+
+/* Whether the node computes: all do, or in the strategy `sequential` the first
+ * that is there. */
+static bool computes(const struct host_service *s, unsigned node)
+{
+    if (s->node[node].lost) {
+        return false;
+    }
+    for (unsigned i = 0; s->workers == 1 && i < node; i++) {
+        if (!s->node[i].lost) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void give_job(struct host_service *s, unsigned to,
+                     const struct incode_job *job)
+{
+    struct host_node *node = &s->node[to];
+    node->job.job = *job;
+    node->job.epoch = host_ledger_open(&s->ledger, to, job->first, job->last);
+    node->job_due = true;
+    node->working = true;
+    node->reported = false;
+    s->working++;
+}
+
+/* Bricks [first, last), and the box of their points. */
+static struct incode_job job_of(const struct host_order *order, uint32_t first,
+                                uint32_t last)
+{
+    struct incode_job job = {.first = first, .last = last};
+    for (int k = 0; k < 3; k++) {
+        job.lo[k] = INFINITY;
+        job.hi[k] = -INFINITY;
+    }
+    for (uint32_t v = first * INCODE_BRICK_POINTS;
+         v < last * INCODE_BRICK_POINTS; v++) {
+        double p[3];
+        host_vertex(order, v, p);
+        for (int k = 0; k < 3; k++) {
+            job.lo[k] = p[k] < job.lo[k] ? p[k] : job.lo[k];
+            job.hi[k] = p[k] > job.hi[k] ? p[k] : job.hi[k];
+        }
+    }
+    return job;
+}
+
+/* The next range of bricks, for a node that has nothing to do. */
+static void give_next(struct host_service *s, unsigned to)
+{
+    uint32_t first, last;
+    if (computes(s, to) &&
+        host_ledger_next(&s->ledger, s->order, &first, &last)) {
+        struct incode_job job = job_of(s->order, first, last);
+        give_job(s, to, &job);
+    }
+}
+
+/* Every node has its setup: the first jobs.  As long as nothing is done and
+ * nobody lost, each node has its region. */
+static void deal(struct host_service *s)
+{
+    s->dealt = true;
+    if (s->ledger.committed > 0 || s->living < s->machine->nodes) {
+        return; /* serve_node gives ranges */
+    }
+    for (unsigned i = 0; i < s->workers; i++) {
+        const struct host_region *region = &s->order->region[i];
+        struct incode_job job = {.first = region->first, .last = region->last};
+        memcpy(job.lo, region->lo, sizeof region->lo);
+        memcpy(job.hi, region->hi, sizeof region->hi);
+        give_job(s, i, &job);
+    }
+    s->ledger.cursor = s->ledger.bricks;
+}
+
+/* Begins with the nodes as after their start: nothing is out, nothing asked
+ * for, and each has to have its setup. */
+static void set_up(struct host_service *s)
+{
+    bool all = s->living == s->machine->nodes;
+    s->setup.holders = (uint16_t)(all ? s->machine->nodes - s->workers : 0);
+    s->dealt = false;
+    s->working = 0;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct host_node *node = &s->node[i];
+        node->pages_first = node->pages_count = 0;
+        node->unspills_first = node->unspills_count = 0;
+        node->results = 0;
+        node->credit = s->setup.credits;
+        node->setup_due = true;
+        node->job_due = node->report_due = false;
+        node->working = node->reported = false;
+    }
+}
+
+/* --- the loop ------------------------------------------------------------- */
 
 /* The next message that is due to this node; false: none, or no room. */
 static bool serve_node(struct host_service *s, uint16_t to,
                        struct host_error *error)
 {
     struct host_node *node = &s->node[to];
-    /* A broadcast and a letter go different ways: jobs wait until every node
-     * has its setup. */
-    if (node->job_due && s->ready == s->machine->nodes) {
-        node->job_due = cube_write(s->cube, to, NODE_JOB, &node->job,
-                                   sizeof node->job) != 0;
+    if (node->lost) {
+        return false;
+    }
+    if (node->call_due) {
+        return host_watch_call(s, to);
+    }
+    if (!s->started || !s->report[to].here) {
+        return false; /* what goes before the first answer may get lost */
+    }
+    if (node->setup_due) {
+        node->setup_due =
+            !send_letter(s, to, NODE_SETUP, &s->setup, sizeof s->setup);
+        return !node->setup_due;
+    }
+    if (s->dealt && !node->working) {
+        give_next(s, to);
+    }
+    if (node->job_due) {
+        node->job_due =
+            !send_letter(s, to, NODE_JOB, &node->job, sizeof node->job);
         return !node->job_due;
     }
     if (node->report_due) {
-        node->report_due = cube_write(s->cube, to, NODE_REPORT, NULL, 0) != 0;
+        node->report_due = !send_letter(s, to, NODE_REPORT, NULL, 0);
         return !node->report_due;
     }
     /* Half of the credit back at a time. */
     uint32_t credit = node->results + s->setup.credits;
     if (credit - node->credit >= s->setup.credits / 2) {
-        if (cube_write(s->cube, to, NODE_CREDIT, &credit, sizeof credit) != 0) {
+        if (!send_letter(s, to, NODE_CREDIT, &credit, sizeof credit)) {
             return false;
         }
         node->credit = credit;
@@ -174,14 +278,6 @@ static bool serve_node(struct host_service *s, uint16_t to,
 static unsigned serve(struct host_service *s, struct host_error *error)
 {
     unsigned sent = 0, idle = 0;
-    if (s->setup_due) {
-        if (cube_write(s->cube, CUBE_ALL, NODE_SETUP, &s->setup,
-                       sizeof s->setup) != 0) {
-            return 0;
-        }
-        s->setup_due = false;
-        sent++;
-    }
     while (idle < s->machine->nodes && error->code == 0) {
         if (serve_node(s, (uint16_t)s->turn, error)) {
             sent++;
@@ -204,6 +300,61 @@ static bool pages_wait(const struct host_service *s)
     return false;
 }
 
+/* --- generations ---------------------------------------------------------- */
+
+/* The node by which the host speaks from now on: as before, or the other one
+ * that has a wire to the host. */
+static uint16_t choose_gate(const struct host_service *s,
+                            const struct cube_wiring *next)
+{
+    unsigned dimension = s->machine->dimension;
+    uint16_t other = next->gate != 0 ? 0 : s->machine->spare_node;
+    bool dead = wiring_is_dead(next, next->dead_count, next->gate, dimension,
+                               dimension);
+    return dead ? other : next->gate;
+}
+
+/* After a loss: all nodes begin again, with what is not committed. */
+static int renew(struct host_service *s, uint64_t now_us,
+                 struct host_error *error)
+{
+    struct cube_wiring next = *cube_wiring(s->cube);
+    unsigned dimension = s->machine->dimension;
+    s->loss = false;
+    if (s->started && s->ledger.committed == s->ledger.bricks) {
+        s->over = true; /* nothing is lost that is needed */
+        return 0;
+    }
+    next.generation++;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct cube_dead dead = {(uint16_t)i, CUBE_WHOLE_NODE};
+        if (s->node[i].given_up) {
+            (void)wiring_add_dead(&next, dead, dimension);
+        }
+    }
+    next.gate = choose_gate(s, &next);
+    cube_renew(s->cube, &next);
+    s->generations++;
+    host_watch_begin(s, now_us);
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (i == next.gate ? s->node[i].lost
+                           : s->node[i].given_up && !s->node[i].lost) {
+            return host_fail(error, HOST_CUBE,
+                             "node %u link %u: lost, and the cube does not go "
+                             "on without it; look after that node and its "
+                             "wires, and run again",
+                             i, host_watch_link(s, i));
+        }
+    }
+    if (s->started) {
+        unsigned workers = s->workers == 1 ? 1 : s->living;
+        (void)host_ledger_abandon(&s->ledger, workers, s->order, s->tets);
+        host_spill_clear(&s->spill);
+        set_up(s);
+    }
+    return 0;
+}
+
 /* One round of the loop: read, serve, and sleep where nothing moved. */
 static int round_trip(struct host_service *s, struct host_error *error)
 {
@@ -212,14 +363,15 @@ static int round_trip(struct host_service *s, struct host_error *error)
     if (read_all(s, &moved, error) != 0) {
         return error->code;
     }
-    if (s->started) {
-        bool pages = pages_wait(s);
-        uint64_t begun = pages ? now_of(s) : 0;
-        moved += serve(s, error);
-        s->pages_us += pages ? now_of(s) - begun : 0;
-    }
-    if (error->code != 0 || check(s, now, error) != 0) {
+    bool pages = s->started && pages_wait(s);
+    uint64_t begun = pages ? now_of(s) : 0;
+    moved += serve(s, error);
+    s->pages_us += pages ? now_of(s) - begun : 0;
+    if (error->code != 0 || host_watch_check(s, now, error) != 0) {
         return error->code;
+    }
+    if (s->loss) {
+        return renew(s, now, error);
     }
     if (moved == 0) {
         wait_for_wire(s, now);
@@ -229,66 +381,59 @@ static int round_trip(struct host_service *s, struct host_error *error)
 
 int host_service_start(struct host_service *service, struct host_error *error)
 {
-    uint64_t start = now_of(service);
-    service->wire_seen_us = start;
-    service->spill.file = -1;
-    service->node = calloc(service->machine->nodes, sizeof *service->node);
-    service->report = calloc(service->machine->nodes, sizeof *service->report);
-    if (service->node == NULL || service->report == NULL) {
+    struct host_service *s = service;
+    s->spill.file = -1;
+    s->patience_us = s->patience_us == 0 ? PATIENCE_US : s->patience_us;
+    s->node = calloc(s->machine->nodes, sizeof *s->node);
+    s->report = calloc(s->machine->nodes, sizeof *s->report);
+    if (s->node == NULL || s->report == NULL) {
         return host_fail_memory(error, "the nodes' queues");
     }
-    if (make_cube(service, error) != 0) {
+    if (make_cube(s, error) != 0) {
         return error->code;
     }
-    bool called = false;
-    while (service->here < service->machine->nodes) {
-        called = called ||
-                 cube_write(service->cube, CUBE_ALL, NODE_CALL, NULL, 0) == 0;
-        if (round_trip(service, error) != 0) {
+    s->generations = 1;
+    s->check_us = s->wire_down_us = now_of(s);
+    host_watch_begin(s, s->check_us);
+    while (s->here < s->living) {
+        if (round_trip(s, error) != 0) {
             return error->code;
-        }
-        if (now_of(service) - start > BRING_UP_US_MAX ||
-            cube_link_state(service->cube, 0) == LINK_REFUSED) {
-            return host_fail(error, HOST_CUBE,
-                             "node 0 link %u: %u of %u nodes answer; is "
-                             "incode-node of this version, and the machine "
-                             "not too busy?",
-                             service->machine->dimension, service->here,
-                             service->machine->nodes);
         }
     }
     return 0;
 }
 
-/* One job a worker: its region, or all bricks where there is one region. */
+/* What is the same in all generations. */
 static void prepare(struct host_service *s)
 {
     const struct host_order *order = s->order;
     s->setup.protocol = NODE_PROTOCOL;
     s->setup.nodes = (uint16_t)s->machine->nodes;
-    s->setup.holders = (uint16_t)(s->machine->nodes - s->workers);
     s->setup.credits = CREDITS_MIN + CREDITS_SHARED / s->machine->nodes;
     s->setup.setup.bricks = order->bricks;
     memcpy(s->setup.setup.lo, order->lo, sizeof order->lo);
     memcpy(s->setup.setup.hi, order->hi, sizeof order->hi);
     memcpy(s->setup.setup.cells, order->cells, sizeof order->cells);
+    s->started = true;
+}
+
+/* Statistics of all that nodes have done, from those who have not told. */
+static void ask_for_reports(struct host_service *s)
+{
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
-        node->credit = s->setup.credits;
-        node->job_due = i < s->workers;
-        if (node->job_due) {
-            const struct host_region *region = &order->region[i];
-            struct incode_job *job = &node->job.job;
-            job->first = region->first;
-            job->last = region->last;
-            memcpy(job->lo, region->lo, sizeof region->lo);
-            memcpy(job->hi, region->hi, sizeof region->hi);
-            node->job.epoch =
-                host_ledger_open(&s->ledger, i, job->first, job->last);
+        node->report_due = !node->lost && !node->reported;
+    }
+}
+
+static bool all_reported(const struct host_service *s)
+{
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->node[i].lost && !s->node[i].reported) {
+            return false;
         }
     }
-    s->setup_due = true;
-    s->started = true;
+    return true;
 }
 
 int host_service_run(struct host_service *service, struct host_error *error)
@@ -300,44 +445,50 @@ int host_service_run(struct host_service *service, struct host_error *error)
         return error->code;
     }
     prepare(s);
+    set_up(s);
     host_progress_start(&s->progress, s->show_progress);
     bool asked = false;
-    while (s->done < s->machine->nodes) {
+    while (!s->over && !(asked && all_reported(s))) {
         if (round_trip(s, error) != 0) {
             host_progress_end(&s->progress);
             return error->code;
         }
-        if (!asked && s->done == s->workers) {
-            for (unsigned i = s->workers; i < s->machine->nodes; i++) {
-                s->node[i].report_due = true;
-            }
+        if (!s->dealt && s->ready == s->living) {
+            deal(s);
+        }
+        if (!asked && s->ledger.committed == s->ledger.bricks &&
+            s->working == 0) {
+            ask_for_reports(s);
             asked = true;
         }
         host_progress_show(&s->progress, s->ledger.committed, s->ledger.bricks,
                            s->tets->count);
     }
     host_progress_end(&s->progress);
+    host_watch_end(s);
     s->retransmitted = cube_link_statistics(s->cube, 0)->retransmitted;
     s->finished = true;
-    if (s->ledger.committed != s->ledger.bricks) {
-        return host_fail(error, HOST_BROKEN,
-                         "host: %u bricks of %u committed; please report this "
-                         "with the points",
-                         s->ledger.committed, s->ledger.bricks);
-    }
     return 0;
+}
+
+/* Whether no node is there that has to hear the end. */
+static bool parted(const struct host_service *s)
+{
+    enum link_state state = cube_link_state(s->cube, 0);
+    return s->machine->ended(s->machine->context) &&
+           (s->machine->restarts != NULL || state == LINK_CLOSED ||
+            state == LINK_DOWN);
 }
 
 void host_service_end(struct host_service *service)
 {
     struct host_service *s = service;
-    uint64_t start = now_of(service);
+    uint64_t start = now_of(s);
     bool told = s->cube == NULL || !s->finished, closing = false;
     if (!s->finished) {
         s->machine->stop(s->machine->context); /* nothing to wait for */
     }
-    while (!told ||
-           (s->cube != NULL && !s->machine->ended(s->machine->context))) {
+    while (!told || (s->cube != NULL && !parted(s))) {
         uint64_t now = now_of(s);
         unsigned moved = (unsigned)cube_poll(s->cube, now);
         struct cube_message message;

@@ -3,6 +3,10 @@
  * watches over the nodes.  One loop, one thread; it never waits to write while
  * there is something to read.
  *
+ * On any loss (watch.h) it begins a new generation of the cube's wiring: every
+ * node drops its job and its role, uncommitted tetrahedra are dropped here, and
+ * their bricks are given out again, in ranges.
+ *
  * Memory: the cube's windows, 3 KiB a node, a bit a brick, the spilled faces
  * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
  *
@@ -34,13 +38,29 @@ struct host_node {
     uint32_t unspills_first, unspills_count;
     uint32_t results; /* messages taken */
     uint32_t credit;  /* messages allowed, as the node knows */
-    bool job_due, report_due, done;
+    /* What is to be sent, in this order. */
+    bool call_due, setup_due, job_due, report_due;
     struct node_job_message job;
+    bool working;  /* a job is out */
+    bool reported; /* statistics of all that it has done are here */
+    /* Whether it is there: watch.h. */
+    bool lost;     /* not reached in this generation: nothing is sent to it */
+    bool given_up; /* for the rest of the run */
+    bool calling;  /* a call has not been answered */
+    uint32_t sent, received; /* letters of this generation */
+    uint32_t missed;         /* calls that were lost before the first answer */
+    uint32_t start;          /* the epoch of its start; 0: not heard of */
+    uint64_t silent_us;      /* that it has not answered */
+    uint64_t called_us, call_again_us;
+    /* Statistics of starts that are over, and tetrahedra of the present one
+     * that no statistics know of yet. */
+    struct node_finished_message before;
+    uint64_t unreported;
 };
 
 /* What remains of a node when the run is over. */
 struct host_node_report {
-    bool here, ready, finished;
+    bool here, ready;
     struct node_ready_message map;
     struct node_finished_message statistics;
     uint64_t pages; /* that this node had from the host */
@@ -53,14 +73,17 @@ struct host_service {
     const struct host_order *order;
     struct host_tetrahedra *tets; /* takes rows of vertex numbers */
     struct node_setup_message setup;
-    unsigned window; /* frames; 0: a large one */
+    unsigned window;      /* frames; 0: a large one */
+    uint64_t patience_us; /* for a node that does not answer */
     bool show_progress;
-    /* One job a node: regions of the order; nodes beyond `workers` hold. */
+    /* Nodes that compute, one region of the order each; others hold pages. */
     unsigned workers;
     /* Results. */
     struct host_node_report *report; /* [nodes], until the end */
     uint64_t pages_us;               /* time spent on serving pages */
     uint64_t retransmitted;          /* frames, on the host's wire */
+    unsigned restarts;               /* of nodes, by the machine */
+    unsigned generations;            /* of the cube's wiring; 1: no loss */
     /* Private. */
     struct cube *cube;
     void *cube_memory;
@@ -68,11 +91,16 @@ struct host_service {
     struct host_ledger ledger;
     struct host_spill spill;
     struct host_progress progress;
-    bool setup_due, started, finished;
-    unsigned here, ready, done; /* nodes that are up; that have their setup;
-                                   that finished */
-    unsigned turn;              /* the node to be served next */
-    uint64_t check_us, wire_seen_us;
+    bool started, finished;
+    bool dealt;           /* the first jobs of this generation are out */
+    bool over;            /* all is here that is needed */
+    bool loss;            /* a new generation is due */
+    unsigned living;      /* nodes that are not lost */
+    unsigned here, ready; /* of them, that are up; that have their setup */
+    unsigned working;     /* that have a job */
+    unsigned turn;        /* the node to be served next */
+    unsigned call_turn;   /* to be called next */
+    uint64_t call_us, check_us, began_us, wire_down_us;
 };
 
 /* Brings up the cube on the machine's wire, and waits until every node has
@@ -80,7 +108,7 @@ struct host_service {
 int host_service_start(struct host_service *service, struct host_error *error);
 
 /* Hands out the setup and the jobs, and returns when every brick is committed
- * and every node has finished. */
+ * and every node has told its statistics. */
 int host_service_run(struct host_service *service, struct host_error *error);
 
 /* Tells the nodes to stop, ends those that do not, and frees all. */

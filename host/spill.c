@@ -36,6 +36,15 @@ int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
     return spill->table == NULL ? host_fail_memory(error, "spilled faces") : 0;
 }
 
+void host_spill_clear(struct host_spill *spill)
+{
+    memset(spill->table, 0, spill->table_size * sizeof *spill->table);
+    spill->table_used = 0;
+    spill->blocks_used = 0;
+    spill->free = HOST_SPILL_END;
+    spill->faces = 0;
+}
+
 void host_spill_free(struct host_spill *spill)
 {
     host_unmap(spill->blocks, spill->blocks_mapped * sizeof *spill->blocks);

@@ -41,6 +41,8 @@ struct host_spill {
 /* blocks_memory: 0 for the default, 64 MiB. */
 int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
                     struct host_error *error);
+/* Drops all lists. */
+void host_spill_clear(struct host_spill *spill);
 void host_spill_free(struct host_spill *spill);
 
 /* Appends faces to the lists of their bricks, v[0] / 64. */

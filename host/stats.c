@@ -129,6 +129,8 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "socket_send_bytes", (uint64_t)r->socket_send_bytes);
     put(o, "socket_receive_bytes", (uint64_t)r->socket_receive_bytes);
     put(o, "retransmitted_frames", r->retransmitted);
+    put(o, "node_restarts", r->restarts);
+    put(o, "generations", r->generations);
     for (unsigned i = 0; i < r->nodes; i++) {
         json_array_append_new(nodes, node_object(r, i));
     }

@@ -7,7 +7,7 @@
  * frame before the host is asked, the holder always reads what comes, and
  * nothing deadlocks.  Work: one pass over the queue a call.
  *
- *     node_holder_start(&holder, arena, bytes, cube, &setup, &why);
+ *     node_holder_start(&holder, arena, bytes, &letters, &setup, &why);
  *     node_holder_message(&holder, &message);
  *     moved = node_holder_send(&holder);
  */
@@ -18,6 +18,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "letters.h"
 #include "message.h"
 
 enum { NODE_HOLDER_QUEUE = 256 }; /* at least NODE_IN_FLIGHT_MAX */
@@ -31,7 +32,7 @@ struct node_holder_frame {
 };
 
 struct node_holder {
-    struct cube *cube;
+    struct node_letters *letters;
     uint32_t holders;
     struct node_holder_frame *frames;
     uint32_t frame_count, frames_used;
@@ -42,8 +43,8 @@ struct node_holder {
 };
 
 int node_holder_start(struct node_holder *holder, void *arena, size_t bytes,
-                      struct cube *cube, const struct node_setup_message *setup,
-                      const char **why);
+                      struct node_letters *letters,
+                      const struct node_setup_message *setup, const char **why);
 
 /* A message of type NODE_PAGE_REQUEST or NODE_PAGE. */
 void node_holder_message(struct node_holder *holder,

@@ -18,7 +18,7 @@
 #include "../transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 1,         /* both ends must agree */
+    NODE_PROTOCOL = 2,         /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64, /* page numbers in one NODE_PAGE_REQUEST */
     NODE_FAULT_TEXT_MAX = 200,
     NODE_FACES_A_MESSAGE = 128 /* faces in one NODE_SPILL or NODE_UNSPILL */
@@ -26,14 +26,14 @@ enum {
 
 enum node_message_type {
     /* From the host. */
-    NODE_SETUP = 1, /* struct node_setup_message, to all */
+    NODE_SETUP = 1, /* struct node_setup_message */
     NODE_JOB,       /* struct node_job_message */
     NODE_PAGE,      /* uint32 page, then its bytes; also from a holder */
     NODE_CREDIT,    /* uint32: NODE_RESULT messages allowed since the setup */
     NODE_UNSPILL,   /* struct node_spill_header, then faces */
-    NODE_REPORT,    /* nothing: asks a holder for NODE_FINISHED */
-    NODE_STOP,      /* nothing: the run is over */
-    NODE_CALL,      /* nothing, to all: asks for NODE_HERE */
+    NODE_REPORT,    /* nothing: asks for NODE_FINISHED, without a job */
+    NODE_STOP,      /* nothing, to all: the run is over */
+    NODE_CALL,      /* struct node_call_message: asks for NODE_HERE */
     /* To the host. */
     NODE_READY = 32,      /* struct node_ready_message */
     NODE_PAGE_REQUEST,    /* uint32 page numbers; also to a holder */
@@ -42,12 +42,26 @@ enum node_message_type {
     NODE_UNSPILL_REQUEST, /* struct node_spill_header */
     NODE_FINISHED,        /* struct node_finished_message */
     NODE_FAULT,           /* text without a final 0 */
-    NODE_HERE /* nothing: the node is up, and so is its way to the host */
+    NODE_HERE             /* struct node_here_message */
 };
 
 enum node_role {
     NODE_WORKS, /* triangulates the jobs that it is given */
     NODE_HOLDS  /* keeps pages for node 0 */
+};
+
+/* Letters are all that goes between the host and one node, NODE_STOP apart;
+ * both sides count them anew in each generation of the cube's wiring.  They
+ * arrive in order, so any that is missing has been lost for good. */
+struct node_call_message {
+    uint32_t sent; /* letters to this node before this one */
+};
+
+struct node_here_message {
+    uint32_t start;    /* the epoch of this start of the node */
+    uint32_t called;   /* `sent` of the call that is answered */
+    uint32_t received; /* letters from the host before that call */
+    uint32_t sent;     /* letters to the host before this one */
 };
 
 struct node_setup_message {
@@ -88,11 +102,12 @@ struct node_ready_message {
     struct node_map map;
 };
 
+/* Of all jobs and roles since the start of the node. */
 struct node_finished_message {
-    uint32_t epoch;
-    uint32_t reserved;
-    uint64_t wall_us; /* from the job's arrival to its last result */
-    uint64_t busy_us; /* processor time of the node since its start */
+    uint32_t epoch;   /* of the job that is done; 0: it is a report alone */
+    uint32_t start;   /* the epoch of this start of the node */
+    uint64_t wall_us; /* from each job's arrival to its last result */
+    uint64_t busy_us; /* processor time of the node */
     uint64_t bytes_in, bytes_out; /* payload of messages, at this node */
     uint64_t pages_held, pages_forwarded; /* as a holder of pages */
     uint64_t retransmitted;               /* frames on all links */

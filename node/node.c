@@ -4,6 +4,7 @@
 
 #include "../incode/check.h"
 #include "holder.h"
+#include "totals.h"
 #include "worker.h"
 
 enum { IDLE_MAX_US = 1000000, FAREWELL_US = 500000 };
@@ -18,8 +19,11 @@ struct node {
     enum node_role role;
     struct node_worker worker;
     struct node_holder holder;
-    uint32_t job_epoch;
+    uint32_t generation; /* of the wiring that this node has followed */
+    struct node_letters letters;
+    struct node_here_message here; /* the answer that is owed */
     bool owes_here, owes_ready, owes_report;
+    struct node_finished_message before; /* of roles of older generations */
     const char *fault;
     bool fault_sent;
     uint64_t now_us, stop_us;
@@ -104,6 +108,7 @@ struct node *node_start(const struct node_board *board, const char **why)
         *why = "the cube's description is not sound";
         return NULL;
     }
+    node->letters.cube = node->cube;
     return node;
 }
 
@@ -125,10 +130,10 @@ static void take_setup(struct node *n, const struct cube_message *message)
     n->role = self >= 1 && self <= setup.holders ? NODE_HOLDS : NODE_WORKS;
     if (n->role == NODE_HOLDS) {
         status = node_holder_start(&n->holder, n->role_memory, n->role_bytes,
-                                   n->cube, &setup, &why);
+                                   &n->letters, &setup, &why);
     } else {
         status = node_worker_start(&n->worker, n->role_memory, n->role_bytes,
-                                   n->cube, &setup, &why);
+                                   &n->letters, &setup, &why);
     }
     if (status != 0) {
         n->fault = why;
@@ -141,16 +146,27 @@ static void take_setup(struct node *n, const struct cube_message *message)
 static void take_job(struct node *n, const struct cube_message *message)
 {
     struct node_job_message job;
-    if (n->fault != NULL) {
+    /* After a fresh start: a letter that was sent to the one before. */
+    if (n->fault != NULL || !n->set_up) {
         return;
     }
-    if (!n->set_up || n->role != NODE_WORKS || message->size != sizeof job) {
-        n->fault = "a job before its setup";
+    if (n->role != NODE_WORKS || message->size != sizeof job) {
+        n->fault = "a job that is none";
         return;
     }
     memcpy(&job, message->data, sizeof job);
-    n->job_epoch = job.epoch;
     node_worker_job(&n->worker, &job, n->now_us);
+}
+
+static void take_call(struct node *n, const struct cube_message *message)
+{
+    struct node_call_message call;
+    if (message->size == sizeof call) {
+        memcpy(&call, message->data, sizeof call);
+        n->here.called = call.sent;
+        n->here.received = n->letters.received;
+        n->owes_here = true;
+    }
 }
 
 static void take_message(struct node *n, const struct cube_message *message)
@@ -166,7 +182,7 @@ static void take_message(struct node *n, const struct cube_message *message)
         n->owes_report = true;
         break;
     case NODE_CALL:
-        n->owes_here = true;
+        take_call(n, message);
         break;
     case NODE_STOP:
         n->stopping = true;
@@ -179,6 +195,8 @@ static void take_message(struct node *n, const struct cube_message *message)
             node_worker_message(&n->worker, message);
         }
     }
+    n->letters.received +=
+        message->source == CUBE_HOST && message->type != NODE_STOP;
 }
 
 static void fill_map(const struct node *n, struct node_map *map)
@@ -216,8 +234,16 @@ static bool send_ready(struct node *n)
     ready.protocol = NODE_PROTOCOL;
     ready.role = (uint32_t)n->role;
     fill_map(n, &ready.map);
-    return cube_write(n->cube, CUBE_HOST, NODE_READY, &ready, sizeof ready) ==
-           0;
+    return node_letters_write(&n->letters, CUBE_HOST, NODE_READY, &ready,
+                              sizeof ready) == 0;
+}
+
+static bool send_here(struct node *n)
+{
+    n->here.start = n->board->identity.epoch;
+    n->here.sent = n->letters.sent;
+    return node_letters_write(&n->letters, CUBE_HOST, NODE_HERE, &n->here,
+                              sizeof n->here) == 0;
 }
 
 static void link_totals(const struct node *n,
@@ -231,32 +257,62 @@ static void link_totals(const struct node *n,
     }
 }
 
-/* The statistics, where there is room for them on the link. */
-static bool send_finished(struct node *n)
+/* Adds what the role has done. */
+static void role_totals(const struct node *n, struct node_finished_message *sum)
 {
-    struct node_finished_message finished;
+    struct node_finished_message totals;
     size_t used = n->board->fixed_bytes + up64(sizeof *n) + n->cube_bytes;
+    memset(&totals, 0, sizeof totals);
+    if (n->role == NODE_HOLDS) {
+        totals.pages_held = n->holder.hits;
+        totals.pages_forwarded = n->holder.misses;
+        totals.bytes_in = n->holder.bytes_in;
+        totals.bytes_out = n->holder.bytes_out;
+        used += n->holder.frames_used * sizeof n->holder.frames[0];
+    } else {
+        node_worker_totals(&n->worker, &totals, n->now_us);
+        used += n->worker.outbox_bytes +
+                (size_t)totals.statistics.memory_high_water;
+    }
+    totals.memory_high_water = used;
+    node_totals_add(sum, &totals);
+}
+
+/* The statistics, where there is room for them on the link.  epoch: of the job
+ * that is done, or 0. */
+static bool send_finished(struct node *n, uint32_t epoch)
+{
+    struct node_finished_message finished = n->before;
     if (cube_room(n->cube, CUBE_HOST) == 0) {
         return false;
     }
-    memset(&finished, 0, sizeof finished);
-    finished.busy_us = n->board->busy_us(n->board->context);
+    role_totals(n, &finished);
     link_totals(n, &finished);
-    if (n->role == NODE_HOLDS) {
-        finished.pages_held = n->holder.hits;
-        finished.pages_forwarded = n->holder.misses;
-        finished.bytes_in = n->holder.bytes_in;
-        finished.bytes_out = n->holder.bytes_out;
-        used += n->holder.frames_used * sizeof n->holder.frames[0];
-    } else {
-        node_worker_finish(&n->worker, &finished, n->now_us);
-        used += n->worker.outbox_bytes +
-                (size_t)finished.statistics.memory_high_water;
-    }
-    finished.memory_high_water = used;
-    INCODE_ASSERT(cube_write(n->cube, CUBE_HOST, NODE_FINISHED, &finished,
-                             sizeof finished) == 0);
+    finished.busy_us = n->board->busy_us(n->board->context);
+    finished.epoch = epoch;
+    finished.start = n->board->identity.epoch;
+    INCODE_ASSERT(node_letters_write(&n->letters, CUBE_HOST, NODE_FINISHED,
+                                     &finished, sizeof finished) == 0);
     return true;
+}
+
+/* A new generation of the wiring: the host begins again with all nodes.  What
+ * this one had is of no use, but for what it knows of its work. */
+static void follow_wiring(struct node *n)
+{
+    uint32_t generation = cube_wiring(n->cube)->generation;
+    if (generation == n->generation) {
+        return;
+    }
+    if (n->set_up) {
+        role_totals(n, &n->before);
+    }
+    n->generation = generation;
+    n->set_up = false;
+    n->owes_here = n->owes_ready = n->owes_report = false;
+    n->fault = NULL;
+    n->fault_sent = false;
+    n->letters.received = n->letters.sent = 0;
 }
 
 /* Tells the host what is wrong, once.  The node goes on to pass messages of
@@ -267,8 +323,8 @@ static void send_fault(struct node *n)
     while (size < NODE_FAULT_TEXT_MAX && n->fault[size] != '\0') {
         size++;
     }
-    n->fault_sent =
-        cube_write(n->cube, CUBE_HOST, NODE_FAULT, n->fault, size) == 0;
+    n->fault_sent = node_letters_write(&n->letters, CUBE_HOST, NODE_FAULT,
+                                       n->fault, size) == 0;
 }
 
 static unsigned serve_role(struct node *n)
@@ -277,17 +333,19 @@ static unsigned serve_role(struct node *n)
     if (n->role == NODE_HOLDS) {
         moved += node_holder_send(&n->holder);
         n->fault = n->holder.fault;
-        if (n->owes_report && send_finished(n)) {
-            n->owes_report = false;
+    } else {
+        moved += node_worker_work(&n->worker);
+        moved += node_worker_send(&n->worker);
+        n->fault = n->worker.fault;
+        if (n->fault == NULL && node_worker_done(&n->worker) &&
+            send_finished(n, n->worker.epoch)) {
+            node_worker_end(&n->worker, n->now_us);
             moved++;
         }
-        return moved;
     }
-    moved += node_worker_work(&n->worker);
-    moved += node_worker_send(&n->worker);
-    n->fault = n->worker.fault;
-    if (n->fault == NULL && node_worker_done(&n->worker)) {
-        moved += send_finished(n);
+    if (n->owes_report && send_finished(n, 0)) {
+        n->owes_report = false;
+        moved++;
     }
     return moved;
 }
@@ -325,6 +383,7 @@ enum node_event node_step(struct node *node)
     struct cube_message message;
     node->now_us = node->board->now_us(node->board->context);
     unsigned moved = (unsigned)cube_poll(node->cube, node->now_us);
+    follow_wiring(node);
     while (cube_read(node->cube, &message)) {
         take_message(node, &message);
         cube_release(node->cube);
@@ -335,8 +394,7 @@ enum node_event node_step(struct node *node)
             send_fault(node);
         }
     } else if (node->owes_here) {
-        node->owes_here =
-            cube_write(node->cube, CUBE_HOST, NODE_HERE, NULL, 0) != 0;
+        node->owes_here = !send_here(node);
     } else if (node->set_up && node->owes_ready) {
         node->owes_ready = !send_ready(node);
     } else if (node->set_up) {

@@ -168,8 +168,8 @@ size_t node_worker_outbox_bytes(size_t memory)
 }
 
 int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
-                      struct cube *cube, const struct node_setup_message *setup,
-                      const char **why)
+                      struct node_letters *letters,
+                      const struct node_setup_message *setup, const char **why)
 {
     const struct incode_ports ports = {
         worker,      port_request, port_emit_room, port_emit,
@@ -184,7 +184,7 @@ int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
         *why = "the node's memory does not hold its outboxes";
         return -1;
     }
-    worker->cube = cube;
+    worker->letters = letters;
     worker->setup = *setup;
     worker->credit = setup->credits;
     worker->outbox_bytes = (uint32_t)boxes;
@@ -306,7 +306,7 @@ static void send_wanted(struct node_worker *w)
         uint32_t batch[NODE_PAGES_A_REQUEST];
         uint32_t count = 0, left = 0;
         uint16_t to = keeper(w, w->wanted[0]);
-        if (cube_room(w->cube, to) == 0) {
+        if (cube_room(w->letters->cube, to) == 0) {
             return;
         }
         for (uint32_t i = 0; i < w->wanted_count; i++) {
@@ -318,8 +318,8 @@ static void send_wanted(struct node_worker *w)
         }
         w->wanted_count = left;
         w->in_flight += count;
-        INCODE_ASSERT(cube_write(w->cube, to, NODE_PAGE_REQUEST, batch,
-                                 count * sizeof batch[0]) == 0);
+        INCODE_ASSERT(node_letters_write(w->letters, to, NODE_PAGE_REQUEST,
+                                         batch, count * sizeof batch[0]) == 0);
         w->bytes_out += count * sizeof batch[0];
     }
 }
@@ -328,8 +328,8 @@ static void send_wanted(struct node_worker *w)
 static bool send_first(struct node_worker *w, struct node_outbox *box)
 {
     const struct node_outbox_slot *slot = node_outbox_first(box);
-    if (slot == NULL || cube_write(w->cube, CUBE_HOST, slot->type, slot->data,
-                                   slot->size) != 0) {
+    if (slot == NULL || node_letters_write(w->letters, CUBE_HOST, slot->type,
+                                           slot->data, slot->size) != 0) {
         return false;
     }
     w->bytes_out += slot->size;
@@ -364,16 +364,21 @@ bool node_worker_done(const struct node_worker *worker)
            worker->in_flight == 0;
 }
 
-void node_worker_finish(struct node_worker *worker,
-                        struct node_finished_message *finished, uint64_t now_us)
+void node_worker_end(struct node_worker *worker, uint64_t now_us)
 {
-    const struct incode_statistics *statistics =
-        incode_triangulator_statistics(worker->triangulator);
-    finished->epoch = worker->epoch;
-    finished->wall_us = now_us - worker->start_us;
-    finished->bytes_in = worker->bytes_in;
-    finished->bytes_out = worker->bytes_out;
-    finished->statistics = *statistics;
+    worker->wall_us += now_us - worker->start_us;
     worker->working = false;
     worker->drained = false;
+}
+
+void node_worker_totals(const struct node_worker *worker,
+                        struct node_finished_message *totals, uint64_t now_us)
+{
+    totals->wall_us = worker->wall_us;
+    if (worker->working) {
+        totals->wall_us += now_us - worker->start_us;
+    }
+    totals->bytes_in = worker->bytes_in;
+    totals->bytes_out = worker->bytes_out;
+    totals->statistics = *incode_triangulator_statistics(worker->triangulator);
 }

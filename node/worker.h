@@ -7,13 +7,14 @@
  * triangulator.  Work: node_worker_work closes at most NODE_STEPS stars, and
  * node_worker_send sends what the link takes.
  *
- *     node_worker_start(&worker, arena, bytes, cube, &setup, &why);
+ *     node_worker_start(&worker, arena, bytes, &letters, &setup, &why);
  *     node_worker_job(&worker, &job, now_us);
  *     moved = node_worker_work(&worker) + node_worker_send(&worker, now_us);
  */
 #ifndef NODE_WORKER_H
 #define NODE_WORKER_H
 
+#include "letters.h"
 #include "outbox.h"
 #include "result.h"
 
@@ -28,13 +29,14 @@ enum {
 };
 
 struct node_worker {
-    struct cube *cube;
+    struct node_letters *letters;
     struct incode_triangulator *triangulator;
     struct node_setup_message setup;
-    uint32_t epoch; /* of the job */
-    bool working;   /* a job is open */
-    bool drained;   /* the triangulator is done, results still leave */
-    uint64_t start_us;
+    uint32_t epoch;    /* of the job */
+    bool working;      /* a job is open */
+    bool drained;      /* the triangulator is done, results still leave */
+    uint64_t start_us; /* of the job */
+    uint64_t wall_us;  /* of the jobs before */
     uint32_t wanted[NODE_WANTED_MAX];
     uint32_t wanted_count, in_flight;
     struct node_outbox results; /* leave under credit */
@@ -53,8 +55,8 @@ size_t node_worker_outbox_bytes(size_t memory);
 
 /* 0, or -1 where the memory does not suffice: *why says so. */
 int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
-                      struct cube *cube, const struct node_setup_message *setup,
-                      const char **why);
+                      struct node_letters *letters,
+                      const struct node_setup_message *setup, const char **why);
 
 void node_worker_job(struct node_worker *worker,
                      const struct node_job_message *job, uint64_t now_us);
@@ -72,9 +74,10 @@ unsigned node_worker_send(struct node_worker *worker);
 /* Whether every result has left and the statistics are due. */
 bool node_worker_done(const struct node_worker *worker);
 
-/* Fills in what the worker knows of the statistics, and ends the job. */
-void node_worker_finish(struct node_worker *worker,
-                        struct node_finished_message *finished,
-                        uint64_t now_us);
+void node_worker_end(struct node_worker *worker, uint64_t now_us);
+
+/* Fills in what the worker knows of the statistics of all its jobs. */
+void node_worker_totals(const struct node_worker *worker,
+                        struct node_finished_message *totals, uint64_t now_us);
 
 #endif

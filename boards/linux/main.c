@@ -191,7 +191,7 @@ int main(int argc, char **argv)
     board.identity.self = (uint16_t)straps.node;
     board.identity.dimension = (uint8_t)straps.dimension;
     board.identity.window = (uint8_t)straps.window;
-    board.identity.epoch = (uint32_t)(straps.epoch + straps.node);
+    board.identity.epoch = (uint32_t)straps.epoch;
     board.now_us = now_us;
     board.busy_us = busy_us;
     board.idle = idle;

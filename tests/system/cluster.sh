@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The cube as processes: what memory they hold, what happens when one is
-# stopped, killed or slow to read, and that none outlives the host.
+# stopped or slow to read, and that none outlives the host.  survival.sh kills
+# them.
 . tests/system/lib.sh
 
 points=$scratch/points.npy
@@ -36,20 +37,6 @@ check 'cluster/a node stopped for 10 s' "exit $status: \
 $(last "$scratch/errors")" test $status = 0
 check 'cluster/the same bytes after it' 'the output differs' \
     cmp -s "$scratch/first.npy" "$scratch/out.npy"
-
-start
-sleep 0.1
-began=$(date +%s)
-kill -KILL "$node"
-wait $host
-status=$?
-check 'cluster/a node killed: exit 4' "exit $status" test $status = 4
-check 'cluster/a node killed: it is named' "$(last "$scratch/errors")" \
-    grep -qE '^incode: node [0-7]: ' "$scratch/errors"
-check 'cluster/a node killed: within 10 s' 'it took longer' \
-    test $(($(date +%s) - began)) -le 10
-check 'cluster/a node killed: no output' 'it left one' \
-    test ! -e "$scratch/out.npy"
 
 start
 sleep 0.1

@@ -172,10 +172,81 @@ static void test_unfinished(void **unused)
     static struct node_finished_message finished;
     struct host_error error = {0};
     begin();
+    finished.epoch = service.ledger.job[2].epoch;
     assert_int_equal(send(2, NODE_FINISHED, &finished, sizeof finished, &error),
                      HOST_BROKEN);
     assert_non_null(strstr(error.text, "node 2: "));
-    assert_int_equal(service.done, 0);
+    assert_false(service.node[2].reported);
+    memset(&error, 0, sizeof error);
+    assert_int_equal(send(1, NODE_FINISHED, &finished, sizeof finished, &error),
+                     HOST_CUBE); /* that job is another node's */
+    end();
+}
+
+static void answer(uint32_t start, uint32_t called, uint32_t received,
+                   uint32_t sent)
+{
+    struct node_here_message here = {start, called, received, sent};
+    struct host_error error = {0};
+    assert_int_equal(send(1, NODE_HERE, &here, sizeof here, &error), 0);
+}
+
+/* Letters that are missing, either way, and another start are losses; calls
+ * that got lost before the first answer are none. */
+static void test_answers(void **unused)
+{
+    (void)unused;
+    static const struct {
+        uint32_t start, called, received, sent;
+        bool loss;
+    } then[] = {{7, 5, 3, 1, false}, {7, 5, 4, 1, true}, {7, 5, 2, 1, true},
+                {7, 5, 3, 2, true},  {7, 5, 3, 0, true}, {8, 5, 3, 1, true}};
+    for (size_t i = 0; i < sizeof then / sizeof then[0]; i++) {
+        begin();
+        answer(7, 3, 1, 0); /* two calls went astray */
+        assert_false(service.loss);
+        assert_int_equal(service.here, 1);
+        answer(then[i].start, then[i].called, then[i].received, then[i].sent);
+        assert_int_equal(service.loss, then[i].loss);
+        assert_int_equal(service.here, 1);
+        end();
+    }
+}
+
+/* Statistics replace those of the same start, and add to those of others; of
+ * what no statistics tell, the tetrahedra that came are counted. */
+static void test_starts(void **unused)
+{
+    (void)unused;
+    static struct node_finished_message told;
+    const struct incode_statistics *sum;
+    struct host_error error = {0};
+    uint8_t data[128];
+    begin();
+    sum = &service.report[1].statistics.statistics;
+    answer(7, 0, 0, 0);
+    told.start = 7;
+    told.statistics.make_tetra_calls = 50;
+    told.statistics.afl_max = 9;
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(send(1, NODE_FINISHED, &told, sizeof told, &error), 0);
+        assert_int_equal(sum->make_tetra_calls, 50);
+    }
+    size_t size =
+        batch(data, service.ledger.job[1].epoch, service.ledger.job[1].first);
+    assert_int_equal(send(1, NODE_RESULT, data, size, &error), 0);
+    service.report[1].here = false; /* a new generation */
+    service.node[1].received = 0;
+    answer(8, 0, 0, 0);
+    assert_int_equal(sum->make_tetra_calls, 51);
+    assert_int_equal(sum->tetrahedra_built, 1);
+    told.start = 8;
+    told.statistics.make_tetra_calls = 20;
+    told.statistics.afl_max = 4;
+    assert_int_equal(send(1, NODE_FINISHED, &told, sizeof told, &error), 0);
+    assert_int_equal(sum->make_tetra_calls, 71);
+    assert_int_equal(sum->afl_max, 9);
+    assert_true(service.node[1].reported);
     end();
 }
 
@@ -193,10 +264,9 @@ static void test_fault(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_any_bytes),
-        cmocka_unit_test(test_epochs),
-        cmocka_unit_test(test_unfinished),
-        cmocka_unit_test(test_fault),
+        cmocka_unit_test(test_any_bytes),  cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_unfinished), cmocka_unit_test(test_answers),
+        cmocka_unit_test(test_starts),     cmocka_unit_test(test_fault),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,0 +1,329 @@
+#include "watch.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "../transport/wiring.h"
+
+enum {
+    CHECK_EVERY_US = 20000,
+    ELAPSED_US_MAX = 100000,   /* a host that was stopped blames nobody */
+    CALLS_EVERY_US = 250000,   /* all nodes once, */
+    CALL_EVERY_US = 5000,      /* but no more than one node in this time */
+    CALL_AGAIN_US = 2000000,   /* a call may have been lost with a node; */
+    CALL_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
+    WIRE_DOWN_US_MAX = 8000000,
+    BRING_UP_US_MAX = 9000000
+};
+
+static unsigned wire_of(const struct host_service *s)
+{
+    uint16_t gate = cube_wiring(s->cube)->gate;
+    return gate != 0 && gate == s->machine->spare_node ? 1 : 0;
+}
+
+/* --- the beginning ------------------------------------------------------- */
+
+/* Nodes that the gate reaches over links that are not dead. */
+static void find_living(struct host_service *s)
+{
+    const struct cube_wiring *w = cube_wiring(s->cube);
+    unsigned dimension = s->machine->dimension, head = 0, tail = 0;
+    uint16_t queue[HOST_NODES_MAX];
+    bool gate_dead =
+        wiring_is_dead(w, w->dead_count, w->gate, dimension, dimension);
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        s->node[i].lost = gate_dead || i != w->gate;
+    }
+    if (!gate_dead) {
+        queue[tail++] = w->gate;
+    }
+    while (head < tail) {
+        unsigned node = queue[head++];
+        for (unsigned d = 0; d < dimension; d++) {
+            uint16_t other = (uint16_t)(node ^ 1u << d);
+            if (s->node[other].lost &&
+                !wiring_is_dead(w, w->dead_count, node, d, dimension)) {
+                s->node[other].lost = false;
+                queue[tail++] = other;
+            }
+        }
+    }
+    s->living = tail;
+}
+
+/* A start of a node is over.  Of what it did and no statistics tell, this much
+ * is known: it built the tetrahedra that it sent. */
+static void close_start(struct host_service *s, unsigned i)
+{
+    struct host_node *node = &s->node[i];
+    struct incode_statistics *sum = &s->report[i].statistics.statistics;
+    sum->tetrahedra_built += node->unreported;
+    sum->tetrahedra_kept += node->unreported;
+    sum->make_tetra_calls += node->unreported;
+    node->unreported = 0;
+    node->before = s->report[i].statistics;
+}
+
+void host_watch_begin(struct host_service *service, uint64_t now_us)
+{
+    struct host_service *s = service;
+    find_living(s);
+    s->loss = false;
+    s->here = s->ready = 0;
+    s->began_us = now_us;
+    s->call_us = now_us;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct host_node *node = &s->node[i];
+        node->call_due = !node->lost;
+        node->called_us = now_us;
+        node->calling = false;
+        node->call_again_us = CALL_AGAIN_US_MIN;
+        node->sent = node->received = node->missed = 0;
+        node->silent_us = 0;
+        s->report[i].here = s->report[i].ready = false;
+        if (node->lost) {
+            close_start(s, i);
+        }
+    }
+}
+
+void host_watch_end(struct host_service *service)
+{
+    for (unsigned i = 0; i < service->machine->nodes; i++) {
+        close_start(service, i);
+    }
+}
+
+/* --- calls and answers ---------------------------------------------------- */
+
+bool host_watch_call(struct host_service *service, uint16_t to)
+{
+    struct host_node *node = &service->node[to];
+    struct node_call_message call = {node->sent};
+    if (cube_write(service->cube, to, NODE_CALL, &call, sizeof call) != 0) {
+        return false;
+    }
+    node->sent++;
+    node->call_due = false;
+    node->calling = true;
+    return true;
+}
+
+int host_watch_answer(struct host_service *service,
+                      const struct cube_message *message,
+                      struct host_error *error)
+{
+    struct host_service *s = service;
+    struct host_node *node = &s->node[message->source];
+    struct host_node_report *report = &s->report[message->source];
+    struct node_here_message here;
+    if (message->size != sizeof here) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u: is here in another language; are host and "
+                         "node of one version? run make",
+                         message->source);
+    }
+    memcpy(&here, message->data, sizeof here);
+    if (!report->here) {
+        /* It has had nothing but calls yet.  The first of them may have gone
+         * to a link's end that was just about to start again. */
+        report->here = true;
+        s->here++;
+        node->missed = here.called - here.received;
+        node->call_again_us = CALL_AGAIN_US;
+        if (node->start != 0 && node->start != here.start) {
+            close_start(s, message->source);
+        }
+        node->start = here.start;
+    }
+    if (here.start != node->start ||
+        here.called - here.received != node->missed ||
+        here.sent != node->received) {
+        s->loss = true;
+    }
+    node->calling = false;
+    return 0;
+}
+
+/* Has each node called once a period, one after the other. */
+static void call_in_turn(struct host_service *s, uint64_t now_us)
+{
+    uint64_t every = CALLS_EVERY_US / s->machine->nodes;
+    every = every < CALL_EVERY_US ? CALL_EVERY_US : every;
+    for (unsigned i = 0; i < s->machine->nodes && now_us - s->call_us >= every;
+         i++) {
+        struct host_node *node = &s->node[s->call_turn];
+        if (!node->lost && !node->calling) {
+            node->call_due = true;
+            node->called_us = now_us;
+        }
+        s->call_turn = (s->call_turn + 1) % s->machine->nodes;
+        s->call_us += every;
+    }
+    if (now_us - s->call_us >= every) {
+        s->call_us = now_us;
+    }
+}
+
+/* --- what is wrong -------------------------------------------------------- */
+
+unsigned host_watch_link(const struct host_service *service, unsigned node)
+{
+    unsigned away = node ^ cube_wiring(service->cube)->gate;
+    return away == 0 ? service->machine->dimension
+                     : 31u - (unsigned)__builtin_clz(away);
+}
+
+static int fail_wrong(const struct cube_wrong *wrong, struct host_error *error)
+{
+    char peer[24] = "the host", expected[24] = "the host";
+    if (wrong->refusal != LINK_WRONG_WIRE) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u link %u: its peer is %s; run the same "
+                         "version of the program everywhere",
+                         wrong->node, wrong->link,
+                         wrong->refusal == LINK_WRONG_VERSION
+                             ? "of another version"
+                             : "made for other sizes of frames");
+    }
+    if (wrong->peer_node != CUBE_HOST) {
+        snprintf(peer, sizeof peer, "node %u", wrong->peer_node);
+    }
+    if (wrong->node != CUBE_HOST) {
+        snprintf(expected, sizeof expected, "node %u",
+                 wrong->node ^ 1u << wrong->link);
+    }
+    return host_fail(error, HOST_CUBE,
+                     "wiring: node %u link %u is wired to "
+                     "%s, expected %s; put that wire right",
+                     wrong->node, wrong->link, peer, expected);
+}
+
+static unsigned distance(const struct host_service *s, unsigned node)
+{
+    return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gate);
+}
+
+/* Gives up the nodes that patience has run out for: of those, the ones that
+ * are nearest to the gate, since the others speak through them. */
+static void give_up(struct host_service *s)
+{
+    unsigned nearest = UINT32_MAX;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (s->node[i].silent_us > s->patience_us && distance(s, i) < nearest) {
+            nearest = distance(s, i);
+        }
+    }
+    for (unsigned i = 0; i < s->machine->nodes && nearest != UINT32_MAX; i++) {
+        struct host_node *node = &s->node[i];
+        bool silent = node->silent_us > s->patience_us;
+        node->silent_us = silent ? 0 : node->silent_us;
+        if (silent && distance(s, i) == nearest &&
+            (s->machine->kill == NULL ||
+             !s->machine->kill(s->machine->context, i))) {
+            node->given_up = true;
+            s->loss = true;
+        }
+    }
+}
+
+static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
+{
+    bool enough = false;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct host_node *node = &s->node[i];
+        if (!node->lost && (node->calling || node->call_due)) {
+            node->silent_us += elapsed_us;
+            enough = enough || node->silent_us > s->patience_us;
+        }
+        if (node->calling && now_us - node->called_us >= node->call_again_us) {
+            node->call_due = true;
+            node->called_us = now_us;
+            node->call_again_us = 2 * node->call_again_us < CALL_AGAIN_US
+                                      ? 2 * node->call_again_us
+                                      : CALL_AGAIN_US;
+        }
+    }
+    if (enough) {
+        give_up(s);
+    }
+}
+
+static int check_wire(struct host_service *s, uint64_t now_us,
+                      struct host_error *error)
+{
+    unsigned wire = wire_of(s);
+    enum link_state state = cube_link_state(s->cube, wire);
+    uint16_t gate = cube_wiring(s->cube)->gate;
+    if (state == LINK_REFUSED) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u link %u: the host's wire leads to node %u "
+                         "link %u, or to another version of the program; put "
+                         "the wire right, or run make",
+                         gate, s->machine->dimension,
+                         cube_link_peer(s->cube, wire)->node,
+                         cube_link_peer(s->cube, wire)->port);
+    }
+    if (state != LINK_DOWN) {
+        s->wire_down_us = now_us;
+    }
+    if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX) {
+        s->node[gate].given_up = true;
+        s->loss = true;
+    }
+    return 0;
+}
+
+/* Nodes that have not answered since the generation began: as long as the
+ * machine would need to start them. */
+static int check_bring_up(const struct host_service *s, uint64_t now_us,
+                          struct host_error *error)
+{
+    uint64_t most =
+        s->machine->restarts != NULL ? BRING_UP_US_MAX : s->patience_us;
+    if (s->started || s->here == s->living || now_us - s->began_us <= most) {
+        return 0;
+    }
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->node[i].lost && !s->report[i].here) {
+            return host_fail(error, HOST_CUBE,
+                             "node %u link %u: no answer, %u of %u nodes are "
+                             "there; is the node's program of this version, "
+                             "and the machine not too busy?",
+                             i, host_watch_link(s, i), s->here,
+                             s->machine->nodes);
+        }
+    }
+    return 0;
+}
+
+int host_watch_check(struct host_service *service, uint64_t now_us,
+                     struct host_error *error)
+{
+    struct host_service *s = service;
+    const struct cube_wiring *wiring = cube_wiring(s->cube);
+    if (now_us - s->check_us < CHECK_EVERY_US) {
+        return 0;
+    }
+    uint64_t elapsed = now_us - s->check_us;
+    s->check_us = now_us;
+    if (s->machine->check(s->machine->context, error) != 0) {
+        return error->code;
+    }
+    if (wiring->wrong_count > 0) {
+        return fail_wrong(&wiring->wrong[0], error);
+    }
+    if (s->machine->restarts != NULL &&
+        s->machine->restarts(s->machine->context) != s->restarts) {
+        s->restarts = s->machine->restarts(s->machine->context);
+        s->loss = true;
+    }
+    s->loss = s->loss || wiring->dead_count > wiring->settled;
+    call_in_turn(s, now_us);
+    listen(s, now_us, elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX);
+    if (check_wire(s, now_us, error) != 0) {
+        return error->code;
+    }
+    return check_bring_up(s, now_us, error);
+}

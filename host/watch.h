@@ -1,0 +1,45 @@
+/* Whether all nodes are there, and have missed nothing.  Part of service.h.
+ *
+ * Each node is called in turn.  Its answer names its start and how many letters
+ * it has had and sent; another start than before, or a count that does not
+ * match, is a loss.  So is a node that the machine had to start again, a dead
+ * link that the cube has found, and a node that does not answer for the length
+ * of the service's patience: the machine ends it, if it can start it again, and
+ * it counts as lost otherwise.  A node that others speak through is blamed
+ * before them.
+ *
+ * Memory: none of its own.  Work: constant a message; one pass over the nodes
+ * at each check, every 20 ms.
+ *
+ *     host_watch_begin(service);
+ *     status = host_watch_answer(service, &message, &error);
+ *     status = host_watch_check(service, now_us, &error);
+ */
+#ifndef HOST_WATCH_H
+#define HOST_WATCH_H
+
+#include "service.h"
+
+/* A generation begins: who is living by the wiring, and all are called. */
+void host_watch_begin(struct host_service *service, uint64_t now_us);
+
+/* The run is over, for those too whose statistics have not come. */
+void host_watch_end(struct host_service *service);
+
+/* The link by which a node is reached first. */
+unsigned host_watch_link(const struct host_service *service, unsigned node);
+
+/* Sends the call that is due to a node; false: no room. */
+bool host_watch_call(struct host_service *service, uint16_t to);
+
+/* NODE_HERE. */
+int host_watch_answer(struct host_service *service,
+                      const struct cube_message *message,
+                      struct host_error *error);
+
+/* Sets service->loss where a new generation is due.  HOST_CUBE where the cube
+ * cannot go on. */
+int host_watch_check(struct host_service *service, uint64_t now_us,
+                     struct host_error *error);
+
+#endif

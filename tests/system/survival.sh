@@ -1,0 +1,157 @@
+#!/usr/bin/env bash
+# Nodes that are killed and stopped in mid-run, and nodes that cannot live: the
+# digest is that of the undisturbed run, or the run ends with status 4 and
+# leaves nothing.  Half a minute.
+. tests/system/lib.sh
+
+points=$scratch/points.npy
+"$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null
+"$INCODE" run "$points" -q --strategy sequential --nodes 1 \
+    --stats "$scratch/first.json" 2> "$scratch/errors"
+digest=$(stat_of "$scratch/first.json" digest)
+tetrahedra=$(stat_of "$scratch/first.json" tetrahedra)
+
+# start [OPTION...]: a run on 8 nodes in the background, $host its process.
+start() {
+    rm -f "$scratch/out.npy" "$scratch/stats.json"
+    "$INCODE" run "$points" -q --nodes 8 -o "$scratch/out.npy" \
+        --stats "$scratch/stats.json" "$@" 2> "$scratch/errors" &
+    host=$!
+}
+
+# The process of node I, once it is there.
+node_of() {
+    local pid words
+    for _ in $(seq 200); do
+        for pid in $(pgrep -P $host -x incode-node); do
+            { words=$(tr '\0' ' ' < "/proc/$pid/cmdline"); } 2> /dev/null
+            case $words in *"--node $1 "*) echo "$pid"; return ;; esac
+        done
+        kill -0 $host 2> /dev/null || return
+        sleep 0.005
+    done
+}
+
+# strike SIGNAL NODE: false where the run is over already.
+strike() {
+    local pid
+    pid=$(node_of "$2")
+    [ -n "$pid" ] && kill "-$1" "$pid" 2> /dev/null
+}
+
+plausible() {
+    jq -e ".tetrahedra == $tetrahedra and .duplication_factor >= 1 and
+        .make_tetra_calls >= .tetrahedra" "$scratch/stats.json" > "$scratch/said"
+}
+
+# survives NAME: the run in the background ends well, its digest is right, and
+# its statistics know of what was done twice.
+restarts=0
+survives() {
+    local status found
+    wait $host
+    status=$?
+    if [ $status != 0 ]; then
+        fail "survival/$1" "exit $status: $(last "$scratch/errors")"
+        return
+    fi
+    restarts=$((restarts + $(stat_of "$scratch/stats.json" node_restarts)))
+    found=$(stat_of "$scratch/stats.json" digest)
+    if [ "$found" != "$digest" ]; then
+        fail "survival/$1" "digest $found, not $digest"
+    else
+        check "survival/$1" 'the statistics cannot be' plausible
+    fi
+}
+
+# --- kill -9 -----------------------------------------------------------------
+
+for strategy in spatial sequential; do
+    for node in 0 1 2 3 4 5 6 7; do
+        start --strategy $strategy
+        node_of 7 > "$scratch/said"
+        sleep 0.0$((node + 2))
+        strike KILL $node
+        survives "kill -9 of node $node, $strategy"
+    done
+    for node in 0 5; do
+        start --strategy $strategy --index grid
+        sleep 0.3
+        strike KILL $node
+        survives "kill -9 of node $node, $strategy, grid"
+    done
+done
+check 'survival/they were killed in mid-run' "$restarts starts in 20 runs" \
+    test $restarts -ge 15
+
+start --strategy spatial
+for node in 0 3 3 6 0; do strike KILL $node; done
+survives 'five kills during bring-up'
+start --strategy spatial
+for node in 1 0 4 1; do
+    sleep 0.1
+    strike KILL $node
+done
+survives 'four kills, one after the other'
+start --strategy spatial --face-rule paper
+sleep 0.1
+for node in 2 7; do strike KILL $node; done
+survives 'two nodes at once, face rule paper'
+for delay in 0.25 0.3 0.35 0.4; do
+    start --strategy spatial
+    sleep $delay
+    strike KILL $((RANDOM % 8))
+    survives "a kill after $delay s, towards the end"
+done
+
+# --- kill -STOP --------------------------------------------------------------
+
+for strategy in spatial sequential; do
+    start --strategy $strategy
+    sleep 0.05
+    strike STOP 0
+    sleep 0.5
+    strike STOP 6
+    strike CONT 0
+    sleep 0.5
+    strike CONT 6
+    survives "kill -STOP and -CONT, $strategy"
+    check "survival/nobody was started again, $strategy" \
+        'a stopped node was given up' test \
+        "$(stat_of "$scratch/stats.json" node_restarts)" = 0
+done
+start --strategy spatial --patience 1
+sleep 0.05
+strike STOP 0
+strike STOP 5
+survives 'two nodes stopped for longer than --patience'
+check 'survival/they were started again' 'not both' test \
+    "$(stat_of "$scratch/stats.json" node_restarts)" -ge 2
+
+# --- it cannot go on ---------------------------------------------------------
+
+# hopeless NAME PROGRAM: exit 4 within 10 s, a node named, no output left.
+hopeless() {
+    local began=$SECONDS
+    refuses "survival/$1" 4 '^incode: node [0-7]' "$INCODE" run "$points" -q \
+        --nodes 8 --node-program "$2" -o "$scratch/left/out.npy"
+    check "survival/$1: within 10 s" "$((SECONDS - began)) s" \
+        test $((SECONDS - began)) -le 10
+}
+hopeless 'a node program that ends at once' /bin/false
+printf '#!/bin/sh\nkill -SEGV $$\n' > "$scratch/dies"
+printf '#!/bin/sh\nexec sleep 60\n' > "$scratch/mute"
+chmod +x "$scratch/dies" "$scratch/mute"
+hopeless 'a node program that a signal ends' "$scratch/dies"
+hopeless 'a node program that says nothing' "$scratch/mute"
+
+# A node that is killed whenever it comes up.
+start --strategy spatial
+while kill -0 $host 2> /dev/null; do strike KILL 3; done
+wait $host
+status=$?
+check 'survival/a node killed for ever: exit 4, named' \
+    "exit $status: $(last "$scratch/errors")" \
+    test $status = 4 -a -n "$(grep '^incode: node 3: ' "$scratch/errors")"
+check 'survival/a node killed for ever: no output' 'it left one' \
+    test ! -e "$scratch/out.npy"
