@@ -32,7 +32,12 @@ HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
 # V=1 shows every command.
 Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
-HOST_LIBS = -lserialport -ljansson -lnettle -lexpat -lz -lm
+HOST_LIBS = -lsodium -lserialport -ljansson -lnettle -lexpat -lz -lm
+
+# libsodium's own code is the same under either C library; its headers are
+# made visible to musl's compiler alone.
+NODE_LIBS = $(shell $(CC) -print-file-name=libsodium.a)
+NODE_INCLUDE = -I$(BUILD)/include
 
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
 # drivers, boards and the host have a system beneath them.
@@ -69,7 +74,7 @@ $(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 # Static, so that a node's data memory is what the node itself declares.
 $(BUILD)/incode-node: $(node_objects) $(BUILD)/libcore.a
 	$(say) LINK $@
-	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $^ -o $@
+	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $^ $(NODE_LIBS) -o $@
 
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
@@ -103,10 +108,14 @@ $(obj)/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(HOSTED) -MMD -MP -c $< -o $@
-$(BUILD)/node/%.o: %.c $(BUILD)/flags
+$(BUILD)/node/%.o: %.c $(BUILD)/flags $(BUILD)/include/sodium.h
 	@mkdir -p $(@D)
 	$(say) CC $<
-	$(Q)$(NODE_CC) $(BASE) -D_GNU_SOURCE= -MMD -MP -c $< -o $@
+	$(Q)$(NODE_CC) $(BASE) $(NODE_INCLUDE) -D_GNU_SOURCE= -MMD -MP -c $< -o $@
+$(BUILD)/include/sodium.h:
+	@mkdir -p $(@D)
+	@ln -sfn /usr/include/sodium $(@D)/sodium
+	@ln -sfn /usr/include/sodium.h $@
 
 unit: $(unit_tests)
 $(BUILD)/tests/%: $(obj)/tests/unit/%.o $(BUILD)/libhost.a $(BUILD)/libcore.a
@@ -217,7 +226,7 @@ help:
 # --- packages --------------------------------------------------------------
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-dev \
-	libjansson-dev libserialport-dev
+	libjansson-dev libserialport-dev libsodium-dev
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi

@@ -1,0 +1,97 @@
+/* Authenticated, fresh and secret bytes over a pipe that strangers can reach,
+ * beneath a link: both ends prove that they know the cube's key, and every
+ * record carries the next number of its direction under keys of this connection
+ * alone.  PROTOCOL.md has the bytes.  A record that is not the next one, or not
+ * of the peer's making, fails the connection; the link goes on over the next.
+ *
+ * The primitives are given: keyed BLAKE2b-256 and ChaCha20-Poly1305 (RFC 7693,
+ * RFC 8439), from a library that is known for them.
+ *
+ * Memory: struct secure_shake while a connection is not proven, struct
+ * secure_channel then.  Work: a shake hashes at most three short inputs and
+ * opens one empty record; a channel's function handles one record and calls the
+ * pipe at most three times.
+ *
+ *     secure_shake_init(&shake, suite, key, caller, nonce);
+ *     while ((status = secure_shake(&shake, &pipe)) == 0) wait;
+ *     if (status > 0) secure_channel_start(&channel, &shake, &pipe);
+ *     config.pipe = secure_channel_pipe(&channel);
+ */
+#ifndef TRANSPORT_SECURE_H
+#define TRANSPORT_SECURE_H
+
+#include "link.h"
+
+enum {
+    SECURE_KEY_BYTES = 32,
+    SECURE_NONCE_BYTES = 24,
+    SECURE_TAG_BYTES = 16,
+    SECURE_HEAD_BYTES = 4,    /* size, and its complement */
+    SECURE_RECORD_MAX = 2048, /* bytes of the link in a record */
+    SECURE_GREETING_BYTES = 32,
+    SECURE_PROOF_BYTES = SECURE_HEAD_BYTES + SECURE_TAG_BYTES,
+    SECURE_OPENING_BYTES = SECURE_GREETING_BYTES + SECURE_PROOF_BYTES,
+    SECURE_WIRE_MAX = SECURE_HEAD_BYTES + SECURE_RECORD_MAX + SECURE_TAG_BYTES
+};
+
+/* `size` bytes in, size + SECURE_TAG_BYTES out, or the other way round; in and
+ * out may be the same.  The nonce is 4 zero bytes and the counter, little-
+ * endian; ad: the record's head. */
+struct secure_suite {
+    void (*hash)(uint8_t out[SECURE_KEY_BYTES],
+                 const uint8_t key[SECURE_KEY_BYTES], const uint8_t *in,
+                 size_t size);
+    void (*seal)(uint8_t *out, const uint8_t *in, size_t size,
+                 const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
+                 const uint8_t key[SECURE_KEY_BYTES]);
+    bool (*open)(uint8_t *out, const uint8_t *in, size_t size,
+                 const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
+                 const uint8_t key[SECURE_KEY_BYTES]);
+};
+
+struct secure_keys {
+    uint8_t out[SECURE_KEY_BYTES], in[SECURE_KEY_BYTES];
+    uint64_t out_count, in_count;
+};
+
+struct secure_shake {
+    const struct secure_suite *suite;
+    const uint8_t *key; /* of the cube; stays the caller's */
+    bool caller, greeted, proven, failed;
+    struct secure_keys keys;
+    uint8_t out[SECURE_OPENING_BYTES], in[SECURE_OPENING_BYTES];
+    size_t out_begin, out_end, in_end;
+};
+
+/* caller: the end that made the connection.  nonce: never used before with this
+ * key by anyone; it need not be secret.  Random bytes will do. */
+void secure_shake_init(struct secure_shake *shake,
+                       const struct secure_suite *suite,
+                       const uint8_t key[SECURE_KEY_BYTES], bool caller,
+                       const uint8_t nonce[SECURE_NONCE_BYTES]);
+
+/* Moves bytes: 1 when the peer has proven itself and has what proves us, 0 not
+ * yet, -1 it does not know the key, or is gone. */
+int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe);
+
+struct secure_channel {
+    const struct secure_suite *suite;
+    struct link_pipe pipe; /* beneath */
+    struct secure_keys keys;
+    bool failed;
+    uint64_t records_in, records_out, refused;
+    size_t out_begin, out_end; /* sealed, not sent */
+    size_t in_end;             /* of a record that has come in part */
+    size_t plain_begin, plain_end;
+    uint8_t out[SECURE_WIRE_MAX], in[SECURE_WIRE_MAX];
+};
+
+/* Takes the keys of a shake that returned 1. */
+void secure_channel_start(struct secure_channel *channel,
+                          const struct secure_shake *shake,
+                          const struct link_pipe *pipe);
+
+/* LINK_PIPE_CLOSED from either function: this connection is over. */
+struct link_pipe secure_channel_pipe(struct secure_channel *channel);
+
+#endif
