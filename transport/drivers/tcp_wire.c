@@ -1,0 +1,362 @@
+#include "tcp_wire.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <time.h>
+#include <unistd.h>
+
+static uint64_t clock_us(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
+}
+
+/* --- addresses ----------------------------------------------------------- */
+
+int tcp_address_parse(struct tcp_address *address, const char *text)
+{
+    struct sockaddr_in *v4 = (struct sockaddr_in *)&address->to;
+    struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)&address->to;
+    char host[INET6_ADDRSTRLEN + 2], *end;
+    const char *colon = strrchr(text, ':');
+    memset(address, 0, sizeof *address);
+    if (colon == NULL || colon[1] < '0' || colon[1] > '9' ||
+        (size_t)(colon - text) >= sizeof host) {
+        return -1;
+    }
+    unsigned long port = strtoul(colon + 1, &end, 10);
+    if (*end != '\0' || port == 0 || port > 65535) {
+        return -1;
+    }
+    size_t length = (size_t)(colon - text);
+    memcpy(host, text, length);
+    host[length] = '\0';
+    if (length > 2 && host[0] == '[' && host[length - 1] == ']') {
+        host[length - 1] = '\0';
+        v6->sin6_family = AF_INET6;
+        v6->sin6_port = htons((uint16_t)port);
+        address->size = sizeof *v6;
+        return inet_pton(AF_INET6, host + 1, &v6->sin6_addr) == 1 ? 0 : -1;
+    }
+    v4->sin_family = AF_INET;
+    v4->sin_port = htons((uint16_t)port);
+    address->size = sizeof *v4;
+    return inet_pton(AF_INET, host, &v4->sin_addr) == 1 ? 0 : -1;
+}
+
+bool tcp_address_is_loopback(const struct tcp_address *address)
+{
+    const struct sockaddr_in *v4 = (const struct sockaddr_in *)&address->to;
+    const struct sockaddr_in6 *v6 = (const struct sockaddr_in6 *)&address->to;
+    if (address->to.any.sa_family == AF_INET6) {
+        return IN6_IS_ADDR_LOOPBACK(&v6->sin6_addr);
+    }
+    return address->to.any.sa_family == AF_INET &&
+           ntohl(v4->sin_addr.s_addr) >> 24 == 127;
+}
+
+void tcp_address_to_loopback(struct tcp_address *address)
+{
+    struct sockaddr_in *v4 = (struct sockaddr_in *)&address->to;
+    struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)&address->to;
+    if (address->to.any.sa_family == AF_INET6) {
+        v6->sin6_addr = in6addr_loopback;
+    } else {
+        v4->sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    }
+}
+
+/* --- connections that are not proven ------------------------------------- */
+
+static void drop(struct tcp_candidate *c)
+{
+    if (c->fd >= 0) {
+        close(c->fd);
+        c->fd = -1;
+    }
+}
+
+/* A free place, or that of the oldest. */
+static struct tcp_candidate *place(struct tcp_wire *wire)
+{
+    struct tcp_candidate *best = &wire->candidate[0];
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+        struct tcp_candidate *c = &wire->candidate[i];
+        if (c->fd < 0) {
+            return c;
+        }
+        best = c->since_us < best->since_us ? c : best;
+    }
+    drop(best);
+    wire->strangers++;
+    return best;
+}
+
+static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
+                  bool connected, uint64_t now_us)
+{
+    uint8_t nonce[SECURE_NONCE_BYTES];
+    if (wire->config.suite != NULL) {
+        if (getrandom(nonce, sizeof nonce, 0) != (ssize_t)sizeof nonce) {
+            close(fd);
+            return false;
+        }
+        secure_shake_init(&c->shake, wire->config.suite, wire->config.key,
+                          !wire->config.listens, nonce);
+    }
+    /* A peer that answers no more is a broken connection, in the end. */
+    unsigned silent_ms = TCP_SILENT_MS;
+    (void)setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &silent_ms,
+                     sizeof silent_ms);
+    c->fd = fd;
+    c->connected = connected;
+    c->since_us = now_us;
+    tcp_pipe_init(&c->pipe, fd);
+    return true;
+}
+
+static void accept_some(struct tcp_wire *wire, uint64_t now_us)
+{
+    for (unsigned i = 0; i < TCP_ACCEPTS_MAX; i++) {
+        int fd = accept4(wire->listener, NULL, NULL, SOCK_CLOEXEC);
+        if (fd < 0) {
+            return;
+        }
+        if (tcp_prepare(fd) != 0) {
+            close(fd);
+            continue;
+        }
+        (void)begin(wire, place(wire), fd, true, now_us);
+    }
+}
+
+/* A call that failed is made again after a pause, longer each time. */
+static void pause_calls(struct tcp_wire *wire, uint64_t now_us)
+{
+    uint64_t pause = 2 * wire->pause_us;
+    wire->pause_us = pause < TCP_PAUSE_MIN_US   ? TCP_PAUSE_MIN_US
+                     : pause > TCP_PAUSE_MAX_US ? TCP_PAUSE_MAX_US
+                                                : pause;
+    wire->call_us = now_us + wire->pause_us;
+}
+
+static void call(struct tcp_wire *wire, uint64_t now_us)
+{
+    const struct tcp_address *to = &wire->config.address;
+    int fd = socket(to->to.any.sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && tcp_prepare(fd) == 0) {
+        bool at_once = connect(fd, &to->to.any, to->size) == 0;
+        if (at_once || errno == EINPROGRESS) {
+            (void)begin(wire, &wire->candidate[0], fd, at_once, now_us);
+            return;
+        }
+    }
+    wire->fault = errno;
+    if (fd >= 0) {
+        close(fd);
+    }
+    pause_calls(wire, now_us);
+}
+
+/* Whether the call was answered: 1, 0 not yet, -1 no. */
+static int answered(struct tcp_wire *wire, struct tcp_candidate *c)
+{
+    struct pollfd wait = {c->fd, POLLOUT, 0};
+    int fault = 0;
+    socklen_t size = sizeof fault;
+    if (c->connected) {
+        return 1;
+    }
+    if (poll(&wait, 1, 0) == 0) {
+        return 0;
+    }
+    if (getsockopt(c->fd, SOL_SOCKET, SO_ERROR, &fault, &size) != 0 ||
+        fault != 0) {
+        wire->fault = fault;
+        return -1;
+    }
+    c->connected = true;
+    return 1;
+}
+
+/* The candidate becomes the connection. */
+static void promote(struct tcp_wire *wire, struct tcp_candidate *c)
+{
+    if (wire->tcp.fd >= 0) {
+        close(wire->tcp.fd);
+        wire->replaced = true;
+    }
+    wire->tcp = c->pipe;
+    c->fd = -1;
+    wire->connections++;
+    wire->pause_us = 0;
+    wire->fault = 0;
+    if (wire->config.suite != NULL) {
+        struct link_pipe beneath = tcp_link_pipe(&wire->tcp);
+        secure_channel_start(&wire->channel, &c->shake, &beneath);
+    }
+}
+
+static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
+                    uint64_t now_us)
+{
+    struct link_pipe pipe = tcp_link_pipe(&c->pipe);
+    uint64_t most = c->connected ? TCP_PROVE_US : TCP_CALL_US;
+    int status = answered(wire, c);
+    if (status > 0 && wire->config.suite != NULL) {
+        status = secure_shake(&c->shake, &pipe);
+    }
+    if (status > 0) {
+        promote(wire, c);
+    } else if (status < 0 || now_us - c->since_us > most) {
+        drop(c);
+        wire->strangers += wire->config.listens ? 1 : 0;
+        if (!wire->config.listens) {
+            pause_calls(wire, now_us);
+        }
+    }
+}
+
+static void tick(struct tcp_wire *wire)
+{
+    uint64_t now_us = clock_us();
+    if (wire->listener >= 0) {
+        accept_some(wire, now_us);
+    } else if (wire->tcp.fd < 0 && wire->candidate[0].fd < 0 &&
+               now_us >= wire->call_us) {
+        call(wire, now_us);
+    }
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+        if (wire->candidate[i].fd >= 0) {
+            look_at(wire, &wire->candidate[i], now_us);
+        }
+    }
+}
+
+/* --- the pipe ------------------------------------------------------------ */
+
+/* The connection is over: the next one begins. */
+static int broken(struct tcp_wire *wire)
+{
+    if (wire->tcp.fd >= 0) {
+        close(wire->tcp.fd);
+        tcp_pipe_init(&wire->tcp, -1);
+        pause_calls(wire, clock_us());
+    }
+    return LINK_PIPE_CLOSED;
+}
+
+static struct link_pipe inner(struct tcp_wire *wire)
+{
+    return wire->config.suite != NULL ? secure_channel_pipe(&wire->channel)
+                                      : tcp_link_pipe(&wire->tcp);
+}
+
+static int wire_send(void *context, const uint8_t *bytes, size_t size)
+{
+    struct tcp_wire *wire = context;
+    if (wire->tcp.fd < 0 || wire->replaced) {
+        return LINK_PIPE_CLOSED;
+    }
+    struct link_pipe pipe = inner(wire);
+    int sent = pipe.send(pipe.context, bytes, size);
+    return sent < 0 ? broken(wire) : sent;
+}
+
+static int wire_receive(void *context, uint8_t *bytes, size_t size)
+{
+    struct tcp_wire *wire = context;
+    tick(wire);
+    if (wire->tcp.fd < 0 || wire->replaced) {
+        wire->replaced = false;
+        return LINK_PIPE_CLOSED;
+    }
+    struct link_pipe pipe = inner(wire);
+    int got = pipe.receive(pipe.context, bytes, size);
+    return got < 0 ? broken(wire) : got;
+}
+
+struct link_pipe tcp_wire_pipe(struct tcp_wire *wire)
+{
+    return (struct link_pipe){wire, wire_send, wire_receive};
+}
+
+/* --- opening ------------------------------------------------------------- */
+
+static int listen_there(struct tcp_wire *wire)
+{
+    const struct tcp_address *at = &wire->config.address;
+    int on = 1;
+    int fd = socket(at->to.any.sa_family,
+                    SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd < 0) {
+        return -1;
+    }
+    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (tcp_prepare(fd) != 0 || bind(fd, &at->to.any, at->size) != 0 ||
+        listen(fd, 16) != 0) {
+        int reason = errno;
+        close(fd);
+        errno = reason;
+        return -1;
+    }
+    wire->listener = fd;
+    return 0;
+}
+
+int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
+{
+    memset(wire, 0, sizeof *wire);
+    wire->config = *config;
+    wire->listener = -1;
+    tcp_pipe_init(&wire->tcp, -1);
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+        wire->candidate[i].fd = -1;
+    }
+    if (config->suite == NULL && !tcp_address_is_loopback(&config->address)) {
+        errno = EACCES;
+        return -1;
+    }
+    return config->listens ? listen_there(wire) : 0;
+}
+
+void tcp_wire_close(struct tcp_wire *wire)
+{
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+        drop(&wire->candidate[i]);
+    }
+    if (wire->tcp.fd >= 0) {
+        close(wire->tcp.fd);
+        tcp_pipe_init(&wire->tcp, -1);
+    }
+    if (wire->listener >= 0) {
+        close(wire->listener);
+        wire->listener = -1;
+    }
+}
+
+unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
+{
+    unsigned used = 0;
+    short events = wire->tcp.fd < 0 ? 0 : tcp_events(&wire->tcp);
+    if (events != 0) {
+        fds[used++] = (struct pollfd){wire->tcp.fd, events, 0};
+    }
+    if (wire->listener >= 0) {
+        fds[used++] = (struct pollfd){wire->listener, POLLIN, 0};
+    }
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+        const struct tcp_candidate *c = &wire->candidate[i];
+        if (c->fd >= 0) {
+            events = c->connected ? tcp_events(&c->pipe) : POLLOUT;
+            fds[used++] = (struct pollfd){c->fd, events, 0};
+        }
+    }
+    return used;
+}
