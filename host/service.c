@@ -326,6 +326,12 @@ static int renew(struct host_service *s, uint64_t now_us,
         return 0;
     }
     next.generation++;
+    if (s->wire_lost) {
+        struct cube_dead dead = {next.gate, (uint8_t)dimension};
+        (void)wiring_add_dead(&next, dead, dimension);
+        s->wire_lost = false;
+        s->wire_down_us = now_us;
+    }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct cube_dead dead = {(uint16_t)i, CUBE_WHOLE_NODE};
         if (s->node[i].given_up) {
@@ -340,7 +346,7 @@ static int renew(struct host_service *s, uint64_t now_us,
         if (i == next.gate ? s->node[i].lost
                            : s->node[i].given_up && !s->node[i].lost) {
             return host_fail(error, HOST_CUBE,
-                             "node %u link %u: lost, and the cube does not go "
+                             "node %u link %u: lost, and the cube cannot go "
                              "on without it; look after that node and its "
                              "wires, and run again",
                              i, host_watch_link(s, i));

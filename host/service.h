@@ -95,6 +95,7 @@ struct host_service {
     bool dealt;           /* the first jobs of this generation are out */
     bool over;            /* all is here that is needed */
     bool loss;            /* a new generation is due */
+    bool wire_lost;       /* the one in use is dead */
     unsigned living;      /* nodes that are not lost */
     unsigned here, ready; /* of them, that are up; that have their setup */
     unsigned working;     /* that have a job */

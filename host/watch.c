@@ -3,8 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "../transport/wiring.h"
-
 enum {
     CHECK_EVERY_US = 20000,
     ELAPSED_US_MAX = 100000,   /* a host that was stopped blames nobody */
@@ -24,34 +22,6 @@ static unsigned wire_of(const struct host_service *s)
 
 /* --- the beginning ------------------------------------------------------- */
 
-/* Nodes that the gate reaches over links that are not dead. */
-static void find_living(struct host_service *s)
-{
-    const struct cube_wiring *w = cube_wiring(s->cube);
-    unsigned dimension = s->machine->dimension, head = 0, tail = 0;
-    uint16_t queue[HOST_NODES_MAX];
-    bool gate_dead =
-        wiring_is_dead(w, w->dead_count, w->gate, dimension, dimension);
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        s->node[i].lost = gate_dead || i != w->gate;
-    }
-    if (!gate_dead) {
-        queue[tail++] = w->gate;
-    }
-    while (head < tail) {
-        unsigned node = queue[head++];
-        for (unsigned d = 0; d < dimension; d++) {
-            uint16_t other = (uint16_t)(node ^ 1u << d);
-            if (s->node[other].lost &&
-                !wiring_is_dead(w, w->dead_count, node, d, dimension)) {
-                s->node[other].lost = false;
-                queue[tail++] = other;
-            }
-        }
-    }
-    s->living = tail;
-}
-
 /* A start of a node is over.  Of what it did and no statistics tell, this much
  * is known: it built the tetrahedra that it sent. */
 static void close_start(struct host_service *s, unsigned i)
@@ -68,13 +38,14 @@ static void close_start(struct host_service *s, unsigned i)
 void host_watch_begin(struct host_service *service, uint64_t now_us)
 {
     struct host_service *s = service;
-    find_living(s);
     s->loss = false;
-    s->here = s->ready = 0;
+    s->living = s->here = s->ready = 0;
     s->began_us = now_us;
     s->call_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
+        node->lost = !cube_reaches(s->cube, (uint16_t)i);
+        s->living += !node->lost;
         node->call_due = !node->lost;
         node->called_us = now_us;
         node->calling = false;
@@ -269,7 +240,7 @@ static int check_wire(struct host_service *s, uint64_t now_us,
         s->wire_down_us = now_us;
     }
     if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX) {
-        s->node[gate].given_up = true;
+        s->wire_lost = true;
         s->loss = true;
     }
     return 0;

@@ -13,6 +13,7 @@
 #ifndef NODE_BOARD_H
 #define NODE_BOARD_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -24,13 +25,16 @@ struct node_identity {
     uint8_t dimension; /* of the cube */
     uint8_t window;    /* frames a link and direction; 0: what suits memory */
     uint32_t epoch;    /* of this start, never repeated */
+    bool host_wire;    /* at link `dimension`; node 0 has it always */
+    uint32_t dead_us;  /* a link that is down or silent for so long is given up
+                          for the run; 0: never */
 };
 
 struct node_board {
     void *context;
     struct node_identity identity;
     /* Sends and receives bytes on link i: 0 .. dimension - 1 to the neighbours;
-     * node 0 has its host at link `dimension`. */
+     * node 0, and the one with host_wire, have the host at link `dimension`. */
     struct link_pipe pipes[CUBE_LINKS_MAX];
     /* Microseconds since any fixed time, never going back. */
     uint64_t (*now_us)(void *context);

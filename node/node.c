@@ -52,6 +52,8 @@ static struct cube_config configure(const struct node_identity *identity,
     config.window =
         identity->window != 0 ? identity->window : window_for(memory);
     config.epoch = identity->epoch;
+    config.host_wire = identity->host_wire;
+    config.dead_us = identity->dead_us;
     return config;
 }
 
@@ -249,9 +251,7 @@ static bool send_here(struct node *n)
 static void link_totals(const struct node *n,
                         struct node_finished_message *finished)
 {
-    unsigned links =
-        n->board->identity.dimension + (n->board->identity.self == 0 ? 1u : 0u);
-    for (unsigned d = 0; d < links; d++) {
+    for (unsigned d = 0; d < cube_links(n->cube); d++) {
         const struct link_statistics *s = cube_link_statistics(n->cube, d);
         finished->retransmitted += s->retransmitted;
     }
