@@ -32,6 +32,8 @@ HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
 # V=1 shows every command.
 Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
+MPI_CFLAGS = $(addprefix -isystem ,$(shell mpicc --showme:incdirs))
+MPI_LIBS = $(addprefix -L,$(shell mpicc --showme:libdirs)) -lmpi
 HOST_LIBS = -lsodium -lserialport -ljansson -lnettle -lexpat -lz -lm
 
 # libsodium's own code is the same under either C library; its headers are
@@ -42,7 +44,7 @@ NODE_INCLUDE = -I$(BUILD)/include
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
 # drivers, boards and the host have a system beneath them.
 freestanding := $(wildcard incode/*.c transport/*.c node/*.c)
-drivers      := $(wildcard transport/drivers/*.c)
+drivers      := $(filter-out %/mpi.c,$(wildcard transport/drivers/*.c))
 # Those that need what a static node has not.
 host_drivers := transport/drivers/serial_port.c
 node_drivers := $(filter-out $(host_drivers),$(drivers))
@@ -57,6 +59,10 @@ host_objects := $(filter-out $(obj)/host/main.o,$(host:%.c=$(obj)/%.o)) \
 	$(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 	$(node_drivers:%.c=$(BUILD)/node/%.o)
+# Host and node as ranks of Open MPI; no other program is linked with it.
+mpi_host     := $(obj)/host/mpi/main.o $(obj)/host/mpi/ranks.o \
+	$(obj)/transport/drivers/mpi.o
+mpi_node     := $(obj)/boards/mpi/main.o $(obj)/transport/drivers/mpi.o
 unit_tests   := $(unit:tests/unit/%.c=$(BUILD)/tests/%)
 fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
@@ -65,7 +71,8 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 .PHONY: all unit points bare run test test-full bench firmware fuzz fuzzers lint install \
 	clean help deps deps-run deps-test deps-bench deps-full FORCE
 
-all: $(BUILD)/incode $(BUILD)/incode-node
+all: $(BUILD)/incode $(BUILD)/incode-node $(BUILD)/incode-mpi \
+	$(BUILD)/incode-node-mpi
 
 $(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	$(say) LINK $@
@@ -75,6 +82,13 @@ $(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 $(BUILD)/incode-node: $(node_objects) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $^ $(NODE_LIBS) -o $@
+
+$(BUILD)/incode-mpi: $(mpi_host) $(BUILD)/libhost.a $(BUILD)/libcore.a
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) $(MPI_LIBS) -o $@
+$(BUILD)/incode-node-mpi: $(mpi_node) $(BUILD)/libcore.a
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
@@ -96,6 +110,7 @@ $(obj)/node/%.o: node/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
+$(mpi_host) $(mpi_node): private HOSTED += $(MPI_CFLAGS)
 $(obj)/transport/drivers/%.o: transport/drivers/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
@@ -201,7 +216,8 @@ lint: deps-test
 
 install: all
 	install -d '$(DESTDIR)$(PREFIX)/bin'
-	install $(BUILD)/incode $(BUILD)/incode-node '$(DESTDIR)$(PREFIX)/bin'
+	install $(BUILD)/incode $(BUILD)/incode-node $(BUILD)/incode-mpi \
+		$(BUILD)/incode-node-mpi '$(DESTDIR)$(PREFIX)/bin'
 
 clean:
 	rm -rf '$(BUILD)'
@@ -210,7 +226,8 @@ help:
 	@echo 'make run [POINTS=FILE]   the main job: set up, build, triangulate'
 	@echo '                         on 8 nodes, verify, write out/, report'
 	@echo 'make test                set up, build, pass all tests (20 minutes)'
-	@echo 'make                     build/incode and build/incode-node'
+	@echo 'make                     build/incode, build/incode-node, and both for'
+	@echo '                         ranks of MPI'
 	@echo 'make deps                install missing Debian packages'
 	@echo 'make test-full           every combination, large sets, a clean'
 	@echo '                         chroot (hours)'
@@ -219,14 +236,14 @@ help:
 	@echo '                         Cortex-M3 and M7, print their sizes'
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
 	@echo 'make lint                formatters, analysers, warnings as errors'
-	@echo 'make install PREFIX=DIR  copy the two programs to DIR/bin'
+	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
 
 # --- packages --------------------------------------------------------------
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-dev \
-	libjansson-dev libserialport-dev libsodium-dev
+	libjansson-dev libserialport-dev libsodium-dev libopenmpi-dev openmpi-bin
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi

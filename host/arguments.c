@@ -62,7 +62,9 @@ static const struct argp_option options_of_run[] = {
     {"memory", KEY_MEMORY, "BYTES", 0,
      "Data memory of a node, stack included: 256K .. 1G. Default: 4M", 1},
     {"link", KEY_LINK, "NAME", 0,
-     "Wires between nodes: tcp, the default, or serial (pseudo-terminals)", 1},
+     "Wires between nodes: tcp, the default, serial (pseudo-terminals) or mpi "
+     "(ranks of Open MPI, also under mpirun)",
+     1},
     {"board", KEY_BOARD, "NAME", 0, "What a node runs on: linux", 1},
     {"patience", KEY_PATIENCE, "SECONDS", 0,
      "Wait so long for a node that does not answer, then start it again or "
@@ -229,7 +231,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
     static const char *const partitions[] = {"adaptive", "uniform", NULL};
     static const char *const indexes[] = {"naive", "grid", "kd", NULL};
     static const char *const rules[] = {"own", "paper", NULL};
-    static const char *const links[] = {"tcp", "serial", NULL};
+    static const char *const links[] = {"tcp", "serial", "mpi", NULL};
     static const char *const boards[] = {"linux", NULL};
     struct host_run_options *o = p->options;
     switch (key) {
@@ -250,7 +252,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
             (enum incode_face_rule)choose(p, "face-rule", value, rules, NULL);
         return true;
     case KEY_LINK:
-        o->link = (enum host_wire_kind)choose(p, "link", value, links, ",mpi,");
+        o->link = (enum host_wire_kind)choose(p, "link", value, links, NULL);
         return true;
     case KEY_BOARD:
         (void)choose(p, "board", value, boards, ",mps2-an500,mps2-an385,");
@@ -377,8 +379,9 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     }
 }
 
-int host_arguments_run(int argc, char **argv, struct host_run_options *options,
-                       struct host_error *error)
+/* flags: of argp_parse. */
+static int parse_run(int argc, char **argv, unsigned flags,
+                     struct host_run_options *options, struct host_error *error)
 {
     static const struct argp argp = {
         options_of_run,
@@ -400,7 +403,7 @@ int host_arguments_run(int argc, char **argv, struct host_run_options *options,
         NULL};
     struct parse parse = {options, error};
     host_run_defaults(options);
-    if (argp_parse(&argp, argc, argv, 0, NULL, &parse) != 0) {
+    if (argp_parse(&argp, argc, argv, flags, NULL, &parse) != 0) {
         return host_fail(error, HOST_USAGE,
                          "incode run: wrong usage; see incode run --help");
     }
@@ -409,4 +412,16 @@ int host_arguments_run(int argc, char **argv, struct host_run_options *options,
         options->hindrance.slow_us = 30000000;
     }
     return error->code;
+}
+
+int host_arguments_run(int argc, char **argv, struct host_run_options *options,
+                       struct host_error *error)
+{
+    return parse_run(argc, argv, 0, options, error);
+}
+
+int host_arguments_try(int argc, char **argv, struct host_run_options *options)
+{
+    struct host_error error = {0};
+    return parse_run(argc, argv, ARGP_SILENT, options, &error);
 }

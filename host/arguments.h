@@ -15,6 +15,9 @@
 int host_arguments_run(int argc, char **argv, struct host_run_options *options,
                        struct host_error *error);
 
+/* The same where somebody else says what is wrong: prints nothing. */
+int host_arguments_try(int argc, char **argv, struct host_run_options *options);
+
 /* A count of bytes with an optional K, M or G: 4M.  0, or -1. */
 int host_parse_bytes(const char *text, uint64_t *bytes);
 

@@ -10,6 +10,7 @@
 #include "arguments.h"
 #include "convert.h"
 #include "gen.h"
+#include "launch.h"
 #include "report.h"
 #include "run.h"
 #include "tetrahedra.h"
@@ -84,9 +85,17 @@ static void parse(int argc, char **argv, const struct argp_option *options,
 static int command_run(int argc, char **argv, struct host_error *error)
 {
     static struct host_run_result result;
-    struct host_run_options options;
-    if (host_arguments_run(argc, argv, &options, error) != 0) {
+    struct host_run_options options = {0};
+    int rank = host_launch_rank();
+    if (rank > 0 && host_arguments_try(argc, argv, &options) != 0) {
+        return 0; /* rank 0 says what is wrong, and ends with its status */
+    }
+    if (rank <= 0 && host_arguments_run(argc, argv, &options, error) != 0) {
         return error->code;
+    }
+    if (options.link == HOST_WIRE_MPI) {
+        return rank >= 0 ? host_launch_become(rank, argv, error)
+                         : host_launch_mpi(argv, &options, error);
     }
     return host_run(&options, &result, error);
 }

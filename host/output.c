@@ -19,6 +19,29 @@ static int cannot_make(const char *path, int reason, struct host_error *error)
                      strerror(reason));
 }
 
+/* The name under which `writer` writes what will be `target`. */
+static void part_name(char *name, size_t size, const char *target, pid_t writer)
+{
+    (void)snprintf(name, size, "%s.part-%ld", target, (long)writer);
+}
+
+void host_output_clean(const char *path, pid_t writer, uint64_t since_ns)
+{
+    char name[4096 + 32];
+    struct stat status;
+    char *target = realpath(path, NULL);
+    part_name(name, sizeof name, target == NULL ? path : target, writer);
+    (void)unlink(name);
+    free(target);
+    /* A change of name counts as one of the file. */
+    if (stat(path, &status) == 0 && S_ISREG(status.st_mode) &&
+        (uint64_t)status.st_ctim.tv_sec * 1000000000 +
+                (uint64_t)status.st_ctim.tv_nsec >=
+            since_ns) {
+        (void)unlink(path);
+    }
+}
+
 /* Opens a new file beside the target, or the target itself. */
 static int open_file(struct host_output *out, struct host_error *error)
 {
@@ -46,8 +69,7 @@ static int open_file(struct host_output *out, struct host_error *error)
     if (out->temporary == NULL) {
         return host_fail_memory(error, "an output");
     }
-    (void)snprintf(out->temporary, size, "%s.part-%ld", out->target,
-                   (long)getpid());
+    part_name(out->temporary, size, out->target, getpid());
     out->file =
         open(out->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (out->file < 0) {

@@ -12,6 +12,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <sys/types.h>
 
 #include "error.h"
 
@@ -24,6 +25,10 @@ struct host_output {
     size_t used;
     char *buffer;
 };
+
+/* Removes what a process that was ended has left of this output: its parts, and
+ * the whole where it is no older than since_ns of the clock. */
+void host_output_clean(const char *path, pid_t writer, uint64_t since_ns);
 
 /* "-" is standard output; what is there and is no plain file (a device, a
  * pipe) is written in place.  HOST_INPUT where no file can be made. */

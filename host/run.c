@@ -8,6 +8,7 @@
 
 #include "../node/node.h"
 #include "facets.h"
+#include "output.h"
 #include "report.h"
 #include "stats.h"
 #include "write.h"
@@ -15,7 +16,7 @@
 static const char *const strategies[] = {"sequential", "spatial", "auto"};
 static const char *const partitions[] = {"adaptive", "uniform"};
 static const char *const indexes[] = {"naive", "grid", "kd"};
-static const char *const links[] = {"tcp", "serial"};
+static const char *const links[] = {"tcp", "serial", "mpi"};
 
 const char *host_strategy_name(enum host_strategy strategy)
 {
@@ -65,6 +66,14 @@ static unsigned suitable_nodes(void)
     return nodes;
 }
 
+unsigned host_run_nodes(const struct host_run_options *options)
+{
+    if (options->nodes != 0) {
+        return options->nodes;
+    }
+    return options->strategy == HOST_SEQUENTIAL ? 1 : suitable_nodes();
+}
+
 /* Nodes and strategy, where they were left open. */
 static void settle(const struct host_run_options *options,
                    struct host_run_result *result)
@@ -74,11 +83,7 @@ static void settle(const struct host_run_options *options,
     result->index = options->index;
     result->link = options->link;
     result->memory = options->memory;
-    result->nodes = options->nodes;
-    if (result->nodes == 0) {
-        result->nodes =
-            options->strategy == HOST_SEQUENTIAL ? 1 : suitable_nodes();
-    }
+    result->nodes = host_run_nodes(options);
     if (result->strategy == HOST_AUTO) {
         result->strategy = result->nodes > 1 ? HOST_SPATIAL : HOST_SEQUENTIAL;
     }
@@ -259,8 +264,19 @@ int host_triangulate(const struct host_run_options *options,
     nodes.link = options->link;
     nodes.unplug_us = options->unplug_us;
     nodes.program = options->node_program;
-    if (check_memory(options, result->nodes, 1, no_cells, error) != 0 ||
-        host_cluster_start(&cluster, &nodes, error) != 0) {
+    if (check_memory(options, result->nodes, 1, no_cells, error) != 0) {
+        return error->code;
+    }
+    if (options->begin != NULL) {
+        struct host_machine machine;
+        if (options->begin(options, result, &machine, error) != 0) {
+            return error->code;
+        }
+        result->time_start_up_s = seconds_since(start);
+        return host_triangulate_on(options, &machine, points, tets, result,
+                                   error);
+    }
+    if (host_cluster_start(&cluster, &nodes, error) != 0) {
         return error->code;
     }
     struct host_machine machine = host_cluster_machine(&cluster);
@@ -281,27 +297,53 @@ static bool stdout_is_data(const struct host_run_options *options)
     return data;
 }
 
+/* File k of those that an output makes; NULL: there is none. */
+static const char *output_file(const char *path, unsigned k, char *name,
+                               size_t size)
+{
+    static const char *const beside[] = {".node", ".neigh", ".face"};
+    size_t length = strlen(path);
+    bool ele = length > 4 && strcmp(path + length - 4, ".ele") == 0;
+    if (strcmp(path, "-") == 0 || length + 8 > size || k > (ele ? 3 : 0)) {
+        return NULL;
+    }
+    if (k == 0) {
+        return path;
+    }
+    snprintf(name, size, "%.*s%s", (int)length - 4, path, beside[k - 1]);
+    return name;
+}
+
 /* Outputs that were whole before a later one failed: a failed run leaves
  * none. */
 static void remove_outputs(const struct host_run_options *options,
                            unsigned count)
 {
-    static const char *const beside[] = {".ele", ".node", ".neigh", ".face"};
+    char name[4096];
+    const char *file;
     for (unsigned i = 0; i < count; i++) {
-        const char *path = options->output[i];
-        size_t length = strlen(path);
-        char name[4096];
-        if (strcmp(path, "-") == 0 || length + 8 > sizeof name) {
-            continue;
+        for (unsigned k = 0; (file = output_file(options->output[i], k, name,
+                                                 sizeof name)) != NULL;
+             k++) {
+            (void)unlink(file);
         }
-        (void)unlink(path);
-        if (length > 4 && strcmp(path + length - 4, ".ele") == 0) {
-            for (unsigned k = 0; k < 4; k++) {
-                snprintf(name, sizeof name, "%.*s%s", (int)length - 4, path,
-                         beside[k]);
-                (void)unlink(name);
-            }
+    }
+}
+
+void host_run_clean(const struct host_run_options *options, pid_t writer,
+                    uint64_t since_ns)
+{
+    char name[4096];
+    const char *file;
+    for (unsigned i = 0; i < options->outputs; i++) {
+        for (unsigned k = 0; (file = output_file(options->output[i], k, name,
+                                                 sizeof name)) != NULL;
+             k++) {
+            host_output_clean(file, writer, since_ns);
         }
+    }
+    if (options->stats != NULL) {
+        host_output_clean(options->stats, writer, since_ns);
     }
 }
 

@@ -11,6 +11,8 @@
 #ifndef HOST_RUN_H
 #define HOST_RUN_H
 
+#include <sys/types.h>
+
 #include "cluster.h"
 #include "hindrance.h"
 #include "order.h"
@@ -22,6 +24,8 @@
 enum host_strategy { HOST_SEQUENTIAL, HOST_SPATIAL, HOST_AUTO };
 
 enum { HOST_OUTPUTS_MAX = 16 };
+
+struct host_run_result;
 
 struct host_run_options {
     const char *input;
@@ -43,6 +47,10 @@ struct host_run_options {
     uint64_t unplug_us;
     struct host_hindrance hindrance;
     const char *node_program;
+    /* Begins a cube of result->nodes where it is not host_cluster that does. */
+    int (*begin)(const struct host_run_options *options,
+                 struct host_run_result *result, struct host_machine *machine,
+                 struct host_error *error);
 };
 
 struct host_run_result {
@@ -77,6 +85,14 @@ const char *host_strategy_name(enum host_strategy strategy);
 const char *host_partition_name(enum host_partition partition);
 const char *host_index_name(enum incode_index index);
 const char *host_link_name(enum host_wire_kind link);
+
+/* How many nodes the cube gets. */
+unsigned host_run_nodes(const struct host_run_options *options);
+
+/* Removes what process `writer`, which was ended in a run that began at
+ * `since_ns` of the clock, has left of the outputs. */
+void host_run_clean(const struct host_run_options *options, pid_t writer,
+                    uint64_t since_ns);
 
 /* Triangulates points: tets become rows of points, in no order. */
 int host_triangulate(const struct host_run_options *options,

@@ -16,7 +16,11 @@
 
 enum { HOST_PROCESSES_MAX = 64 }; /* nodes on one machine */
 
-enum host_wire_kind { HOST_WIRE_TCP, HOST_WIRE_SERIAL };
+enum host_wire_kind {
+    HOST_WIRE_TCP,
+    HOST_WIRE_SERIAL,
+    HOST_WIRE_MPI /* made by host/mpi */
+};
 
 struct host_wires {
     int host;           /* the host's end of its wire to node 0; -1: none */

@@ -1,0 +1,243 @@
+/* A node as a rank of MPI.  It has no straps of its own: rank 0, the host, says
+ * how large the cube is and how much memory a node has, and rank i + 1 is node
+ * i.  Its links are pipes to the ranks of its neighbours.
+ *
+ * Memory: a node's is --memory, as on other boards: its arena, its .data and
+ * .bss, and a stack.  Nothing but the arena is enforced: what MPI allocates,
+ * and the pipes' buffers, which stand for those of a network, are not the
+ * node's.  Work: that of the node.
+ *
+ *     mpirun -np 9 incode run --link mpi ...      becomes this in ranks 1 .. 8
+ */
+#include <errno.h>
+#include <link.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "../../node/node.h"
+#include "../../transport/drivers/mpi.h"
+
+enum {
+    PAGE = 4096,
+    STACK_BYTES = 65536, /* of a node's memory */
+    STEPS_A_LOOK = 16,   /* between looks for orders */
+    PART_US_MAX = 60000000,
+    STAY_US = 300000 /* after SIGTERM: rank 0 sees then who went first */
+};
+
+struct mpi_board {
+    struct mpi_place place;
+    struct mpi_pipe *pipes;
+    unsigned links;
+    uint32_t tag;          /* of the present cube */
+    struct mpi_order next; /* what rank 0 says next, once `heard` is */
+    MPI_Request heard;
+    uint64_t busy_us; /* before this cube */
+};
+
+static _Noreturn void give_up(unsigned node, const char *why)
+{
+    (void)fprintf(stderr, "incode-node-mpi: node %u: %s\n", node, why);
+    _exit(4);
+}
+
+/* Open MPI ends all ranks when it has lost one. */
+static void stay_a_moment(int signal)
+{
+    struct timespec wait = {0, STAY_US * 1000L};
+    (void)signal;
+    (void)nanosleep(&wait, NULL);
+    _exit(143);
+}
+
+/* Adds the writable segments of the program itself, the first of the list. */
+static int add_segments(struct dl_phdr_info *info, size_t size, void *context)
+{
+    uint64_t *bytes = context;
+    (void)size;
+    for (unsigned i = 0; i < info->dlpi_phnum; i++) {
+        const ElfW(Phdr) *header = &info->dlpi_phdr[i];
+        if (header->p_type == PT_LOAD && (header->p_flags & PF_W) != 0) {
+            uint64_t from = header->p_vaddr / PAGE * PAGE;
+            uint64_t to = header->p_vaddr + header->p_memsz;
+            *bytes += (to - from + PAGE - 1) / PAGE * PAGE;
+        }
+    }
+    return 1;
+}
+
+static uint64_t clock_us(clockid_t clock)
+{
+    struct timespec now;
+    clock_gettime(clock, &now);
+    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
+}
+
+static uint64_t now_us(void *context)
+{
+    (void)context;
+    return clock_us(CLOCK_MONOTONIC);
+}
+
+static uint64_t busy_us(void *context)
+{
+    const struct mpi_board *b = context;
+    return clock_us(CLOCK_PROCESS_CPUTIME_ID) - b->busy_us;
+}
+
+static void idle(void *context, uint64_t wait_us)
+{
+    struct mpi_board *b = context;
+    mpi_sleep(&b->place, b->pipes, b->links, &b->heard, wait_us);
+}
+
+static void reset(void *context, int status)
+{
+    (void)context;
+    _exit(status);
+}
+
+static void listen_for_order(struct mpi_board *b)
+{
+    MPI_Irecv(&b->next, sizeof b->next, MPI_BYTE, 0, MPI_TAG_ORDER,
+              b->place.comm, &b->heard);
+}
+
+static bool heard(struct mpi_board *b)
+{
+    int flag = 0;
+    MPI_Request_get_status(b->heard, &flag, MPI_STATUS_IGNORE);
+    return flag != 0;
+}
+
+static struct mpi_order take_order(struct mpi_board *b)
+{
+    while (!heard(b)) {
+        mpi_sleep(&b->place, NULL, 0, &b->heard, 1000000);
+    }
+    MPI_Wait(&b->heard, MPI_STATUS_IGNORE);
+    struct mpi_order order = b->next;
+    listen_for_order(b);
+    return order;
+}
+
+/* The board's struct for this cube, with arena and pipes. */
+static void equip(struct mpi_board *b, const struct mpi_order *order,
+                  struct node_board *board)
+{
+    unsigned self = (unsigned)b->place.rank - 1;
+    uint64_t fixed = STACK_BYTES;
+    memset(board, 0, sizeof *board);
+    (void)dl_iterate_phdr(add_segments, &fixed);
+    if (order->dimension > CUBE_DIMENSION_MAX || order->memory < fixed + PAGE) {
+        give_up(self, "the host's order is not sound; are all machines of one "
+                      "version?");
+    }
+    board->fixed_bytes = (size_t)fixed;
+    board->arena_bytes = (size_t)(order->memory - fixed) / PAGE * PAGE;
+    board->arena = mmap(NULL, board->arena_bytes, PROT_READ | PROT_WRITE,
+                        MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    b->tag = order->tag;
+    b->links = order->dimension + (self == 0 ? 1u : 0u);
+    b->pipes = calloc(CUBE_LINKS_MAX, sizeof *b->pipes);
+    if (board->arena == MAP_FAILED || b->pipes == NULL) {
+        give_up(self, "this machine does not grant a node's memory");
+    }
+    for (unsigned d = 0; d < b->links; d++) {
+        int peer = d < order->dimension ? (int)(self ^ 1u << d) + 1 : 0;
+        mpi_pipe_open(&b->pipes[d], &b->place, peer, (int)order->tag);
+        board->pipes[d] = mpi_link_pipe(&b->pipes[d]);
+    }
+    b->busy_us = clock_us(CLOCK_PROCESS_CPUTIME_ID);
+    board->context = b;
+    board->identity.self = (uint16_t)self;
+    board->identity.dimension = (uint8_t)order->dimension;
+    board->identity.window = (uint8_t)order->window;
+    board->identity.epoch = order->epoch + self;
+    board->now_us = now_us;
+    board->busy_us = busy_us;
+    board->idle = idle;
+    board->reset = reset;
+}
+
+/* The node, until the host ends it, or drops the whole cube. */
+static void run(struct mpi_board *b, const struct node_board *board)
+{
+    const char *why = NULL;
+    struct node *node = node_start(board, &why);
+    enum node_event event = NODE_BUSY;
+    if (node == NULL) {
+        give_up(board->identity.self, why);
+    }
+    for (unsigned step = 1; event != NODE_STOPPED; step++) {
+        event = node_step(node);
+        if (event == NODE_IDLE) {
+            idle(b, node_wait_us(node));
+        }
+        if ((event == NODE_IDLE || step % STEPS_A_LOOK == 0) && heard(b)) {
+            return;
+        }
+    }
+    MPI_Request told;
+    for (unsigned d = 0; d < b->links; d++) {
+        mpi_pipe_end(&b->pipes[d]);
+    }
+    MPI_Isend(&b->tag, sizeof b->tag, MPI_BYTE, 0, MPI_TAG_ENDED, b->place.comm,
+              &told);
+    MPI_Request_free(&told);
+    mpi_ring(&b->place, 0);
+}
+
+/* One cube, from its beginning to its end. */
+static void take_part(struct mpi_board *b, const struct mpi_order *order)
+{
+    static struct node_board board;
+    bool mine = (unsigned)b->place.rank <= order->nodes;
+    b->links = 0;
+    if (mine) {
+        equip(b, order, &board);
+        run(b, &board);
+    }
+    if (take_order(b).word != MPI_WORD_END) {
+        give_up((unsigned)b->place.rank - 1,
+                "the host begins before it has ended; please report this");
+    }
+    if (!mpi_place_part(&b->place, b->pipes, b->links, PART_US_MAX)) {
+        give_up((unsigned)b->place.rank - 1, "other ranks do not end");
+    }
+    if (mine) {
+        (void)munmap(board.arena, board.arena_bytes);
+        free(b->pipes);
+        b->pipes = NULL;
+    }
+}
+
+int main(int argc, char **argv)
+{
+    static struct mpi_board board;
+    struct sigaction action = {.sa_handler = stay_a_moment};
+    prctl(PR_SET_PDEATHSIG, SIGKILL); /* gone with the launcher's daemon */
+    (void)sigaction(SIGTERM, &action, NULL);
+    MPI_Init(&argc, &argv);
+    if (mpi_place_open(&board.place) == 0) {
+        listen_for_order(&board);
+        for (;;) {
+            struct mpi_order order = take_order(&board);
+            if (order.word != MPI_WORD_BEGIN) {
+                break;
+            }
+            take_part(&board, &order);
+        }
+        MPI_Cancel(&board.heard);
+        MPI_Wait(&board.heard, MPI_STATUS_IGNORE);
+        mpi_place_close(&board.place);
+    }
+    MPI_Finalize();
+    return 0;
+}
