@@ -44,11 +44,12 @@ static void say_link(struct words *w, const char *before, unsigned link)
     say_number(w, link);
 }
 
-/* NOLINTNEXTLINE(readability-non-const-parameter): it is written to */
 void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
                      uint16_t spare_node, char text[CUBE_FAULT_BYTES])
 {
-    struct words w = {text, 0};
+    struct words w;
+    w.text = text;
+    w.size = 0;
     bool host = wrong->node == CUBE_HOST;
     bool to_host = !host && wrong->link >= dimension;
     unsigned node = host      ? wrong->link == 0 ? 0 : spare_node
@@ -68,6 +69,8 @@ void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
         say_end(&w, ": ", wrong->peer_node);
         say(&w, wrong->refusal == LINK_WRONG_VERSION
                     ? " speaks another version of the protocol"
+                : wrong->refusal == LINK_WRONG_GREETING
+                    ? " is set to a cube of another dimension"
                     : " has other sizes of frames or messages");
     }
 }

@@ -55,8 +55,9 @@ enum link_state {
 enum link_refusal {
     LINK_FITS,
     LINK_WRONG_VERSION,
-    LINK_WRONG_WIRE, /* another node, or another of its ports */
-    LINK_WRONG_SIZES /* its window does not hold a message, or ours its */
+    LINK_WRONG_WIRE,     /* another node, or another of its ports */
+    LINK_WRONG_GREETING, /* the level above differs */
+    LINK_WRONG_SIZES     /* its window does not hold a message, or ours its */
 };
 
 /* Who is at the other end, by its own account. */
@@ -64,7 +65,7 @@ struct link_peer {
     uint32_t epoch; /* 0: not heard of yet */
     uint16_t node;
     uint8_t port;
-    uint8_t version;
+    uint8_t version, greeting;
     uint16_t window, frame_payload, message_max;
     enum link_refusal refusal;
 };
@@ -106,6 +107,8 @@ struct link_config {
     uint8_t port;
     uint8_t peer_port; /* and who must be at the other */
     uint16_t peer_node;
+    uint8_t greeting;        /* of the level above: the peer's must be the same,
+                                unless one of them is 0 */
     uint16_t window;         /* frames a direction, 1 .. LINK_WINDOW_MAX */
     uint16_t message_max;    /* bytes; default LINK_MESSAGE_MAX */
     uint16_t frame_payload;  /* bytes; default: a message a frame */

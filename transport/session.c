@@ -47,7 +47,7 @@ void link_pack_hello(const struct link *link, uint8_t *hello)
     put16(hello + 2, c->node);
     put16(hello + 4, c->peer_node);
     hello[6] = c->peer_port;
-    hello[7] = 0;
+    hello[7] = c->greeting;
     put32(hello + 8, c->epoch);
     put32(hello + 12, candidate ? link->candidate.epoch : link->peer_epoch);
     put16(hello + 16, c->window);
@@ -91,6 +91,9 @@ static enum link_refusal fits(const struct link *link, const uint8_t *hello)
         get16(hello + 4) != c->node || hello[6] != c->port) {
         return LINK_WRONG_WIRE;
     }
+    if (hello[7] != 0 && c->greeting != 0 && hello[7] != c->greeting) {
+        return LINK_WRONG_GREETING;
+    }
     if (get16(hello + 18) != c->frame_payload ||
         get16(hello + 20) != c->message_max || window < link->fragments_max ||
         window > LINK_WINDOW_MAX) {
@@ -104,6 +107,7 @@ static void note_peer(struct link *link, const uint8_t *hello)
     struct link_peer *peer = &link->peer;
     peer->version = hello[0];
     peer->port = hello[1];
+    peer->greeting = hello[7];
     peer->node = get16(hello + 2);
     peer->epoch = get32(hello + 8);
     peer->window = get16(hello + 16);

@@ -251,6 +251,8 @@ static void wrong_wires_in_words(void **unused)
          "the host link 1 is wired to node 3, expected node 6"},
         {{2, 3, 0, 0, LINK_WRONG_VERSION},
          "node 2 link 0: node 3 speaks another version of the protocol"},
+        {{2, 3, 0, 0, LINK_WRONG_GREETING},
+         "node 2 link 0: node 3 is set to a cube of another dimension"},
         {{2, 3, 0, 0, LINK_WRONG_SIZES},
          "node 2 link 0: node 3 has other sizes of frames or messages"},
     };
