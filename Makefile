@@ -34,7 +34,7 @@ Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
 MPI_CFLAGS = $(addprefix -isystem ,$(shell mpicc --showme:incdirs))
 MPI_LIBS = $(addprefix -L,$(shell mpicc --showme:libdirs)) -lmpi
-HOST_LIBS = -lsodium -lserialport -ljansson -lnettle -lexpat -lz -lm
+HOST_LIBS = -lconfig -lsodium -lserialport -ljansson -lnettle -lexpat -lz -lm
 
 # libsodium's own code is the same under either C library; its headers are
 # made visible to musl's compiler alone.
@@ -243,7 +243,8 @@ help:
 # --- packages --------------------------------------------------------------
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-dev \
-	libjansson-dev libserialport-dev libsodium-dev libopenmpi-dev openmpi-bin
+	libjansson-dev libserialport-dev libsodium-dev libconfig-dev \
+	libopenmpi-dev openmpi-bin
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi

@@ -70,7 +70,10 @@ static const struct argp_option options_of_run[] = {
      "Wait so long for a node that does not answer, then start it again or "
      "go on without it. Default: 60",
      1},
-    {"cube", KEY_CUBE, "FILE", 0, "Real nodes: not in this version", 1},
+    {"cube", KEY_CUBE, "FILE", 0,
+     "Run on the nodes that FILE describes, over the wires that it names; see "
+     "README.md",
+     1},
     {NULL, 0, NULL, 0, "What to report:", 2},
     {"verify", KEY_VERIFY, NULL, 0,
      "Check the result exactly before reporting success", 2},
@@ -361,10 +364,7 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         (void)number(p, "patience", value, 1, 86400, &p->options->patience_s);
         return 0;
     case KEY_CUBE:
-        host_fail(p->error, HOST_USAGE,
-                  "--cube %s: not in this version; leave it out, and the "
-                  "nodes are started on this machine",
-                  value);
+        p->options->cube = value;
         return 0;
     case KEY_CLUSTER:
     case KEY_FACES_PER_JOB:

@@ -25,9 +25,8 @@
 
 extern char **environ;
 
-/* incode-node beside this executable, or where `make install` puts it. */
-static int find_program(const char *given, char *path, size_t size,
-                        struct host_error *error)
+int host_cluster_program(const char *given, char *path, size_t size,
+                         struct host_error *error)
 {
     ssize_t length;
     char *slash;
@@ -195,8 +194,8 @@ int host_cluster_start(struct host_cluster *cluster,
     while (1u << cluster->dimension < options->nodes) {
         cluster->dimension++;
     }
-    if (find_program(options->program, cluster->path, sizeof cluster->path,
-                     error) != 0) {
+    if (host_cluster_program(options->program, cluster->path,
+                             sizeof cluster->path, error) != 0) {
         return error->code;
     }
     int status = host_wires_make(&cluster->wires, options->link, cluster->nodes,

@@ -63,6 +63,11 @@ struct host_cluster {
     char path[4096]; /* of the node program */
 };
 
+/* The node program: the one given, or if NULL incode-node beside this
+ * executable, as `make` and `make install` put it. */
+int host_cluster_program(const char *given, char *path, size_t size,
+                         struct host_error *error);
+
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,
                        struct host_error *error);

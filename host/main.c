@@ -11,6 +11,7 @@
 #include "convert.h"
 #include "gen.h"
 #include "launch.h"
+#include "remote.h"
 #include "report.h"
 #include "run.h"
 #include "tetrahedra.h"
@@ -96,6 +97,9 @@ static int command_run(int argc, char **argv, struct host_error *error)
     if (options.link == HOST_WIRE_MPI) {
         return rank >= 0 ? host_launch_become(rank, argv, error)
                          : host_launch_mpi(argv, &options, error);
+    }
+    if (options.cube != NULL && host_remote_prepare(&options, error) != 0) {
+        return error->code;
     }
     return host_run(&options, &result, error);
 }
@@ -191,6 +195,15 @@ static int command_convert(int argc, char **argv, struct host_error *error)
     return host_convert(s.argument[0], s.argument[1], error);
 }
 
+static int command_cube(int argc, char **argv, struct host_error *error)
+{
+    struct simple s = {0};
+    parse(argc, argv, NULL, "FILE",
+          "Checks a cube file, and prints how each of its nodes is started.", 1,
+          &s);
+    return host_cube_print(s.argument[0], error);
+}
+
 static int command_bench(int argc, char **argv, struct host_error *error)
 {
     static const struct argp_option options[] = {
@@ -219,7 +232,8 @@ struct command {
 static const struct command commands[] = {
     {"run", command_run},         {"gen", command_gen},
     {"verify", command_verify},   {"digest", command_digest},
-    {"convert", command_convert}, {"bench", command_bench}};
+    {"convert", command_convert}, {"bench", command_bench},
+    {"cube", command_cube}};
 
 /* Stops at the first word that is no option: the command. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
@@ -234,7 +248,7 @@ static error_t parse_top(int key, char *value, struct argp_state *state)
         return 0;
     case ARGP_KEY_NO_ARGS:
         argp_error(state, "no command; allowed: run, gen, verify, digest, "
-                          "convert, bench");
+                          "convert, bench, cube");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -253,7 +267,7 @@ static int dispatch(int argc, char **argv, struct host_error *error)
     }
     return host_fail(error, HOST_USAGE,
                      "%s: no such command; allowed: run, gen, verify, "
-                     "digest, convert, bench",
+                     "digest, convert, bench, cube",
                      argv[0]);
 }
 
@@ -271,6 +285,7 @@ int main(int argc, char **argv)
         "  verify POINTS TETS   check a triangulation exactly\n"
         "  digest TETS          print what tells triangulations apart\n"
         "  convert IN OUT       from one file format to another\n"
+        "  cube FILE            check a cube file, print its nodes' straps\n"
         "  bench paper          the paper's tables on this machine\n\n"
         "incode COMMAND --help says more of each.",
         NULL,

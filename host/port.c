@@ -1,5 +1,6 @@
 #include "port.h"
 
+#include <errno.h>
 #include <poll.h>
 #include <string.h>
 #include <time.h>
@@ -26,9 +27,24 @@ int host_port_serial(struct host_port *port,
     return 0;
 }
 
+int host_port_net(struct host_port *port, const struct tcp_wire_config *config,
+                  struct host_error *error)
+{
+    memset(port, 0, sizeof *port);
+    if (tcp_wire_open(&port->net, config) != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "the host's wire: %s; give the cube a key, or a "
+                         "loopback address",
+                         strerror(errno));
+    }
+    port->kind = HOST_PORT_NET;
+    return 0;
+}
+
 struct link_pipe host_port_pipe(struct host_port *port)
 {
     return port->kind == HOST_PORT_SERIAL ? serial_link_pipe(&port->serial.pipe)
+           : port->kind == HOST_PORT_NET  ? tcp_wire_pipe(&port->net)
                                           : tcp_link_pipe(&port->tcp);
 }
 
@@ -47,24 +63,37 @@ static void unplug(struct host_port *port)
     }
 }
 
+/* Adds what to wait for: the number of entries. */
+static unsigned add_events(const struct host_port *port, struct pollfd *fds)
+{
+    switch (port->kind) {
+    case HOST_PORT_NET:
+        return tcp_wire_events(&port->net, fds);
+    case HOST_PORT_SERIAL:
+        fds->fd = port->serial.pipe.fd;
+        fds->events = serial_events(&port->serial.pipe);
+        return fds->events != 0 ? 1 : 0;
+    case HOST_PORT_SOCKET:
+        fds->fd = port->tcp.fd;
+        fds->events = tcp_events(&port->tcp);
+        return fds->events != 0 ? 1 : 0;
+    default:
+        return 0;
+    }
+}
+
 void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
 {
-    struct pollfd fds[HOST_PORTS_MAX];
+    struct pollfd fds[HOST_PORTS_MAX * TCP_WIRE_FDS_MAX];
     nfds_t used = 0;
     for (unsigned i = 0; i < count; i++) {
         struct host_port *port = &ports[i];
         struct serial_pipe *pipe = &port->serial.pipe;
         bool serial = port->kind == HOST_PORT_SERIAL;
-        short events = serial                           ? serial_events(pipe)
-                       : port->kind == HOST_PORT_SOCKET ? tcp_events(&port->tcp)
-                                                        : 0;
         if (serial && serial_wait_us(pipe) < wait_us) {
             wait_us = serial_wait_us(pipe);
         }
-        if (events != 0) {
-            fds[used].fd = serial ? pipe->fd : port->tcp.fd;
-            fds[used++].events = events;
-        }
+        used += add_events(port, fds + used);
         if (serial && port->unplug_us != 0) {
             unplug(port);
         }
@@ -81,6 +110,8 @@ void host_port_close(struct host_port *port)
     } else if (port->kind == HOST_PORT_SOCKET) {
         close(port->tcp.fd);
         port->tcp.closed = true;
+    } else if (port->kind == HOST_PORT_NET) {
+        tcp_wire_close(&port->net);
     }
     port->kind = HOST_PORT_NONE;
 }

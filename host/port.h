@@ -1,5 +1,6 @@
-/* The host's end of a wire, whatever its kind: a connected socket, or a serial
- * port that may vanish and come back.
+/* The host's end of a wire, whatever its kind: a connected socket, a serial
+ * port that may vanish and come back, or a call over TCP that is made again
+ * when it breaks.
  *
  * Memory: struct host_port.  Work: as the drivers'.
  *
@@ -12,15 +13,21 @@
 #define HOST_PORT_H
 
 #include "../transport/drivers/serial_port.h"
-#include "../transport/drivers/tcp.h"
+#include "../transport/drivers/tcp_wire.h"
 #include "error.h"
 
-enum host_port_kind { HOST_PORT_NONE, HOST_PORT_SOCKET, HOST_PORT_SERIAL };
+enum host_port_kind {
+    HOST_PORT_NONE,
+    HOST_PORT_SOCKET,
+    HOST_PORT_SERIAL,
+    HOST_PORT_NET
+};
 
 struct host_port {
     enum host_port_kind kind;
     struct tcp_pipe tcp; /* its socket is the port's */
     struct serial_port serial;
+    struct tcp_wire net;
     /* For tests: the port is closed after it was open so long, and opened when
      * it is next looked for. */
     uint64_t unplug_us, unplugged_us;
@@ -33,6 +40,10 @@ void host_port_socket(struct host_port *port, int fd);
 int host_port_serial(struct host_port *port,
                      const struct serial_port_settings *settings,
                      struct host_error *error);
+
+/* Calls a node: 0, or HOST_CUBE.  The node may come later. */
+int host_port_net(struct host_port *port, const struct tcp_wire_config *config,
+                  struct host_error *error);
 
 struct link_pipe host_port_pipe(struct host_port *port);
 

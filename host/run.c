@@ -152,8 +152,9 @@ static uint64_t memory_needed(const struct host_run_options *options,
                               unsigned dimension,
                               const struct incode_setup *setup)
 {
-    struct node_identity identity = {
-        0, (uint8_t)dimension, (uint8_t)options->window, 1, false, 0};
+    struct node_identity identity = {.dimension = (uint8_t)dimension,
+                                     .window = (uint8_t)options->window,
+                                     .epoch = 1};
     uint64_t memory = HOST_MEMORY_MIN;
     while (node_arena_needed(&identity, memory, setup) + HOST_STACK_BYTES +
                HOST_STATIC_BYTES >

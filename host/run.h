@@ -39,6 +39,7 @@ struct host_run_options {
     unsigned nodes; /* 0: what suits this machine */
     uint64_t memory;
     uint64_t patience_s; /* for a node that does not answer */
+    const char *cube;    /* a file that describes real nodes, or NULL */
     const char *stats;   /* a file for the statistics, or NULL */
     bool verify, quiet, progress, table, map;
     /* For tests. */

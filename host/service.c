@@ -36,6 +36,9 @@ static int make_cube(struct host_service *s, struct host_error *error)
     config.pipes[0] = s->machine->pipe;
     config.pipes[1] = s->machine->spare;
     config.spare_node = s->machine->spare_node;
+    if (s->machine->lines) {
+        cube_for_lines(&config);
+    }
     size_t bytes = cube_arena_bytes(&config);
     s->cube_memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
     if (s->cube_memory == NULL) {

@@ -28,6 +28,7 @@ struct node_identity {
     bool host_wire;    /* at link `dimension`; node 0 has it always */
     uint32_t dead_us;  /* a link that is down or silent for so long is given up
                           for the run; 0: never */
+    bool lines;        /* the cube's wires are serial lines: cube_for_lines */
 };
 
 struct node_board {

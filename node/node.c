@@ -54,6 +54,9 @@ static struct cube_config configure(const struct node_identity *identity,
     config.epoch = identity->epoch;
     config.host_wire = identity->host_wire;
     config.dead_us = identity->dead_us;
+    if (identity->lines) {
+        cube_for_lines(&config);
+    }
     return config;
 }
 

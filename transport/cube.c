@@ -131,6 +131,15 @@ static size_t up64(size_t bytes)
     return (bytes + 63) / 64 * 64;
 }
 
+void cube_for_lines(struct cube_config *config)
+{
+    config->frame_payload = 408;
+    config->window = config->window >= 8 ? 14 : 7;
+    config->staging = 2;
+    config->timeout_min_us = 20000;
+    config->ack_delay_us = 1000;
+}
+
 size_t cube_arena_bytes(const struct cube_config *config)
 {
     if (!sound(config)) {

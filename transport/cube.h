@@ -104,6 +104,10 @@ struct cube_statistics {
     uint64_t outdated;      /* dropped: of an older generation */
 };
 
+/* The settings of PROTOCOL.md for serial lines, and a window that fits them:
+ * the same on all nodes and the host. */
+void cube_for_lines(struct cube_config *config);
+
 struct cube; /* opaque: lives at the start of its arena */
 
 size_t cube_arena_bytes(const struct cube_config *config);

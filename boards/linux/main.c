@@ -6,12 +6,20 @@
  *
  *     incode-node --node 3 --dimension 3 --memory 4194304 --stack 65536 \
  *                 --window 8 --epoch 17 --links 5,6,7
+ *
+ * A node that a user starts opens its wires itself, draws its epoch, holds
+ * itself to its memory, and begins anew when a run is over; see wire.h:
+ *
+ *     incode-node --node 3 --dimension 2 --key cube.key \
+ *                 --wire 0=listen:10.0.0.3:7001 --wire 1=call:10.0.0.1:7001
  */
+#include <fcntl.h>
 #include <link.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/random.h>
 #include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
@@ -19,17 +27,23 @@
 #include "../../node/node.h"
 #include "wire.h"
 
-enum { PAGE = 4096, SANITIZED_STATIC = 8192 };
+enum { PAGE = 4096, SANITIZED_STATIC = 8192, KEY_DIGITS = 64 };
 
 struct straps {
-    uint64_t node, dimension, memory, stack, window, epoch;
+    uint64_t node, dimension, memory, stack, window, epoch, lines, host_wire,
+        dead;
     int links[CUBE_LINKS_MAX];
     unsigned links_count;
+    const char *wire[CUBE_LINKS_MAX]; /* that the node opens itself */
+    unsigned wires_count;
+    const char *key; /* a file */
 };
 
 struct linux_board {
     struct linux_wire wire[CUBE_LINKS_MAX];
     unsigned links_count;
+    uint8_t key[SECURE_KEY_BYTES];
+    char **again; /* arguments of the next start; NULL: there is none */
 };
 
 static void complain(const char *what)
@@ -70,6 +84,35 @@ static bool read_links(const char *text, struct straps *straps)
     return true;
 }
 
+/* "2=call:10.0.0.1:7001" */
+static bool read_wire(const char *text, struct straps *straps)
+{
+    uint64_t link;
+    if (!read_number(&text, &link) || *text != '=' || link >= CUBE_LINKS_MAX ||
+        straps->wire[link] != NULL) {
+        return false;
+    }
+    straps->wire[link] = text + 1;
+    straps->wires_count++;
+    return true;
+}
+
+/* Every link has a wire, and there are no others. */
+static bool wires_fit(const struct straps *straps)
+{
+    unsigned links = (unsigned)straps->dimension +
+                     (straps->node == 0 || straps->host_wire != 0 ? 1 : 0);
+    if (straps->wires_count == 0) {
+        return straps->links_count == links;
+    }
+    for (unsigned i = 0; i < links; i++) {
+        if (straps->wire[i] == NULL) {
+            return false;
+        }
+    }
+    return straps->links_count == 0 && straps->wires_count == links;
+}
+
 static bool read_straps(char **argv, struct straps *straps)
 {
     const struct {
@@ -78,7 +121,9 @@ static bool read_straps(char **argv, struct straps *straps)
     } known[] = {
         {"--node", &straps->node},     {"--dimension", &straps->dimension},
         {"--memory", &straps->memory}, {"--stack", &straps->stack},
-        {"--window", &straps->window}, {"--epoch", &straps->epoch}};
+        {"--window", &straps->window}, {"--epoch", &straps->epoch},
+        {"--lines", &straps->lines},   {"--host-wire", &straps->host_wire},
+        {"--dead", &straps->dead}};
     for (; argv[0] != NULL && argv[1] != NULL; argv += 2) {
         const char *text = argv[1];
         bool good = false;
@@ -89,15 +134,18 @@ static bool read_straps(char **argv, struct straps *straps)
         }
         if (strcmp(argv[0], "--links") == 0) {
             good = read_links(text, straps);
+        } else if (strcmp(argv[0], "--wire") == 0) {
+            good = read_wire(text, straps);
+        } else if (strcmp(argv[0], "--key") == 0) {
+            straps->key = text;
+            good = true;
         }
         if (!good) {
             return false;
         }
     }
     return argv[0] == NULL && straps->dimension <= CUBE_DIMENSION_MAX &&
-           straps->node < UINT64_C(1) << straps->dimension &&
-           straps->links_count ==
-               straps->dimension + (straps->node == 0 ? 1 : 0);
+           straps->node < UINT64_C(1) << straps->dimension && wires_fit(straps);
 }
 
 /* Adds the writable segments in whole pages, as the kernel counts them. */
@@ -149,22 +197,93 @@ static void idle(void *context, uint64_t wait_us)
     linux_wires_idle(board->wire, board->links_count, wait_us);
 }
 
+/* A node that a user started begins anew, with an epoch of its own. */
 static void reset(void *context, int status)
 {
-    (void)context;
+    const struct linux_board *board = context;
+    if (status == 0 && board->again != NULL) {
+        execv("/proc/self/exe", board->again);
+    }
     _exit(status);
+}
+
+/* 64 hexadecimal digits. */
+static bool read_key(const char *path, uint8_t key[SECURE_KEY_BYTES])
+{
+    char text[KEY_DIGITS];
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    ssize_t got = fd < 0 ? -1 : read(fd, text, sizeof text);
+    if (fd >= 0) {
+        close(fd);
+    }
+    for (int i = 0; i < KEY_DIGITS && got == KEY_DIGITS; i++) {
+        const char *digits = "0123456789abcdef", *at;
+        at = text[i] == '\0' ? NULL : strchr(digits, text[i]);
+        if (at == NULL) {
+            return false;
+        }
+        key[i / 2] = (uint8_t)(key[i / 2] << 4 | (at - digits));
+    }
+    return got == KEY_DIGITS;
+}
+
+static const char *open_wires(struct linux_board *linux_board,
+                              const struct straps *straps, struct tcp_wire *net)
+{
+    const uint8_t *key = NULL;
+    if (straps->key != NULL) {
+        if (!read_key(straps->key, linux_board->key)) {
+            return "--key: not a file of 64 hexadecimal digits, as openssl "
+                   "rand -hex 32 prints them";
+        }
+        key = linux_board->key;
+    }
+    for (unsigned i = 0; i < straps->wires_count; i++) {
+        const char *told = NULL;
+        const char *why = linux_wire_open(&linux_board->wire[i],
+                                          straps->wire[i], key, &net[i], &told);
+        if (why != NULL) {
+            return why;
+        }
+        if (told != NULL) {
+            complain(told);
+        }
+    }
+    return NULL;
+}
+
+/* What the one who starts a node does otherwise. */
+static void start_alone(struct straps *straps, struct linux_board *linux_board,
+                        char **argv)
+{
+    uint32_t epoch = 0;
+    linux_board->again = argv;
+    while (straps->epoch == 0) {
+        (void)getrandom(&epoch, sizeof epoch, 0);
+        straps->epoch = epoch;
+    }
+#ifndef INCODE_SANITIZED
+    struct rlimit stack = {straps->stack, straps->stack};
+    struct rlimit data = {straps->memory - straps->stack,
+                          straps->memory - straps->stack};
+    (void)setrlimit(RLIMIT_STACK, &stack);
+    (void)setrlimit(RLIMIT_DATA, &data);
+#endif
 }
 
 int main(int argc, char **argv)
 {
-    static struct straps straps = {.stack = 65536};
+    static struct straps straps = {.stack = 65536, .memory = 4u << 20};
     static struct linux_board linux_board;
     static struct node_board board;
     const char *why = NULL;
     (void)argc;
     if (!read_straps(argv + 1, &straps)) {
-        complain("wrong straps; it is incode that starts its nodes");
+        complain("wrong straps; incode cube FILE prints those of a cube");
         return 2;
+    }
+    if (straps.wires_count > 0) {
+        start_alone(&straps, &linux_board, argv);
     }
     board.fixed_bytes = static_bytes() + straps.stack;
 #ifdef INCODE_SANITIZED
@@ -182,9 +301,23 @@ int main(int argc, char **argv)
         complain("the kernel does not grant --memory; is it limited?");
         return 4;
     }
-    linux_board.links_count = straps.links_count;
+    size_t net = straps.wires_count * sizeof(struct tcp_wire);
+    net = (net + PAGE - 1) / PAGE * PAGE;
+    board.arena_bytes -= net;
+    board.fixed_bytes += net;
+    linux_board.links_count = straps.links_count + straps.wires_count;
+    if (straps.wires_count > 0) {
+        why = open_wires(&linux_board, &straps,
+                         (void *)((uint8_t *)board.arena + board.arena_bytes));
+        if (why != NULL) {
+            complain(why);
+            return 2;
+        }
+    }
     for (unsigned i = 0; i < straps.links_count; i++) {
         linux_wire_inherit(&linux_board.wire[i], straps.links[i]);
+    }
+    for (unsigned i = 0; i < linux_board.links_count; i++) {
         board.pipes[i] = linux_wire_pipe(&linux_board.wire[i]);
     }
     board.context = &linux_board;
@@ -192,6 +325,9 @@ int main(int argc, char **argv)
     board.identity.dimension = (uint8_t)straps.dimension;
     board.identity.window = (uint8_t)straps.window;
     board.identity.epoch = (uint32_t)straps.epoch;
+    board.identity.lines = straps.lines != 0;
+    board.identity.dead_us = (uint32_t)straps.dead;
+    board.identity.host_wire = straps.host_wire != 0;
     board.now_us = now_us;
     board.busy_us = busy_us;
     board.idle = idle;

@@ -1,8 +1,10 @@
 /* The wires of a node on Linux: connected sockets, or terminals.
  *
- * Memory: struct linux_wire.  Work: as the drivers'.
+ * Memory: struct linux_wire, and for a wire over TCP to other machines struct
+ * tcp_wire, in memory that is given.  Work: as the drivers'.
  *
  *     linux_wire_inherit(&wire[0], fd);
+ *     linux_wire_open(&wire[1], "call:10.0.0.7:7001", key, &tcp_wire);
  *     board.pipes[0] = linux_wire_pipe(&wire[0]);
  *     linux_wires_idle(wire, count, wait_us);
  */
@@ -11,16 +13,31 @@
 
 #include "../../transport/cube.h"
 #include "../../transport/drivers/serial.h"
-#include "../../transport/drivers/tcp.h"
+#include "../../transport/drivers/tcp_wire.h"
+
+enum linux_wire_kind { LINUX_SOCKET, LINUX_TERMINAL, LINUX_NET };
 
 struct linux_wire {
-    bool serial; /* else TCP */
-    struct tcp_pipe tcp;
-    struct serial_pipe line;
+    enum linux_wire_kind kind;
+    struct tcp_pipe tcp;     /* a socket from the one who started the node */
+    struct serial_pipe line; /* a terminal */
+    struct tcp_wire *net;    /* TCP, by calling and listening */
+    char device[64];         /* of a terminal that was opened here */
+    uint32_t baud;
+    bool rts_cts;
+    uint64_t look_us; /* when it was last looked for */
 };
 
 /* An open file that the one who started the node gave it. */
 void linux_wire_inherit(struct linux_wire *wire, int fd);
+
+/* "listen:ADDRESS:PORT", "call:ADDRESS:PORT" (addresses in numbers),
+ * "serial:DEVICE:BAUD" or "serial:DEVICE:BAUD:rtscts".  key: of
+ * the cube, or NULL.  NULL, or what is wrong.  *told: what the user should
+ * know. */
+const char *linux_wire_open(struct linux_wire *wire, const char *text,
+                            const uint8_t *key, struct tcp_wire *net,
+                            const char **told);
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 

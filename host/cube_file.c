@@ -1,0 +1,512 @@
+#include "cube_file.h"
+
+#include <errno.h>
+#include <libconfig.h>
+#include <netdb.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../transport/cube.h"
+#include "arguments.h"
+
+/* --- values -------------------------------------------------------------- */
+
+static int wrong(const struct host_cube_file *file,
+                 const config_setting_t *where, struct host_error *error,
+                 const char *what)
+{
+    return host_fail(error, HOST_INPUT, "%s:%u: %s", file->path,
+                     where == NULL ? 1 : config_setting_source_line(where),
+                     what);
+}
+
+/* A member that must be known: others are mistakes in writing. */
+static int check_names(const struct host_cube_file *file,
+                       const config_setting_t *group, const char *const names[],
+                       struct host_error *error)
+{
+    for (int i = 0; i < config_setting_length(group); i++) {
+        const config_setting_t *member =
+            config_setting_get_elem(group, (unsigned)i);
+        const char *name = config_setting_name(member);
+        bool known = false;
+        for (unsigned k = 0; names[k] != NULL; k++) {
+            known = known || strcmp(names[k], name) == 0;
+        }
+        if (!known) {
+            char text[160];
+            snprintf(text, sizeof text,
+                     "%.60s: no such setting here; see README.md for those "
+                     "that there are",
+                     name);
+            return wrong(file, member, error, text);
+        }
+    }
+    return 0;
+}
+
+/* "HOST:PORT", "[ADDRESS]:PORT": looked up once, before the run. */
+static int resolve(const struct host_cube_file *file,
+                   const config_setting_t *where, struct tcp_address *address,
+                   struct host_error *error)
+{
+    struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *found = NULL;
+    const char *text = config_setting_get_string(where);
+    char host[256];
+    const char *colon = text == NULL ? NULL : strrchr(text, ':');
+    uint64_t port = 0;
+    if (text != NULL && tcp_address_parse(address, text) == 0) {
+        return 0;
+    }
+    if (colon == NULL || (size_t)(colon - text) >= sizeof host ||
+        host_parse_number(colon + 1, 1, 65535, &port) != 0) {
+        return wrong(file, where, error,
+                     "not a host with a port; write \"name:7001\", "
+                     "\"10.0.0.7:7001\" or \"[2001:db8::7]:7001\"");
+    }
+    snprintf(host, sizeof host, "%.*s", (int)(colon - text), text);
+    int status = getaddrinfo(host, colon + 1, &hints, &found);
+    if (status != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "%s:%u: host %s: %s; correct the name or give its "
+                         "address",
+                         file->path, config_setting_source_line(where), host,
+                         gai_strerror(status));
+    }
+    memcpy(&address->to, found->ai_addr, found->ai_addrlen);
+    address->size = found->ai_addrlen;
+    freeaddrinfo(found);
+    return 0;
+}
+
+static int read_key(struct host_cube_file *file, const config_setting_t *where,
+                    struct host_error *error)
+{
+    const char *name = config_setting_get_string(where);
+    const char *slash = strrchr(file->path, '/');
+    char text[65] = "", message[200];
+    if (name == NULL) {
+        return wrong(file, where, error,
+                     "key: not a file's name; write it in "
+                     "quotes");
+    }
+    snprintf(file->key_path, sizeof file->key_path, "%.*s%s",
+             name[0] == '/' || slash == NULL ? 0
+                                             : (int)(slash - file->path) + 1,
+             file->path, name);
+    FILE *key = fopen(file->key_path, "re");
+    size_t got = key == NULL ? 0 : fread(text, 1, 64, key);
+    if (key != NULL) {
+        fclose(key);
+    }
+    bool good = got == 64 && strspn(text, "0123456789abcdef") == 64;
+    for (unsigned i = 0; i < SECURE_KEY_BYTES && good; i++) {
+        char pair[3] = {text[2 * i], text[2 * i + 1], '\0'};
+        file->key[i] = (uint8_t)strtoul(pair, NULL, 16);
+    }
+    memset(text, 0, sizeof text);
+    file->has_key = good;
+    snprintf(message, sizeof message,
+             "key %.80s: not a file of 64 hexadecimal digits; make one: "
+             "openssl rand -hex 32 > FILE",
+             file->key_path);
+    return good ? 0 : wrong(file, where, error, message);
+}
+
+/* --- wires --------------------------------------------------------------- */
+
+static int read_device(const struct host_cube_file *file,
+                       const config_setting_t *pair, int end,
+                       char device[SERIAL_NAME_MAX], struct host_error *error)
+{
+    const char *name = config_setting_get_string_elem(pair, end);
+    if (name == NULL || strlen(name) >= SERIAL_NAME_MAX) {
+        return wrong(file, pair, error,
+                     "serial: not two devices; write [\"/dev/ttyS1\", "
+                     "\"/dev/ttyUSB0\"], the first at `node`");
+    }
+    snprintf(device, SERIAL_NAME_MAX, "%s", name);
+    return 0;
+}
+
+static int read_line(const struct host_cube_file *file,
+                     const config_setting_t *group, struct host_cube_wire *wire,
+                     struct host_error *error)
+{
+    const config_setting_t *pair = config_setting_get_member(group, "serial");
+    int baud = 115200, flow = 0;
+    wire->serial = true;
+    (void)config_setting_lookup_int(group, "baud", &baud);
+    (void)config_setting_lookup_bool(group, "rtscts", &flow);
+    wire->baud = baud < 0 ? 0 : (uint32_t)baud;
+    wire->rts_cts = flow != 0;
+    if (baud < 300 || baud > 20000000) {
+        return wrong(file, group, error,
+                     "baud: not a rate of a serial line; give 300 to "
+                     "20000000");
+    }
+    return read_device(file, pair, 0, wire->device[0], error) != 0 ||
+                   read_device(file, pair, 1, wire->device[1], error) != 0
+               ? error->code
+               : 0;
+}
+
+static int read_net(const struct host_cube_file *file,
+                    const config_setting_t *group, struct host_cube_wire *wire,
+                    struct host_error *error)
+{
+    const config_setting_t *at = config_setting_get_member(group, "tcp");
+    const config_setting_t *via = config_setting_get_member(group, "via");
+    if (resolve(file, at, &wire->at, error) != 0) {
+        return error->code;
+    }
+    wire->via = wire->at;
+    if (via != NULL && resolve(file, via, &wire->via, error) != 0) {
+        return error->code;
+    }
+    if (!file->has_key && !(tcp_address_is_loopback(&wire->at) &&
+                            tcp_address_is_loopback(&wire->via))) {
+        return wrong(file, at, error,
+                     "tcp between machines without a key; add key = \"FILE\" "
+                     "at the top");
+    }
+    return 0;
+}
+
+/* A node's number, or the host. */
+static int read_end(const struct host_cube_file *file,
+                    const config_setting_t *group, const char *name,
+                    uint16_t *node, struct host_error *error)
+{
+    const config_setting_t *end = config_setting_get_member(group, name);
+    const char *text = end == NULL ? NULL : config_setting_get_string(end);
+    int number = -1;
+    if (text != NULL && strcmp(text, "host") == 0 && strcmp(name, "to") == 0) {
+        *node = CUBE_HOST;
+        return 0;
+    }
+    if (config_setting_lookup_int(group, name, &number) == CONFIG_FALSE ||
+        number < 0 || (unsigned)number >= file->nodes) {
+        char message[120];
+        snprintf(message, sizeof message,
+                 "%s: not a node of this cube; give 0 to %u%s", name,
+                 file->nodes - 1,
+                 strcmp(name, "to") == 0 ? ", or \"host\"" : "");
+        return wrong(file, end == NULL ? group : end, error, message);
+    }
+    *node = (uint16_t)number;
+    return 0;
+}
+
+static int read_wire(struct host_cube_file *file, config_setting_t *group,
+                     struct host_error *error)
+{
+    static const char *const names[] = {"node",   "to",   "tcp",    "via",
+                                        "serial", "baud", "rtscts", NULL};
+    struct host_cube_wire *wire = &file->wire[file->wires];
+    memset(wire, 0, sizeof *wire);
+    wire->line = config_setting_source_line(group);
+    if (check_names(file, group, names, error) != 0 ||
+        read_end(file, group, "node", &wire->node, error) != 0 ||
+        read_end(file, group, "to", &wire->to, error) != 0) {
+        return error->code;
+    }
+    if (wire->to != CUBE_HOST &&
+        __builtin_popcount(wire->node ^ wire->to) != 1) {
+        return wrong(file, group, error,
+                     "no neighbours in a cube; their numbers must differ in "
+                     "one binary digit");
+    }
+    bool tcp = config_setting_get_member(group, "tcp") != NULL;
+    bool serial = config_setting_get_member(group, "serial") != NULL;
+    if (tcp == serial) {
+        return wrong(file, group, error,
+                     "neither or both of tcp and serial; give one of them");
+    }
+    int status = serial ? read_line(file, group, wire, error)
+                        : read_net(file, group, wire, error);
+    file->lines = file->lines || serial;
+    file->wires++;
+    return status;
+}
+
+/* The wire between two, either way round. */
+static const struct host_cube_wire *between(const struct host_cube_file *file,
+                                            unsigned a, unsigned b,
+                                            unsigned *count)
+{
+    const struct host_cube_wire *found = NULL;
+    *count = 0;
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        if ((w->node == a && w->to == b) || (w->node == b && w->to == a)) {
+            found = w;
+            (*count)++;
+        }
+    }
+    return found;
+}
+
+const struct host_cube_wire *
+host_cube_host_wire(const struct host_cube_file *file, unsigned k)
+{
+    for (unsigned i = 0; i < file->wires; i++) {
+        if (file->wire[i].to == CUBE_HOST && k-- == 0) {
+            return &file->wire[i];
+        }
+    }
+    return NULL;
+}
+
+/* Each wire once, and the host's. */
+static int check_wires(const struct host_cube_file *file,
+                       const config_setting_t *list, struct host_error *error)
+{
+    const struct host_cube_wire *first = host_cube_host_wire(file, 0);
+    const struct host_cube_wire *second = host_cube_host_wire(file, 1);
+    char text[120];
+    for (unsigned i = 0; i < file->nodes; i++) {
+        for (unsigned d = 0; d < file->dimension; d++) {
+            unsigned count = 0, other = i ^ 1u << d;
+            const struct host_cube_wire *w = between(file, i, other, &count);
+            if (count > 1) {
+                return host_fail(error, HOST_INPUT,
+                                 "%s:%u: a second link between nodes %u and "
+                                 "%u; leave one of them out",
+                                 file->path, w->line, i, other);
+            }
+            if (count == 0) {
+                snprintf(text, sizeof text,
+                         "no link between nodes %u and %u; add { node = %u; "
+                         "to = %u; .. }",
+                         i, other, i, other);
+                return wrong(file, list, error, text);
+            }
+        }
+    }
+    if (first == NULL || first->node != 0) {
+        return wrong(file, list, error,
+                     "the host's first link must be that of node 0; begin "
+                     "with { node = 0; to = \"host\"; .. }");
+    }
+    if (second != NULL &&
+        (second->node == 0 || host_cube_host_wire(file, 2) != NULL)) {
+        return wrong(file, list, error,
+                     "a second link of the host must be another node's, and "
+                     "there is no third; leave it out");
+    }
+    return 0;
+}
+
+/* --- the file ------------------------------------------------------------ */
+
+static int read_nodes(struct host_cube_file *file, const config_t *config,
+                      struct host_error *error)
+{
+    const config_setting_t *root = config_root_setting(config), *where;
+    const char *text = NULL;
+    int value = -1;
+    where = config_setting_get_member(root, "dimension");
+    if (config_lookup_int(config, "dimension", &value) == CONFIG_FALSE ||
+        value < 0 || value > CUBE_DIMENSION_MAX) {
+        return wrong(file, where, error,
+                     "dimension: not given or not 0 to 10; a cube of 8 nodes "
+                     "has dimension = 3;");
+    }
+    file->dimension = (unsigned)value;
+    file->nodes = 1u << value;
+    file->memory = 4u << 20;
+    file->dead_s = 30;
+    if (config_lookup_string(config, "memory", &text) == CONFIG_TRUE &&
+        (host_parse_bytes(text, &file->memory) != 0 ||
+         file->memory < 256 * 1024 || file->memory > UINT64_C(1) << 30)) {
+        return wrong(file, config_lookup(config, "memory"), error,
+                     "memory: not a size; write \"4M\", from 256K to 1G");
+    }
+    if (config_lookup_int(config, "window", &value) == CONFIG_TRUE) {
+        if (value < 1 || value > LINK_WINDOW_MAX) {
+            return wrong(file, config_lookup(config, "window"), error,
+                         "window: not a number of frames; give 1 to 64");
+        }
+        file->window = (unsigned)value;
+    }
+    if (config_lookup_int(config, "dead", &value) == CONFIG_TRUE) {
+        if (value < 0 || value > 3600) {
+            return wrong(file, config_lookup(config, "dead"), error,
+                         "dead: not seconds of silence; give 0 (never) to "
+                         "3600");
+        }
+        file->dead_s = (unsigned)value;
+    }
+    where = config_setting_get_member(root, "start");
+    for (int i = 0; where != NULL && i < config_setting_length(where); i++) {
+        int node = config_setting_get_int_elem(where, i);
+        if (node < 0 || (unsigned)node >= file->nodes) {
+            return wrong(file, where, error,
+                         "start: not numbers of nodes; write [0, 1, 2]");
+        }
+        file->local[node] = true;
+    }
+    where = config_setting_get_member(root, "key");
+    return where == NULL ? 0 : read_key(file, where, error);
+}
+
+static int read_settings(struct host_cube_file *file, const config_t *config,
+                         struct host_error *error)
+{
+    static const char *const names[] = {"dimension", "memory", "window", "key",
+                                        "start",     "dead",   "links",  NULL};
+    const config_setting_t *root = config_root_setting(config);
+    const config_setting_t *links = config_setting_get_member(root, "links");
+    if (check_names(file, root, names, error) != 0 ||
+        read_nodes(file, config, error) != 0) {
+        return error->code;
+    }
+    if (links == NULL || !config_setting_is_list(links)) {
+        return wrong(file, links, error,
+                     "links: no list; write links = ( { node = 0; to = "
+                     "\"host\"; .. }, .. );");
+    }
+    unsigned count = (unsigned)config_setting_length(links);
+    file->wire = calloc(count + 1, sizeof *file->wire);
+    if (file->wire == NULL) {
+        return host_fail_memory(error, "the cube file");
+    }
+    for (unsigned i = 0; i < count; i++) {
+        config_setting_t *group = config_setting_get_elem(links, i);
+        if (!config_setting_is_group(group)) {
+            return wrong(file, links, error,
+                         "links: not a list of groups in braces");
+        }
+        if (read_wire(file, group, error) != 0) {
+            return error->code;
+        }
+    }
+    return check_wires(file, links, error);
+}
+
+int host_cube_file_read(struct host_cube_file *file, const char *path,
+                        struct host_error *error)
+{
+    config_t config;
+    int status;
+    memset(file, 0, sizeof *file);
+    file->path = path;
+    FILE *stream = fopen(path, "re");
+    if (stream == NULL) {
+        return host_fail(error, HOST_INPUT, "%s: %s; give the cube's file",
+                         path, strerror(errno));
+    }
+    config_init(&config);
+    if (config_read(&config, stream) == CONFIG_TRUE) {
+        status = read_settings(file, &config, error);
+    } else {
+        status = host_fail(
+            error, HOST_INPUT, "%s:%d: %s; correct it, README.md has examples",
+            path, config_error_line(&config), config_error_text(&config));
+    }
+    config_destroy(&config);
+    fclose(stream);
+    if (status != 0) {
+        host_cube_file_free(file);
+    }
+    return status;
+}
+
+void host_cube_file_free(struct host_cube_file *file)
+{
+    free(file->wire);
+    file->wire = NULL;
+    memset(file->key, 0, sizeof file->key);
+}
+
+/* --- straps -------------------------------------------------------------- */
+
+static void print_address(const struct tcp_address *address, char *text,
+                          size_t size)
+{
+    char host[NI_MAXHOST], port[NI_MAXSERV];
+    if (getnameinfo(&address->to.any, address->size, host, sizeof host, port,
+                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
+        snprintf(text, size, "?");
+        return;
+    }
+    snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host,
+             port);
+}
+
+static void print_wire(const struct host_cube_wire *wire, unsigned link,
+                       bool first, char text[HOST_STRAP_BYTES])
+{
+    char address[HOST_STRAP_BYTES / 2];
+    if (wire->serial) {
+        snprintf(text, HOST_STRAP_BYTES, "%u=serial:%s:%u%s", link,
+                 wire->device[first ? 0 : 1], wire->baud,
+                 wire->rts_cts ? ":rtscts" : "");
+        return;
+    }
+    print_address(first ? &wire->at : &wire->via, address, sizeof address);
+    snprintf(text, HOST_STRAP_BYTES, "%u=%s:%s", link,
+             first ? "listen" : "call", address);
+}
+
+unsigned host_cube_straps(const struct host_cube_file *file, unsigned node,
+                          char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES])
+{
+    unsigned n = 0, count;
+    const struct host_cube_wire *second = host_cube_host_wire(file, 1);
+    const struct host_cube_wire *host = node == 0 ? host_cube_host_wire(file, 0)
+                                        : second != NULL && second->node == node
+                                            ? second
+                                            : NULL;
+    const struct {
+        const char *name;
+        uint64_t value;
+    } numbers[] = {{"--node", node},
+                   {"--dimension", file->dimension},
+                   {"--memory", file->memory},
+                   {"--window", file->window},
+                   {"--dead", UINT64_C(1000000) * file->dead_s},
+                   {"--lines", file->lines ? 1 : 0},
+                   {"--host-wire", host != NULL ? 1 : 0}};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        snprintf(straps[n++], HOST_STRAP_BYTES, "%s", numbers[i].name);
+        snprintf(straps[n++], HOST_STRAP_BYTES, "%llu",
+                 (unsigned long long)numbers[i].value);
+    }
+    if (file->has_key) {
+        snprintf(straps[n++], HOST_STRAP_BYTES, "--key");
+        snprintf(straps[n++], HOST_STRAP_BYTES, "%.*s", HOST_STRAP_BYTES - 1,
+                 file->key_path);
+    }
+    for (unsigned d = 0; d <= file->dimension; d++) {
+        const struct host_cube_wire *wire =
+            d == file->dimension ? host
+                                 : between(file, node, node ^ 1u << d, &count);
+        if (wire != NULL) {
+            snprintf(straps[n++], HOST_STRAP_BYTES, "--wire");
+            print_wire(wire, d, wire->node == node, straps[n++]);
+        }
+    }
+    return n;
+}
+
+int host_cube_print(const char *path, struct host_error *error)
+{
+    static char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES];
+    static struct host_cube_file file;
+    if (host_cube_file_read(&file, path, error) != 0) {
+        return error->code;
+    }
+    for (unsigned i = 0; i < file.nodes; i++) {
+        unsigned count = host_cube_straps(&file, i, straps);
+        printf("incode-node");
+        for (unsigned k = 0; k < count; k++) {
+            printf(" %s", straps[k]);
+        }
+        printf("\n");
+    }
+    host_cube_file_free(&file);
+    return 0;
+}

@@ -1,0 +1,260 @@
+#include "remote.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/random.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "../transport/drivers/sodium.h"
+#include "cluster.h"
+#include "progress.h"
+#include "run.h"
+
+/* In the child: becomes the node. */
+static void become_node(const struct host_remote *r, unsigned node)
+{
+    static char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES];
+    char *argv[HOST_STRAPS_MAX + 2] = {(char[]){"incode-node"}};
+    char *no_environment[] = {NULL};
+    unsigned count = host_cube_straps(r->file, node, straps);
+    for (unsigned i = 0; i < count; i++) {
+        argv[1 + i] = straps[i];
+    }
+    int null = open("/dev/null", O_RDWR);
+    dup2(null, STDIN_FILENO);
+    dup2(null, STDOUT_FILENO);
+    execve(r->program, argv, no_environment);
+    _exit(127);
+}
+
+static int start_node(struct host_remote *r, unsigned node,
+                      struct host_error *error)
+{
+    pid_t host = getpid(), pid = fork();
+    if (pid == 0) {
+        prctl(PR_SET_PDEATHSIG, SIGKILL);
+        if (getppid() != host) {
+            _exit(127); /* the host ended before it could be watched */
+        }
+        become_node(r, node);
+    }
+    if (pid < 0) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u: %s; start it yourself and take it from "
+                         "start",
+                         node, strerror(errno));
+    }
+    r->process[node].pid = pid;
+    return 0;
+}
+
+static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
+                     struct host_error *error)
+{
+    const struct host_cube_file *file = r->file;
+    struct host_port *port = &r->port[r->ports];
+    if (wire->serial) {
+        struct serial_port_settings s = {.baud = wire->baud,
+                                         .rts_cts = wire->rts_cts,
+                                         .dtr = true,
+                                         .rts = true};
+        memcpy(s.name, wire->device[1], sizeof s.name);
+        if (host_port_serial(port, &s, error) != 0) {
+            return error->code;
+        }
+    } else {
+        struct tcp_wire_config config = {.address = wire->via};
+        config.suite = file->has_key ? &secure_sodium : NULL;
+        config.key = file->key;
+        if (host_port_net(port, &config, error) != 0) {
+            return error->code;
+        }
+    }
+    r->ports++;
+    return 0;
+}
+
+int host_remote_start(struct host_remote *remote,
+                      const struct host_cube_file *file, const char *program,
+                      struct host_error *error)
+{
+    int status = 0;
+    memset(remote, 0, sizeof *remote);
+    remote->file = file;
+    remote->program = program;
+    for (unsigned i = 0; i < file->nodes && status == 0; i++) {
+        if (file->local[i]) {
+            status = start_node(remote, i, error);
+        }
+    }
+    for (unsigned k = 0; k < HOST_PORTS_MAX && status == 0; k++) {
+        const struct host_cube_wire *wire = host_cube_host_wire(file, k);
+        if (wire != NULL) {
+            status = open_port(remote, wire, error);
+        }
+    }
+    if (status != 0) {
+        host_remote_stop(remote);
+    }
+    return status;
+}
+
+void host_remote_stop(struct host_remote *remote)
+{
+    remote->ending = true;
+    for (unsigned i = 0; i < remote->file->nodes; i++) {
+        if (remote->process[i].pid > 0) {
+            kill(remote->process[i].pid, SIGKILL);
+            (void)waitpid(remote->process[i].pid, NULL, 0);
+            remote->process[i].pid = 0;
+        }
+    }
+    while (remote->ports > 0) {
+        host_port_close(&remote->port[--remote->ports]);
+    }
+}
+
+/* --- as a machine --------------------------------------------------------- */
+
+static uint64_t machine_now_us(void *context)
+{
+    (void)context;
+    return host_now_us();
+}
+
+static void machine_idle(void *context, uint64_t wait_us)
+{
+    struct host_remote *r = context;
+    host_port_idle(r->port, r->ports, wait_us);
+}
+
+/* A node that says why it cannot start would do so again. */
+static int restart(struct host_remote *r, unsigned node, int status,
+                   struct host_error *error)
+{
+    r->process[node].pid = 0;
+    if (WIFEXITED(status) && WEXITSTATUS(status) != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u: ended with status %d; see what it printed, "
+                         "and run again",
+                         node, WEXITSTATUS(status));
+    }
+    if (++r->process[node].deaths > HOST_REMOTE_DEATHS_MAX) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u: ended %u times; look for what ends it, and "
+                         "run again",
+                         node, r->process[node].deaths);
+    }
+    r->restarts++;
+    return start_node(r, node, error);
+}
+
+static int machine_check(void *context, struct host_error *error)
+{
+    struct host_remote *r = context;
+    for (unsigned i = 0; i < r->file->nodes; i++) {
+        int status;
+        pid_t pid = r->process[i].pid;
+        if (pid > 0 && waitpid(pid, &status, WNOHANG) == pid &&
+            restart(r, i, status, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+static unsigned machine_restarts(void *context)
+{
+    return ((struct host_remote *)context)->restarts;
+}
+
+static bool machine_kill(void *context, unsigned node)
+{
+    struct host_remote *r = context;
+    pid_t pid = r->process[node].pid;
+    return pid > 0 && kill(pid, SIGKILL) == 0;
+}
+
+/* Nothing tells of nodes elsewhere, and those here begin anew. */
+static bool machine_ended(void *context)
+{
+    (void)context;
+    return true;
+}
+
+static void machine_stop(void *context)
+{
+    host_remote_stop(context);
+}
+
+struct host_machine host_remote_machine(struct host_remote *remote)
+{
+    const struct host_cube_wire *second = host_cube_host_wire(remote->file, 1);
+    struct host_machine machine;
+    memset(&machine, 0, sizeof machine);
+    machine.context = remote;
+    machine.nodes = remote->file->nodes;
+    machine.dimension = remote->file->dimension;
+    machine.lines = remote->file->lines;
+    while (machine.epoch == 0) {
+        (void)!getrandom(&machine.epoch, sizeof machine.epoch, 0);
+    }
+    machine.pipe = host_port_pipe(&remote->port[0]);
+    if (second != NULL) {
+        machine.spare_node = second->node;
+        machine.spare = host_port_pipe(&remote->port[1]);
+    }
+    machine.now_us = machine_now_us;
+    machine.idle = machine_idle;
+    machine.check = machine_check;
+    machine.restarts = machine_restarts;
+    machine.kill = machine_kill;
+    machine.ended = machine_ended;
+    machine.stop = machine_stop;
+    return machine;
+}
+
+/* --- for a run ------------------------------------------------------------ */
+
+/* One run a program. */
+static struct host_cube_file the_file;
+
+static int begin(const struct host_run_options *options,
+                 struct host_run_result *result, struct host_machine *machine,
+                 struct host_error *error)
+{
+    static struct host_remote remote;
+    static char program[4096];
+    (void)result;
+    if (host_cluster_program(options->node_program, program, sizeof program,
+                             error) != 0 ||
+        host_remote_start(&remote, &the_file, program, error) != 0) {
+        return error->code;
+    }
+    *machine = host_remote_machine(&remote);
+    return 0;
+}
+
+int host_remote_prepare(struct host_run_options *options,
+                        struct host_error *error)
+{
+    unsigned asked = options->nodes;
+    if (host_cube_file_read(&the_file, options->cube, error) != 0) {
+        return error->code;
+    }
+    if (asked != 0 && asked != the_file.nodes) {
+        return host_fail(error, HOST_USAGE,
+                         "--nodes %u: the cube of %s has %u; leave it out",
+                         asked, options->cube, the_file.nodes);
+    }
+    options->nodes = the_file.nodes;
+    options->memory = the_file.memory;
+    options->link = the_file.lines ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
+    options->begin = begin;
+    return 0;
+}

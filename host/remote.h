@@ -1,0 +1,56 @@
+/* A cube of real nodes, wired as a cube file says.  Nodes that the file lists
+ * under `start` the host starts on this machine, and again when they die; the
+ * others are there already, or come.
+ *
+ * Memory: two ports, and 16 bytes a node.  Work: a fork and an exec for each
+ * node that the host starts.
+ *
+ *     host_remote_prepare(&options, &error); host_run(&options, ..);
+ *
+ * or by itself
+ *
+ *     host_remote_start(&remote, &file, program, &error);
+ *     machine = host_remote_machine(&remote);
+ *     ... give it to the service, whose end stops it ...
+ */
+#ifndef HOST_REMOTE_H
+#define HOST_REMOTE_H
+
+#include <sys/types.h>
+
+#include "cube_file.h"
+#include "port.h"
+
+enum { HOST_REMOTE_DEATHS_MAX = 20 }; /* of one node, then the run ends */
+
+struct host_remote {
+    const struct host_cube_file *file;
+    const char *program;
+    unsigned ports;
+    struct host_port port[HOST_PORTS_MAX];
+    struct {
+        pid_t pid; /* 0: not running, or not here */
+        unsigned deaths;
+    } process[HOST_NODES_MAX];
+    unsigned restarts;
+    bool ending;
+};
+
+struct host_run_options;
+
+/* Reads options->cube and makes these options those of its cube, on whose
+ * nodes the run will be. */
+int host_remote_prepare(struct host_run_options *options,
+                        struct host_error *error);
+
+/* program: of a node, for those that are started here. */
+int host_remote_start(struct host_remote *remote,
+                      const struct host_cube_file *file, const char *program,
+                      struct host_error *error);
+
+struct host_machine host_remote_machine(struct host_remote *remote);
+
+/* Ends the nodes that were started here, and closes the host's wires. */
+void host_remote_stop(struct host_remote *remote);
+
+#endif

@@ -1,0 +1,157 @@
+/* The cube file: what it says is what nodes are started with, and what is wrong
+ * in it is named with its line. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "../../host/cube_file.h"
+
+static char directory[] = "/tmp/incode-cube.XXXXXX";
+static char path[64], key_path[64];
+
+static void write_file(const char *name, const char *text)
+{
+    FILE *file = fopen(name, "w");
+    assert_non_null(file);
+    assert_true(fputs(text, file) >= 0);
+    assert_int_equal(fclose(file), 0);
+}
+
+static int set_up(void **unused)
+{
+    (void)unused;
+    assert_non_null(mkdtemp(directory));
+    snprintf(path, sizeof path, "%s/lab.cube", directory);
+    snprintf(key_path, sizeof key_path, "%s/lab.key", directory);
+    write_file(key_path, "000102030405060708090a0b0c0d0e0f"
+                         "101112131415161718191a1b1c1d1e1f\n");
+    return 0;
+}
+
+static int tear_down(void **unused)
+{
+    (void)unused;
+    return unlink(path) | unlink(key_path) | rmdir(directory);
+}
+
+static const char *const good =
+    "dimension = 1; memory = \"512K\"; key = \"lab.key\"; start = [1];\n"
+    "links = (\n"
+    "  { node = 0; to = \"host\"; tcp = \"10.0.0.1:7000\"; },\n"
+    "  { node = 1; to = \"host\"; tcp = \"localhost:7001\"; },\n"
+    "  { node = 1; to = 0; serial = [\"/dev/ttyS1\", \"/dev/ttyUSB0\"];\n"
+    "    baud = 921600; rtscts = true; }\n"
+    ");\n";
+
+static bool has(char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES], unsigned count,
+                const char *name, const char *value)
+{
+    for (unsigned i = 0; i + 1 < count; i += 2) {
+        if (strcmp(straps[i], name) == 0 && strcmp(straps[i + 1], value) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void nodes_are_started_as_it_says(void **unused)
+{
+    static struct host_cube_file file;
+    static char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES];
+    struct host_error error = {0};
+    (void)unused;
+    write_file(path, good);
+    assert_int_equal(host_cube_file_read(&file, path, &error), 0);
+    assert_int_equal(file.nodes, 2);
+    assert_int_equal(file.memory, 512 * 1024);
+    assert_true(file.has_key && file.lines);
+    assert_int_equal(file.key[0], 0);
+    assert_int_equal(file.key[31], 0x1f);
+    assert_true(file.local[1] && !file.local[0]);
+    assert_int_equal(host_cube_host_wire(&file, 0)->node, 0);
+    assert_int_equal(host_cube_host_wire(&file, 1)->node, 1);
+    assert_null(host_cube_host_wire(&file, 2));
+    unsigned count = host_cube_straps(&file, 0, straps);
+    assert_true(has(straps, count, "--node", "0"));
+    assert_true(has(straps, count, "--memory", "524288"));
+    assert_true(has(straps, count, "--lines", "1"));
+    assert_true(has(straps, count, "--key", key_path));
+    assert_true(
+        has(straps, count, "--wire", "0=serial:/dev/ttyUSB0:921600:rtscts"));
+    assert_true(has(straps, count, "--wire", "1=listen:10.0.0.1:7000"));
+    count = host_cube_straps(&file, 1, straps);
+    assert_true(has(straps, count, "--host-wire", "1"));
+    assert_true(
+        has(straps, count, "--wire", "0=serial:/dev/ttyS1:921600:rtscts"));
+    assert_true(has(straps, count, "--wire", "1=listen:127.0.0.1:7001") ||
+                has(straps, count, "--wire", "1=listen:[::1]:7001"));
+    host_cube_file_free(&file);
+}
+
+/* A text of the good file, another in its place, and where and what the error
+ * must say. */
+static void mistakes_are_named(void **unused)
+{
+    static const struct {
+        const char *old, *new, *where, *what;
+        int code;
+    } cases[] = {
+        {"dimension = 1;", "dimension = 11;", ":1: ", "0 to 10", 3},
+        {"dimension = 1;", "", ":1: ", "dimension", 3},
+        {"dimension = 1;", "dimension = ;", ":1: ", "syntax error", 3},
+        {"\"512K\"", "\"12K\"", ":1: ", "memory", 3},
+        {"memory", "mammary", ":1: ", "mammary: no such setting", 3},
+        {"lab.key", "no.key", ":1: ", "64 hexadecimal digits", 3},
+        {"key = \"lab.key\";", "", ":3: ", "without a key", 3},
+        {"start = [1]", "start = [2]", ":1: ", "start", 3},
+        {"node = 1; to = 0;", "node = 1; to = 1;", ":5: ", "no neighbours", 3},
+        {"node = 1; to = 0;", "node = 7; to = 0;", ":5: ", "not a node", 3},
+        {"node = 1; to = 0;", "node = 1; to = \"host\";",
+         ":2: ", "no link between nodes 0 and 1", 3},
+        {"node = 0; to = \"host\"", "node = 1; to = \"host\"", ":2: ", "node 0",
+         3},
+        {"baud = 921600", "baud = 12", ":5: ", "baud", 3},
+        {"rtscts", "ctsrts", ":6: ", "ctsrts: no such setting", 3},
+        {"[\"/dev/ttyS1\", \"/dev/ttyUSB0\"]", "[\"/dev/ttyS1\"]",
+         ":5: ", "two devices", 3},
+        {"tcp = \"10.0.0.1:7000\"", "tcp = \"10.0.0.1\"", ":3: ", "port", 3},
+        {"tcp = \"10.0.0.1:7000\";", "", ":3: ", "neither or both", 3},
+        {"localhost:7001", "no.such.host.invalid:7001",
+         ":4: ", "no.such.host.invalid", 4},
+    };
+    static struct host_cube_file file;
+    (void)unused;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[1024], where[96];
+        struct host_error error = {0};
+        const char *at = strstr(good, cases[i].old);
+        assert_non_null(at);
+        snprintf(text, sizeof text, "%.*s%s%s", (int)(at - good), good,
+                 cases[i].new, at + strlen(cases[i].old));
+        write_file(path, text);
+        snprintf(where, sizeof where, "%s%s", path, cases[i].where);
+        int status = host_cube_file_read(&file, path, &error);
+        if (status != cases[i].code || strstr(error.text, where) == NULL ||
+            strstr(error.text, cases[i].what) == NULL) {
+            fail_msg("case %zu: exit %d: %s", i, status, error.text);
+        }
+    }
+    struct host_error error = {0};
+    assert_int_equal(host_cube_file_read(&file, "/no/such.cube", &error), 3);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nodes_are_started_as_it_says),
+        cmocka_unit_test(mistakes_are_named),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
