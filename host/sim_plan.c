@@ -1,0 +1,134 @@
+#include "sim_plan.h"
+
+#include <string.h>
+
+const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
+    "loss",    "flip",  "delete",    "insert", "repeat", "burst",     "stall",
+    "one-way", "cut",   "partition", "pause",  "crash",  "slow-host", "tiny"};
+
+/* Numbers of nodes, by weight. */
+static const struct {
+    unsigned dimension, weight;
+} cubes[] = {{0, 60}, {1, 130},  {2, 260}, {3, 270}, {4, 170}, {5, 80},
+             {6, 20}, {7, 4}, {8, 3},   {9, 2},   {10, 1}};
+
+static uint64_t draw(uint64_t *state, uint64_t lo, uint64_t hi)
+{
+    return host_world_draw(state, lo, hi);
+}
+
+static bool one_in(uint64_t *state, unsigned n)
+{
+    return draw(state, 1, n) == 1;
+}
+
+static unsigned draw_nodes(uint64_t *state)
+{
+    uint64_t at = draw(state, 0, 999);
+    unsigned i = 0;
+    while (at >= cubes[i].weight) {
+        at -= cubes[i++].weight;
+    }
+    return 1u << cubes[i].dimension;
+}
+
+static void draw_work(struct host_sim_plan *p, uint64_t *state)
+{
+    static const char *const kinds[] = {"uniform", "bubbles", "bluntfin",
+                                        "sphere",  "grid",    "rotated",
+                                        "hub",     "uniform"};
+    p->kind = kinds[draw(state, 0, 7)];
+    p->sequential = one_in(state, 6);
+    p->partition = one_in(state, 3) ? HOST_UNIFORM : HOST_ADAPTIVE;
+    p->index = one_in(state, 8)   ? INCODE_NAIVE
+               : one_in(state, 6) ? INCODE_GRID
+                                  : INCODE_KD;
+    p->face_rule = one_in(state, 3) ? INCODE_FACE_PAPER : INCODE_FACE_OWN;
+    p->shuffle_seed = one_in(state, 2) ? sim_draw(state) : 0;
+    uint64_t most = p->nodes > 64            ? 600
+                    : p->index == INCODE_KD  ? 3000
+                    : p->index == INCODE_GRID ? 1000
+                                             : 300;
+    p->points = host_world_draw_log(state, 30, most);
+}
+
+static void draw_wire(struct sim_quality *q, uint64_t *state, bool fast)
+{
+    q->bytes_per_s =
+        one_in(state, 5)
+            ? 0
+            : (uint32_t)host_world_draw_log(state, fast ? 4000000 : 60000,
+                                            100000000);
+    q->latency_us = (uint32_t)host_world_draw_log(state, 1, fast ? 50 : 3000);
+    q->room = (uint32_t)host_world_draw_log(state, 300, 32768);
+    q->bytes = q->room + (uint32_t)host_world_draw_log(state, 2048, 32768);
+    q->bytes = q->bytes < SIM_BYTES_MIN ? SIM_BYTES_MIN : q->bytes;
+}
+
+static void draw_cube(struct host_sim_plan *p, uint64_t *state)
+{
+    bool large = p->nodes > 64;
+    p->window = one_in(state, 3) ? 0 : (unsigned)draw(state, 1, large ? 3 : 8);
+    p->host_window = one_in(state, 2) ? 0 : (unsigned)draw(state, 1, 32);
+    p->memory_more = p->wanted[HOST_SIM_TINY] || large
+                         ? draw(state, 0, 8) * 1024
+                         : host_world_draw_log(state, 16384, 1 << 20);
+    draw_wire(&p->wire, state, large);
+    draw_wire(&p->host_wire, state, p->nodes > 16);
+    p->gather_us = (uint32_t)host_world_draw_log(state, 1, 500);
+    p->step_us = (uint32_t)host_world_draw_log(state, 5, 1000);
+    p->host_us = p->wanted[HOST_SIM_SLOW_HOST]
+                     ? (uint32_t)host_world_draw_log(state, 500, 5000)
+                     : (uint32_t)host_world_draw_log(state, 2, 200);
+}
+
+static void draw_faults(struct host_sim_plan *p, uint64_t *state)
+{
+    struct sim_faults *w = &p->weather;
+    bool large = p->nodes > 64;
+    double worst = large ? 0.02 : 0.3;
+    double part = (double)draw(state, 1, 1000) * 1e-3;
+    for (int k = 0; k < SIM_CHANCES; k++) {
+        uint64_t one = host_world_draw_log(state, 1500, large ? 100000 : 30000);
+        w->chance[k] = p->wanted[k] ? 1 / (double)one : 0;
+    }
+    w->chance[SIM_LOSS] = p->wanted[SIM_LOSS] ? worst * part * part : 0;
+    w->chance[SIM_FLIP] /= 8;
+    w->chance[SIM_STALL] /= 4;
+    w->chance[SIM_BURST] /= 4;
+    w->burst_bytes = (uint32_t)host_world_draw_log(state, 2, 2000);
+    w->stall_us = (uint32_t)host_world_draw_log(state, 1000, 1000000);
+    p->early = one_in(state, 2);
+    p->gap_us = (uint32_t)host_world_draw_log(state, 3000, 300000);
+    p->lasts_us_max = (uint32_t)host_world_draw_log(state, 5000, 2000000);
+    p->events_max = (unsigned)draw(state, 1, large ? 4 : 24);
+    p->calm_us = host_world_draw_log(state, 200000, 20000000);
+}
+
+void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
+                        unsigned nodes)
+{
+    uint64_t state = sim_seed(seed, 77);
+    memset(plan, 0, sizeof *plan);
+    plan->seed = seed;
+    plan->nodes_given = nodes;
+    plan->nodes = draw_nodes(&state);
+    plan->nodes = nodes != 0 ? nodes : plan->nodes;
+    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+        plan->wanted[k] = one_in(&state, 3);
+    }
+    draw_work(plan, &state);
+    draw_cube(plan, &state);
+    draw_faults(plan, &state);
+}
+
+void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)
+{
+    static const char *const indexes[] = {"naive", "grid", "kd"};
+    fprintf(file, "%llu points %s, %u nodes, %s, %s, %s, %s;",
+            (unsigned long long)plan->points, plan->kind, plan->nodes,
+            plan->sequential ? "sequential" : "spatial",
+            plan->partition == HOST_UNIFORM ? "uniform" : "adaptive",
+            indexes[plan->index],
+            plan->face_rule == INCODE_FACE_OWN ? "own" : "paper");
+}

@@ -1,0 +1,117 @@
+/* A cube in virtual time: its nodes run the real code on boards that are no
+ * more than memory and wires, one step at a time, in the order of their clocks.
+ * The host is who calls: whenever it asks for the time or sleeps, the rest of
+ * the world runs until then.  No clock of this machine takes part.
+ *
+ * Memory: the nodes' arenas, and the bytes of each wire.  Work: a heap of nodes,
+ * log n a step, besides the nodes' own.
+ *
+ *     host_world_open(&world, &options, &error);
+ *     struct host_machine machine = host_world_machine(&world);
+ *     ... host_service_start, host_service_run, host_service_end ...
+ *     host_world_close(&world);
+ */
+#ifndef HOST_SIM_WORLD_H
+#define HOST_SIM_WORLD_H
+
+#include "../node/node.h"
+#include "../transport/drivers/sim.h"
+#include "machine.h"
+
+enum {
+    HOST_WORLD_STACK = 64 * 1024, /* of a node's memory, outside its arena */
+    HOST_WORLD_STATIC = 16 * 1024
+};
+
+struct host_world_options {
+    unsigned nodes, dimension;
+    uint64_t memory; /* bytes a node, stack included */
+    uint8_t window;  /* frames; 0: the node's choice */
+    struct sim_quality wire, host_wire;
+    uint32_t gather_us; /* bytes that come closer together wake a node once */
+    uint32_t step_us;   /* a step of a node that has work, more or less */
+    uint32_t host_us;   /* a round of the host's loop */
+    uint64_t seed;
+    uint64_t time_us_max, steps_max; /* then it counts as hanging */
+    /* Called whenever strike_us of the world is reached; sets the next. */
+    void (*strike)(void *context);
+    void *context;
+};
+
+enum host_world_state { HOST_WORLD_UP, HOST_WORLD_OFF, HOST_WORLD_ENDED };
+
+struct host_world;
+
+/* One end of a wire, as its link sees it. */
+struct host_world_port {
+    struct host_world *world;
+    struct link_pipe pipe; /* of the simulated wire */
+    struct sim_end *end;
+    unsigned wire, side;
+    unsigned owner, peer; /* node, or `nodes` for the host */
+};
+
+struct host_world_node {
+    struct host_world *world;
+    struct node_board board;
+    struct node *node;
+    enum host_world_state state;
+    bool unplugged; /* its wires were cut while it is off */
+    uint64_t wake_us, busy_until_us, busy_us, offset_us;
+    uint32_t starts, place; /* in the heap */
+    unsigned links;
+    struct host_world_port port[CUBE_LINKS_MAX];
+};
+
+struct host_world_wire {
+    struct sim_wire wire;
+    uint32_t cuts, deaf[2]; /* reasons for it to be so */
+};
+
+struct host_world {
+    struct host_world_options options;
+    uint64_t now_us, steps, strike_us;
+    uint64_t random;
+    uint32_t epoch; /* of the next start of anything */
+    uint64_t trace; /* of all bytes sent, their times and wires */
+    uint64_t host_pause_us;
+    const char *fault; /* why nothing moves any more, or NULL */
+    unsigned fault_node;
+    unsigned ended;
+    struct host_world_node *node;
+    struct host_world_wire *wire;
+    unsigned wires; /* the last one is the host's */
+    uint32_t *heap; /* nodes by wake_us */
+    struct host_world_port host;
+    uint8_t *bytes; /* of all wires */
+};
+
+int host_world_open(struct host_world *world,
+                    const struct host_world_options *options,
+                    struct host_error *error);
+void host_world_close(struct host_world *world);
+struct host_machine host_world_machine(struct host_world *world);
+
+/* The wire of a node's link; of the host's link the last. */
+unsigned host_world_wire_of(const struct host_world *world, unsigned node,
+                            unsigned link);
+
+/* Faults; those that last are taken back as often as they were made. */
+void host_world_cut(struct host_world *world, unsigned wire, bool cut);
+void host_world_deaf(struct host_world *world, unsigned wire, unsigned side,
+                     bool deaf);
+void host_world_pause(struct host_world *world, unsigned node, uint64_t us);
+
+/* The node forgets all at once, and starts anew after `us`.  Meanwhile what is
+ * sent to it is lost, or its wires are seen to be closed. */
+void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
+                      bool unplugged);
+
+/* NULL, or what a node left behind that was not its own. */
+const char *host_world_damage(const struct host_world *world);
+
+/* Uniform from lo to hi, both included; and over orders of magnitude. */
+uint64_t host_world_draw(uint64_t *state, uint64_t lo, uint64_t hi);
+uint64_t host_world_draw_log(uint64_t *state, uint64_t lo, uint64_t hi);
+
+#endif
