@@ -102,6 +102,12 @@ $(BUILD)/flags: FORCE
 	@echo '$(CC) $(NODE_CC) $(HOSTED)' | cmp -s - $@ || \
 		echo '$(CC) $(NODE_CC) $(HOSTED)' > $@
 
+# A simulation's failure names the commit that replays it.
+COMMIT := $(or $(shell git rev-parse --short=12 HEAD 2>/dev/null),unknown)
+$(BUILD)/commit: FORCE
+	@mkdir -p $(@D)
+	@echo '$(COMMIT)' | cmp -s - $@ || echo '$(COMMIT)' > $@
+
 $(obj)/incode/%.o: incode/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
@@ -119,6 +125,10 @@ $(obj)/transport/%.o: transport/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
+$(obj)/host/sim_seeds.o: host/sim_seeds.c $(BUILD)/flags $(BUILD)/commit
+	@mkdir -p $(@D)
+	$(say) CC $<
+	$(Q)$(CC) $(HOSTED) -DINCODE_COMMIT='"$(COMMIT)"' -MMD -MP -c $< -o $@
 $(obj)/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<

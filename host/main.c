@@ -14,6 +14,7 @@
 #include "remote.h"
 #include "report.h"
 #include "run.h"
+#include "sim.h"
 #include "tetrahedra.h"
 #include "verify.h"
 
@@ -224,6 +225,15 @@ static int command_bench(int argc, char **argv, struct host_error *error)
     return host_bench_paper(&run, s.nodes, error);
 }
 
+static int command_sim(int argc, char **argv, struct host_error *error)
+{
+    struct host_sim_options options;
+    if (host_sim_arguments(argc, argv, &options, error) != 0) {
+        return error->code;
+    }
+    return host_sim_seeds(&options, error);
+}
+
 struct command {
     const char *name;
     int (*run)(int argc, char **argv, struct host_error *error);
@@ -233,7 +243,7 @@ static const struct command commands[] = {
     {"run", command_run},         {"gen", command_gen},
     {"verify", command_verify},   {"digest", command_digest},
     {"convert", command_convert}, {"bench", command_bench},
-    {"cube", command_cube}};
+    {"cube", command_cube},       {"sim", command_sim}};
 
 /* Stops at the first word that is no option: the command. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
@@ -248,7 +258,7 @@ static error_t parse_top(int key, char *value, struct argp_state *state)
         return 0;
     case ARGP_KEY_NO_ARGS:
         argp_error(state, "no command; allowed: run, gen, verify, digest, "
-                          "convert, bench, cube");
+                          "convert, bench, cube, sim");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -267,7 +277,7 @@ static int dispatch(int argc, char **argv, struct host_error *error)
     }
     return host_fail(error, HOST_USAGE,
                      "%s: no such command; allowed: run, gen, verify, "
-                     "digest, convert, bench, cube",
+                     "digest, convert, bench, cube, sim",
                      argv[0]);
 }
 
@@ -286,7 +296,8 @@ int main(int argc, char **argv)
         "  digest TETS          print what tells triangulations apart\n"
         "  convert IN OUT       from one file format to another\n"
         "  cube FILE            check a cube file, print its nodes' straps\n"
-        "  bench paper          the paper's tables on this machine\n\n"
+        "  bench paper          the paper's tables on this machine\n"
+        "  sim --seeds A..B     whole cubes in virtual time, with faults\n\n"
         "incode COMMAND --help says more of each.",
         NULL,
         NULL,

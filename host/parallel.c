@@ -4,14 +4,21 @@
 
 enum { THREADS_MAX = 16 };
 
+static unsigned threads_most = THREADS_MAX;
+
 unsigned host_threads(void)
 {
     cpu_set_t set;
-    if (sched_getaffinity(0, sizeof set, &set) != 0) {
+    if (threads_most == 1 || sched_getaffinity(0, sizeof set, &set) != 0) {
         return 1;
     }
-    int count = CPU_COUNT(&set);
-    return count < 1 ? 1 : count > THREADS_MAX ? THREADS_MAX : (unsigned)count;
+    unsigned count = (unsigned)CPU_COUNT(&set);
+    return count < 1 ? 1 : count > threads_most ? threads_most : count;
+}
+
+void host_threads_limit(unsigned most)
+{
+    threads_most = most < 1 ? 1 : most > THREADS_MAX ? THREADS_MAX : most;
 }
 
 static void *trampoline(void *argument)
@@ -26,7 +33,8 @@ void host_fork_start(struct host_fork *fork, void (*function)(void *),
 {
     fork->function = function;
     fork->argument = argument;
-    fork->running = pthread_create(&fork->thread, NULL, trampoline, fork) == 0;
+    fork->running = threads_most > 1 &&
+                    pthread_create(&fork->thread, NULL, trampoline, fork) == 0;
     if (!fork->running) {
         function(argument);
     }

@@ -23,6 +23,10 @@ struct host_fork {
 /* Processors that this process may use, 1 to 16. */
 unsigned host_threads(void);
 
+/* No more than so many from now on; 1: everything runs on the calling thread.
+ */
+void host_threads_limit(unsigned most);
+
 /* Runs function(argument) on a thread of its own, or at once on this one where
  * no thread can be had. */
 void host_fork_start(struct host_fork *fork, void (*function)(void *),

@@ -26,14 +26,23 @@ struct host_sim_outcome {
 };
 
 /* 0; HOST_UNVERIFIED for another result than the right one, HOST_CUBE where
- * the run did not end or a node failed, HOST_BROKEN for what was left behind. */
+ * the run did not end or a node failed, HOST_BROKEN for what was left behind.
+ */
 int host_sim_run(const struct host_sim_plan *plan,
                  struct host_sim_outcome *outcome, struct host_error *error);
 
-/* The command: seeds first .. last, one line each; a failure prints the command
- * that replays it. nodes: 0 where the seeds decide.  seconds_max: 0, or begins
- * no seed after so long. */
-int host_sim_seeds(uint64_t first, uint64_t last, unsigned nodes,
-                   unsigned seconds_max, struct host_error *error);
+struct host_sim_options {
+    uint64_t first, last; /* seeds, each with a line of its own */
+    unsigned nodes;       /* 0: the seeds decide */
+    uint64_t seconds_max; /* of processor time: then no seed is begun; or 0 */
+};
+
+/* The command's arguments.  Wrong usage: HOST_USAGE, as in arguments.h. */
+int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
+                       struct host_error *error);
+
+/* The command.  A failure prints the command that replays it. */
+int host_sim_seeds(const struct host_sim_options *options,
+                   struct host_error *error);
 
 #endif

@@ -3,14 +3,14 @@
 #include <string.h>
 
 const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
-    "loss",    "flip",  "delete",    "insert", "repeat", "burst",     "stall",
-    "one-way", "cut",   "partition", "pause",  "crash",  "slow-host", "tiny"};
+    "loss",    "flip", "delete",    "insert", "repeat", "burst",     "stall",
+    "one-way", "cut",  "partition", "pause",  "crash",  "slow-host", "tiny"};
 
 /* Numbers of nodes, by weight. */
 static const struct {
     unsigned dimension, weight;
-} cubes[] = {{0, 60}, {1, 130},  {2, 260}, {3, 270}, {4, 170}, {5, 80},
-             {6, 20}, {7, 4}, {8, 3},   {9, 2},   {10, 1}};
+} cubes[] = {{0, 60}, {1, 130}, {2, 260}, {3, 270}, {4, 170}, {5, 80},
+             {6, 20}, {7, 4},   {8, 3},   {9, 2},   {10, 1}};
 
 static uint64_t draw(uint64_t *state, uint64_t lo, uint64_t hi)
 {
@@ -45,20 +45,19 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
                                   : INCODE_KD;
     p->face_rule = one_in(state, 3) ? INCODE_FACE_PAPER : INCODE_FACE_OWN;
     p->shuffle_seed = one_in(state, 2) ? sim_draw(state) : 0;
-    uint64_t most = p->nodes > 64            ? 600
-                    : p->index == INCODE_KD  ? 3000
+    uint64_t most = p->nodes > 64             ? 600
+                    : p->index == INCODE_KD   ? 3000
                     : p->index == INCODE_GRID ? 1000
-                                             : 300;
+                                              : 300;
     p->points = host_world_draw_log(state, 30, most);
 }
 
 static void draw_wire(struct sim_quality *q, uint64_t *state, bool fast)
 {
-    q->bytes_per_s =
-        one_in(state, 5)
-            ? 0
-            : (uint32_t)host_world_draw_log(state, fast ? 4000000 : 60000,
-                                            100000000);
+    q->bytes_per_s = one_in(state, 5)
+                         ? 0
+                         : (uint32_t)host_world_draw_log(
+                               state, fast ? 4000000 : 60000, 100000000);
     q->latency_us = (uint32_t)host_world_draw_log(state, 1, fast ? 50 : 3000);
     q->room = (uint32_t)host_world_draw_log(state, 300, 32768);
     q->bytes = q->room + (uint32_t)host_world_draw_log(state, 2048, 32768);

@@ -19,11 +19,12 @@
 enum host_sim_fault {
     HOST_SIM_ONE_WAY = SIM_CHANCES, /* a line brings nothing any more */
     HOST_SIM_CUT,                   /* a wire is closed at both ends */
-    HOST_SIM_PARTITION,             /* all wires between two parts of the cube */
-    HOST_SIM_PAUSE,                 /* a node stands still */
-    HOST_SIM_CRASH,                 /* a node forgets all and starts again */
+    HOST_SIM_PARTITION, /* all wires between two parts of the cube */
+    HOST_SIM_PAUSE,     /* a node stands still */
+    HOST_SIM_CRASH,     /* a node forgets all and starts again */
     HOST_SIM_SLOW_HOST,
-    HOST_SIM_TINY, /* memories so small that pages are dropped or faces spilled */
+    HOST_SIM_TINY, /* memories so small that pages are dropped or faces spilled
+                    */
     HOST_SIM_FAULTS
 };
 

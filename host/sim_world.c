@@ -45,7 +45,8 @@ static void wake_at(struct host_world *w, uint32_t node, uint64_t us)
     }
     for (;;) {
         uint32_t child = 2 * at + 1;
-        if (child + 1 < count && before(w, w->heap[child + 1], w->heap[child])) {
+        if (child + 1 < count &&
+            before(w, w->heap[child + 1], w->heap[child])) {
             child++;
         }
         if (child >= count || !before(w, w->heap[child], node)) {
@@ -450,8 +451,8 @@ int host_world_open(struct host_world *world,
     w->node = calloc(nodes, sizeof *w->node);
     w->wire = calloc(w->wires, sizeof *w->wire);
     w->heap = calloc(nodes, sizeof *w->heap);
-    w->bytes = malloc(each * (w->wires - 1) +
-                      sim_wire_bytes(&options->host_wire));
+    w->bytes =
+        malloc(each * (w->wires - 1) + sim_wire_bytes(&options->host_wire));
     bool good = w->node != NULL && w->wire != NULL && w->heap != NULL &&
                 w->bytes != NULL;
     for (unsigned i = 0; good && i < w->wires; i++) {

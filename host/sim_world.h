@@ -3,8 +3,8 @@
  * The host is who calls: whenever it asks for the time or sleeps, the rest of
  * the world runs until then.  No clock of this machine takes part.
  *
- * Memory: the nodes' arenas, and the bytes of each wire.  Work: a heap of nodes,
- * log n a step, besides the nodes' own.
+ * Memory: the nodes' arenas, and the bytes of each wire.  Work: a heap of
+ * nodes, log n a step, besides the nodes' own.
  *
  *     host_world_open(&world, &options, &error);
  *     struct host_machine machine = host_world_machine(&world);

@@ -301,8 +301,8 @@ static int sim_send(void *context, const uint8_t *bytes, size_t size)
     size = size < most ? size : (size_t)most;
     for (size_t at = 0; at < size;) {
         const uint8_t *zero = memchr(bytes + at, 0, size - at);
-        size_t piece = zero != NULL ? (size_t)(zero + 1 - (bytes + at))
-                                    : size - at;
+        size_t piece =
+            zero != NULL ? (size_t)(zero + 1 - (bytes + at)) : size - at;
         send_piece(line, bytes + at, piece, zero != NULL);
         at += piece;
     }
@@ -425,7 +425,7 @@ void sim_wire_init(struct sim_wire *wire, void *memory,
                             : UINT64_C(1000000000) / quality->bytes_per_s;
         line->random = sim_seed(seed, i);
         sim_line_faults(line, NULL);
-        wire->end[i] = (struct sim_end){&wire->line[i], &wire->line[1 - i],
-                                        &wire->cut};
+        wire->end[i] =
+            (struct sim_end){&wire->line[i], &wire->line[1 - i], &wire->cut};
     }
 }
