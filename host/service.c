@@ -231,17 +231,12 @@ static void set_up(struct host_service *s)
 
 /* --- the loop ------------------------------------------------------------- */
 
-/* The next message that is due to this node; false: none, or no room. */
-static bool serve_node(struct host_service *s, uint16_t to,
+/* The next message that is due to this node, calls apart; false: none, or no
+ * room. */
+static bool serve_work(struct host_service *s, uint16_t to,
                        struct host_error *error)
 {
     struct host_node *node = &s->node[to];
-    if (node->lost) {
-        return false;
-    }
-    if (node->call_due) {
-        return host_watch_call(s, to);
-    }
     if (!s->started || !s->report[to].here) {
         return false; /* what goes before the first answer may get lost */
     }
@@ -275,6 +270,26 @@ static bool serve_node(struct host_service *s, uint16_t to,
         return send_unspill(s, to, error);
     }
     return node->pages_count > 0 && send_page(s, to);
+}
+
+/* A call and a message of work in turn: on a slow wire the calls of many nodes
+ * would leave no room for anything else. */
+static bool serve_node(struct host_service *s, uint16_t to,
+                       struct host_error *error)
+{
+    struct host_node *node = &s->node[to];
+    if (node->lost) {
+        return false;
+    }
+    if (node->call_due && !node->called) {
+        node->called = host_watch_call(s, to);
+        return node->called;
+    }
+    if (serve_work(s, to, error)) {
+        node->called = false;
+        return true;
+    }
+    return node->call_due && host_watch_call(s, to);
 }
 
 /* Serves the nodes in turn, while the wire takes it. */

@@ -47,6 +47,7 @@ struct host_node {
     bool lost;     /* not reached in this generation: nothing is sent to it */
     bool given_up; /* for the rest of the run */
     bool calling;  /* a call has not been answered */
+    bool called;   /* what it was sent last is a call */
     uint32_t sent, received; /* letters of this generation */
     uint32_t missed;         /* calls that were lost before the first answer */
     uint32_t start;          /* the epoch of its start; 0: not heard of */
