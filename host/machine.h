@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "../transport/link.h"
+#include "../transport/cube.h"
 #include "error.h"
 
 enum { HOST_NODES_MAX = 1024 }; /* of any machine: 2^CUBE_DIMENSION_MAX */
@@ -29,6 +29,9 @@ struct host_machine {
     /* A second wire, to another node, for when node 0 is lost; 0: none. */
     uint16_t spare_node;
     struct link_pipe spare;
+    /* Instead of it, wires to nodes 0 .. host_wires - 1; see cube.h. */
+    uint8_t host_wires;
+    struct link_pipe wires[CUBE_HOST_WIRES_MAX]; /* [0] is `pipe` */
     /* Microseconds since any fixed time, never going back. */
     uint64_t (*now_us)(void *context);
     /* Sleeps until bytes have come, or room for them where there was none, but

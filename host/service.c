@@ -36,6 +36,10 @@ static int make_cube(struct host_service *s, struct host_error *error)
     config.pipes[0] = s->machine->pipe;
     config.pipes[1] = s->machine->spare;
     config.spare_node = s->machine->spare_node;
+    config.host_wires = s->machine->host_wires;
+    for (unsigned i = 1; i < config.host_wires; i++) {
+        config.pipes[i] = s->machine->wires[i];
+    }
     if (s->machine->lines) {
         cube_for_lines(&config);
     }
@@ -490,7 +494,9 @@ int host_service_run(struct host_service *service, struct host_error *error)
     }
     host_progress_end(&s->progress);
     host_watch_end(s);
-    s->retransmitted = cube_link_statistics(s->cube, 0)->retransmitted;
+    for (unsigned d = 0; d < cube_links(s->cube); d++) {
+        s->retransmitted += cube_link_statistics(s->cube, d)->retransmitted;
+    }
     s->finished = true;
     return 0;
 }

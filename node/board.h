@@ -21,14 +21,15 @@
 
 /* Who the node is: straps, in the language of boards. */
 struct node_identity {
-    uint16_t self;     /* 0 .. 2^dimension - 1 */
-    uint8_t dimension; /* of the cube */
-    uint8_t window;    /* frames a link and direction; 0: what suits memory */
-    uint32_t epoch;    /* of this start, never repeated */
-    bool host_wire;    /* at link `dimension`; node 0 has it always */
-    uint32_t dead_us;  /* a link that is down or silent for so long is given up
-                          for the run; 0: never */
-    bool lines;        /* the cube's wires are serial lines: cube_for_lines */
+    uint16_t self;      /* 0 .. 2^dimension - 1 */
+    uint8_t dimension;  /* of the cube */
+    uint8_t window;     /* frames a link and direction; 0: what suits memory */
+    uint32_t epoch;     /* of this start, never repeated */
+    bool host_wire;     /* at link `dimension`; node 0 has it always */
+    uint8_t host_wires; /* nodes that have, where all below this; see cube.h */
+    uint32_t dead_us;   /* a link that is down or silent for so long is given up
+                           for the run; 0: never */
+    bool lines;         /* the cube's wires are serial lines: cube_for_lines */
 };
 
 struct node_board {

@@ -53,6 +53,7 @@ static struct cube_config configure(const struct node_identity *identity,
         identity->window != 0 ? identity->window : window_for(memory);
     config.epoch = identity->epoch;
     config.host_wire = identity->host_wire;
+    config.host_wires = identity->host_wires;
     config.dead_us = identity->dead_us;
     if (identity->lines) {
         cube_for_lines(&config);

@@ -22,22 +22,39 @@ static unsigned nodes(const struct cube *cube)
     return 1u << cube->config.dimension;
 }
 
-/* The host's link to the gate. */
-static unsigned link_of_gate(const struct cube *cube)
+/* Whether each of the host's wires is used: not on a tree, which has its root
+ * at the gate. */
+static bool many_doors(const struct cube *cube)
 {
-    unsigned gate = cube->wiring.gate;
-    return cube->count > 1 && gate == cube->config.spare_node ? 1 : 0;
+    return cube->config.host_wires > 1 && !cube->routes.tree;
 }
 
-/* The host is behind the gate's last link; 0: there is no way. */
+/* The node by which a node and the host reach each other.  Between the two
+ * e-cube's dimensions are above those in which doors differ. */
+static unsigned door_of(const struct cube *cube, unsigned node)
+{
+    return many_doors(cube) ? node & (cube->config.host_wires - 1u)
+                            : cube->wiring.gate;
+}
+
+/* The host's link to a door. */
+static unsigned link_of_door(const struct cube *cube, unsigned door)
+{
+    if (cube->config.host_wires > 1) {
+        return door;
+    }
+    return cube->count > 1 && door == cube->config.spare_node ? 1 : 0;
+}
+
+/* The host is behind a door's last link; 0: there is no way. */
 static uint32_t way_to(const struct cube *cube, unsigned dest)
 {
     unsigned self = cube->config.self;
     if (is_host(cube)) {
-        return (uint32_t)1 << link_of_gate(cube);
+        return (uint32_t)1 << link_of_door(cube, door_of(cube, dest));
     }
     if (dest == CUBE_HOST) {
-        dest = cube->wiring.gate;
+        dest = door_of(cube, self);
         if (self == dest) {
             return cube->count > cube->config.dimension
                        ? (uint32_t)1 << cube->config.dimension
@@ -54,11 +71,16 @@ static uint32_t way_to(const struct cube *cube, unsigned dest)
 static uint32_t ways_to_all(const struct cube *cube, unsigned source)
 {
     unsigned self = cube->config.self;
-    unsigned root = source == CUBE_HOST ? cube->wiring.gate : source;
+    unsigned root = source == CUBE_HOST ? door_of(cube, self) : source;
+    uint32_t doors = many_doors(cube) ? cube->config.host_wires - 1u : 0;
     if (is_host(cube)) {
-        return (uint32_t)1 << link_of_gate(cube);
+        return doors != 0 ? ((uint32_t)1 << cube->count) - 1
+                          : (uint32_t)1 << link_of_door(cube, door_of(cube, 0));
     }
     uint32_t ways = routes_to_all(&cube->routes, self, root);
+    if (source == CUBE_HOST) {
+        ways &= ~doors; /* what differs in these dimensions has its own door */
+    }
     return self == source ? ways : ways | (uint32_t)1 << LOCAL;
 }
 
@@ -90,11 +112,12 @@ static struct link_config link_config_of(const struct cube_config *config,
     c.epoch = config->epoch;
     c.node = config->self;
     c.port = (uint8_t)d;
-    c.peer_node = (uint16_t)(host      ? d == 0 ? 0 : config->spare_node
+    bool many = config->host_wires > 1;
+    c.peer_node = (uint16_t)(host      ? many || d == 0 ? d : config->spare_node
                              : to_host ? CUBE_HOST
                                        : config->self ^ 1u << d);
     c.peer_port = (uint8_t)(host      ? config->dimension
-                            : to_host ? config->self != 0
+                            : to_host ? many ? config->self : config->self != 0
                                       : d);
     c.greeting = (uint8_t)(config->dimension + 1);
     c.window = (host || to_host) && config->host_window != 0
@@ -110,6 +133,12 @@ static struct link_config link_config_of(const struct cube_config *config,
 
 static unsigned links_of(const struct cube_config *config)
 {
+    if (config->host_wires > 1) {
+        return config->self == CUBE_HOST
+                   ? config->host_wires
+                   : config->dimension +
+                         (config->self < config->host_wires ? 1u : 0u);
+    }
     if (config->self == CUBE_HOST) {
         return config->spare_node != 0 ? 2 : 1;
     }
@@ -119,9 +148,14 @@ static unsigned links_of(const struct cube_config *config)
 
 static bool sound(const struct cube_config *config)
 {
-    return config->dimension <= CUBE_DIMENSION_MAX &&
+    unsigned wires = config->host_wires;
+    bool even = (wires & (wires - 1)) == 0 && wires <= CUBE_HOST_WIRES_MAX &&
+                wires <= 1u << config->dimension &&
+                (wires < 2 || config->spare_node == 0);
+    return even && config->dimension <= CUBE_DIMENSION_MAX &&
            (config->self == CUBE_HOST
-                ? config->gate == 0 || config->gate == config->spare_node
+                ? config->gate == 0 || config->gate == config->spare_node ||
+                      config->gate < wires
                 : config->self < 1u << config->dimension) &&
            config->spare_node < 1u << config->dimension;
 }

@@ -37,7 +37,8 @@ enum {
     CUBE_WRONG_MAX = 4,     /* wrong wires */
     CUBE_WHOLE_NODE = 0xff, /* as the dimension of struct cube_dead */
     CUBE_HOST = 0xfffe,
-    CUBE_ALL = 0xffff
+    CUBE_ALL = 0xffff,
+    CUBE_HOST_WIRES_MAX = 8
 };
 
 /* A link that is dead for the run, named by its lower end (its host's wire:
@@ -76,10 +77,15 @@ struct cube_config {
     /* A second wire to the host: at the host pipes[1], to this node; at that
      * node its link `dimension`, as node 0 has it. */
     uint16_t spare_node; /* host's; 0: none */
-    bool host_wire;      /* node's; node 0 has one always */
-    uint16_t gate;       /* host's: of the first generation */
-    uint32_t dead_us;    /* a link that was up, and then was down or silent for
-                            so long, is dead; 0: never */
+    /* Instead of it: the host has a wire to each of nodes 0 .. host_wires - 1,
+     * the power of two that all ends are told: pipes[i] to node i.  What goes
+     * between it and a node takes that node's wire, or that of the node with
+     * the same low bits. */
+    uint8_t host_wires; /* 2 .. CUBE_HOST_WIRES_MAX; 0: to node 0 */
+    bool host_wire;     /* node's; node 0 has one always */
+    uint16_t gate;      /* host's: of the first generation */
+    uint32_t dead_us;   /* a link that was up, and then was down or silent for
+                           so long, is dead; 0: never */
     /* Zero means the default. */
     uint16_t host_window;   /* of the host's link, at both ends; `window` */
     uint16_t frame_payload; /* bytes, a multiple of 8, the same on both ends of

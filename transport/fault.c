@@ -52,9 +52,10 @@ void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
     w.size = 0;
     bool host = wrong->node == CUBE_HOST;
     bool to_host = !host && wrong->link >= dimension;
-    unsigned node = host      ? wrong->link == 0 ? 0 : spare_node
-                    : to_host ? CUBE_HOST
-                              : wrong->node ^ 1u << wrong->link;
+    unsigned node =
+        host ? wrong->link == 0 || spare_node == 0 ? wrong->link : spare_node
+        : to_host ? CUBE_HOST
+                  : wrong->node ^ 1u << wrong->link;
     unsigned link = host ? dimension : to_host ? wrong->node != 0 : wrong->link;
     say_end(&w, "", wrong->node);
     say_link(&w, " ", wrong->link);

@@ -144,7 +144,8 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
     board->arena = mmap(NULL, board->arena_bytes, PROT_READ | PROT_WRITE,
                         MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     b->tag = order->tag;
-    b->links = order->dimension + (self == 0 ? 1u : 0u);
+    b->links =
+        order->dimension + (self < order->host_wires || self == 0 ? 1u : 0u);
     b->pipes = calloc(CUBE_LINKS_MAX, sizeof *b->pipes);
     if (board->arena == MAP_FAILED || b->pipes == NULL) {
         give_up(self, "this machine does not grant a node's memory");
@@ -159,6 +160,7 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
     board->identity.self = (uint16_t)self;
     board->identity.dimension = (uint8_t)order->dimension;
     board->identity.window = (uint8_t)order->window;
+    board->identity.host_wires = (uint8_t)order->host_wires;
     board->identity.epoch = order->epoch + self;
     board->now_us = now_us;
     board->busy_us = busy_us;

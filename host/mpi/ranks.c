@@ -89,7 +89,12 @@ int host_ranks_begin(struct host_ranks *ranks, unsigned nodes, uint64_t memory,
     }
     order->tag = MPI_TAG_PIPES + ranks->cubes++ % TAGS;
     ranks->ended = 0;
-    mpi_pipe_open(&ranks->pipe, &ranks->place, 1, (int)order->tag);
+    ranks->wires = nodes < CUBE_HOST_WIRES_MAX ? nodes : CUBE_HOST_WIRES_MAX;
+    order->host_wires = ranks->wires;
+    for (unsigned i = 0; i < ranks->wires; i++) {
+        mpi_pipe_open(&ranks->pipe[i], &ranks->place, (int)i + 1,
+                      (int)order->tag);
+    }
     ranks->running = true;
     tell_all(ranks, MPI_WORD_BEGIN);
     return 0;
@@ -151,7 +156,7 @@ static void machine_idle(void *context, uint64_t wait_us)
     if (!r->running) {
         return; /* nothing more will come */
     }
-    mpi_sleep(&r->place, &r->pipe, 1, NULL, wait_us);
+    mpi_sleep(&r->place, r->pipe, r->wires, NULL, wait_us);
 }
 
 static bool machine_ended(void *context)
@@ -193,11 +198,13 @@ static void machine_stop(void *context)
     }
     r->running = false;
     if (r->lost != 0 || r->stuck) {
-        r->pipe.closed = true; /* nobody is there to part from */
+        for (unsigned i = 0; i < r->wires; i++) {
+            r->pipe[i].closed = true; /* nobody is there to part from */
+        }
         return;
     }
     tell_all(r, MPI_WORD_END);
-    r->stuck = !mpi_place_part(&r->place, &r->pipe, 1, PART_US_MAX);
+    r->stuck = !mpi_place_part(&r->place, r->pipe, r->wires, PART_US_MAX);
     if (!r->stuck && r->cubes == r->cubes_due) {
         leave(r);
     }
@@ -211,7 +218,11 @@ struct host_machine host_ranks_machine(struct host_ranks *ranks)
     machine.nodes = ranks->order.nodes;
     machine.dimension = ranks->order.dimension;
     machine.epoch = ranks->order.epoch - 1;
-    machine.pipe = mpi_link_pipe(&ranks->pipe);
+    machine.pipe = mpi_link_pipe(&ranks->pipe[0]);
+    machine.host_wires = (uint8_t)ranks->wires;
+    for (unsigned i = 0; i < ranks->wires; i++) {
+        machine.wires[i] = mpi_link_pipe(&ranks->pipe[i]);
+    }
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = check;

@@ -22,7 +22,8 @@
 
 struct host_ranks {
     struct mpi_place place;
-    struct mpi_pipe pipe;     /* to node 0 */
+    struct mpi_pipe pipe[CUBE_HOST_WIRES_MAX]; /* to nodes 0 .. */
+    unsigned wires;
     struct mpi_order order;   /* of the present cube */
     unsigned cubes_due;       /* until the ranks may leave */
     unsigned cubes, ended;    /* begun so far; nodes of this one */

@@ -104,7 +104,8 @@ static inline struct machine *build(unsigned dimension,
     m->nodes = 1u << dimension;
     m->count = m->nodes + 1;
     m->size_max = CUBE_PAYLOAD_MAX;
-    m->wires = calloc(m->nodes * dimension / 2 + 2, sizeof *m->wires);
+    m->wires = calloc(m->nodes * dimension / 2 + 1 + CUBE_HOST_WIRES_MAX,
+                      sizeof *m->wires);
     assert_non_null(m->wires);
     for (unsigned i = 0; i < m->count; i++) {
         struct place *p = &m->places[i];
@@ -124,6 +125,9 @@ static inline struct machine *build(unsigned dimension,
         }
     }
     connect_wire(m, 0, dimension, m->nodes, 0, quality);
+    for (unsigned i = 1; i < config->host_wires; i++) {
+        connect_wire(m, i, dimension, m->nodes, i, quality);
+    }
     if (config->spare_node != 0) {
         connect_wire(m, config->spare_node, dimension, m->nodes, 1, quality);
         m->places[config->spare_node].config.host_wire = true;

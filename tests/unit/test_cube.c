@@ -72,6 +72,62 @@ static void broadcasts_from_everywhere(void **unused)
     }
 }
 
+/* The host is wired to each of the first nodes: no letter of it makes a hop in
+ * the dimensions in which those differ. */
+static void a_host_with_many_wires(void **unused)
+{
+    (void)unused;
+    for (unsigned d = 1; d <= 5; d++) {
+        for (unsigned wires = 2; wires <= 1u << d && wires <= 8; wires *= 2) {
+            struct cube_config c = {.window = 1, .host_wires = (uint8_t)wires};
+            struct machine *m = build(d, &c, &perfect, d);
+            m->broadcasts = 10;
+            run(m, 5, 1000000000);
+            check_statistics(m, true);
+            assert_int_equal(cube_links(m->places[m->nodes].cube), wires);
+            destroy(m);
+        }
+    }
+}
+
+static void a_host_wired_to_all_needs_nobody_between(void **unused)
+{
+    struct cube_config c = {.window = 2, .host_wires = 8};
+    (void)unused;
+    struct machine *m = build(3, &c, &perfect, 1);
+    for (unsigned turn = 0; turn < 2000; turn++) { /* all come up */
+        m->now_us += 50;
+        for (unsigned i = 0; i < 9; i++) {
+            cube_poll(m->places[i].cube, m->now_us);
+        }
+    }
+    struct cube *host = m->places[8].cube;
+    for (uint16_t i = 0; i < 8; i++) {
+        struct cube *node = m->places[i].cube;
+        assert_int_equal(cube_write(host, i, 1, "one", 3), 0);
+        assert_int_equal(cube_write(node, CUBE_HOST, 1, "one", 3), 0);
+    }
+    assert_int_equal(cube_write(host, CUBE_ALL, 2, "all", 3), 0);
+    unsigned letters[9] = {0};
+    for (unsigned turn = 0; turn < 2000; turn++) {
+        struct cube_message message;
+        m->now_us += 50;
+        for (unsigned i = 0; i < 9; i++) {
+            struct cube *cube = m->places[i].cube;
+            cube_poll(cube, m->now_us);
+            while (cube_read(cube, &message)) {
+                letters[i]++;
+                cube_release(cube);
+            }
+        }
+    }
+    for (unsigned i = 0; i < 9; i++) {
+        assert_int_equal(letters[i], i < 8 ? 2 : 8);
+        assert_int_equal(cube_statistics(m->places[i].cube)->passed_on, 0);
+    }
+    destroy(m);
+}
+
 /* Each place stops, or does not read, at random times. */
 static void places_that_stall(void **unused)
 {
@@ -290,6 +346,13 @@ static void configs_that_make_no_sense(void **unused)
     c.frame_payload = 408; /* a message would not fit a window of one */
     assert_int_equal(cube_arena_bytes(&c), 0);
     c = good;
+    c.host_wires = 4;
+    assert_true(cube_arena_bytes(&c) > cube_arena_bytes(&good));
+    c.host_wires = 3;
+    assert_int_equal(cube_arena_bytes(&c), 0);
+    c.host_wires = 8; /* of 4 nodes */
+    assert_int_equal(cube_arena_bytes(&c), 0);
+    c = good;
     c.dimension = CUBE_DIMENSION_MAX + 1;
     assert_int_equal(cube_arena_bytes(&c), 0);
 }
@@ -326,6 +389,8 @@ int main(void)
         cmocka_unit_test(every_pair_at_once_in_small_frames),
         cmocka_unit_test(every_pair_at_once_on_bad_wires),
         cmocka_unit_test(broadcasts_from_everywhere),
+        cmocka_unit_test(a_host_with_many_wires),
+        cmocka_unit_test(a_host_wired_to_all_needs_nobody_between),
         cmocka_unit_test(places_that_stall),
         cmocka_unit_test(a_host_that_is_slow),
         cmocka_unit_test(an_unread_message_holds_its_own_link_alone),
