@@ -157,9 +157,10 @@ $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
 
-# The tool that the system tests change point sets with.
-points: $(BUILD)/tests/points
-$(BUILD)/tests/points: $(obj)/tests/system/points.o
+# The tools that the system tests change point sets with, and bytes on a wire.
+points: $(BUILD)/tests/points $(BUILD)/tests/relay
+$(BUILD)/tests/points $(BUILD)/tests/relay: $(BUILD)/tests/%: \
+		$(obj)/tests/system/%.o
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
@@ -256,7 +257,7 @@ run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-d
 	libjansson-dev libserialport-dev libsodium-dev libconfig-dev \
 	libopenmpi-dev openmpi-bin
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
-	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps \
+	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps openssl \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi
 bench_packages = $(run_packages) g++ libcgal-dev jq
 full_packages  = $(test_packages) $(bench_packages) debootstrap

@@ -212,7 +212,12 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;
-    machine.restarts = machine_restarts;
+    /* Without them, nodes are waited for as patiently as the user wants. */
+    bool all_here = true;
+    for (unsigned i = 0; i < machine.nodes; i++) {
+        all_here = all_here && remote->file->local[i];
+    }
+    machine.restarts = all_here ? machine_restarts : NULL;
     machine.kill = machine_kill;
     machine.ended = machine_ended;
     machine.stop = machine_stop;

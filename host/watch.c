@@ -236,7 +236,9 @@ static int check_wire(struct host_service *s, uint64_t now_us,
                          cube_link_peer(s->cube, wire)->node,
                          cube_link_peer(s->cube, wire)->port);
     }
-    if (state != LINK_DOWN) {
+    /* A wire that was never up is waited for: its node may start late. */
+    if (state != LINK_DOWN ||
+        cube_link_statistics(s->cube, wire)->sessions == 0) {
         s->wire_down_us = now_us;
     }
     if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX) {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The same bytes over every kind of wire, also where the wire suffers.
-# 10 seconds.
+# 50 seconds.
 . tests/system/lib.sh
 
 points=$scratch/points.npy
@@ -26,3 +26,118 @@ same '8 small nodes on pseudo-terminals' --nodes 8 --link serial \
     --memory 512K
 same "the host's end closed and reopened" --nodes 8 --link serial \
     --host-unplug 150
+
+# --- a cube file, and a bad network -----------------------------------------
+
+RELAY=${RELAY:-$BUILD/tests/relay}
+base=$((20000 + RANDOM % 20000))
+openssl rand -hex 32 > "$scratch/cube.key"
+
+# make_cube FILE [KEY]: 8 nodes on TCP, started by the host, each wire through
+# the relay; $through its ports.
+make_cube() {
+    local node to wire=0
+    through=
+    {
+        printf 'dimension = 3;\nstart = [0, 1, 2, 3, 4, 5, 6, 7];\n'
+        [ -z "${2:-}" ] || printf 'key = "%s";\n' "$2"
+        printf 'links = (\n'
+        for node in 0 1 2 3 4 5 6 7; do
+            for to in $((node | 1)) $((node | 2)) $((node | 4)) '"host"'; do
+                [ "$to" = "$node" ] && continue
+                [ "$to" = '"host"' ] && [ $node != 0 ] && continue
+                [ $wire = 0 ] || printf ',\n'
+                printf '{ node = %d; to = %s; tcp = "127.0.0.1:%d"; ' $node \
+                    "$to" $((base + wire))
+                printf 'via = "127.0.0.1:%d"; }' $((base + 100 + wire))
+                through="$through $((base + 100 + wire)):$((base + wire))"
+                wire=$((wire + 1))
+            done
+        done
+        printf '\n);\n'
+    } > "$1"
+}
+# relayed NAME SEED BYTES_A_FAULT MS_A_CLOSE DELAY_MS CUBE: the same bytes.
+relayed() {
+    # shellcheck disable=SC2086
+    "$RELAY" "$2" "$3" "$4" "$5" $through > "$scratch/relay" &
+    relay=$!
+    sleep 0.2
+    same "$1" --cube "$6"
+    kill $relay
+    wait $relay
+    check "links/$1: it was bad" "$(cat "$scratch/relay")" grep -qE \
+        '^[1-9][0-9]* flips, [1-9][0-9]* deletions, [1-9][0-9]* closes' \
+        "$scratch/relay"
+}
+make_cube "$scratch/open.cube"
+relayed 'a bad network, without a key' 1 300000 150 4 "$scratch/open.cube"
+make_cube "$scratch/closed.cube" cube.key
+relayed 'a bad network, with a key' 2 300000 150 4 "$scratch/closed.cube"
+
+# Strangers who call, say nothing or noise, and call again, on every wire.
+strangers() {
+    local port
+    while :; do
+        for port in $(seq "$base" $((base + 12))); do
+            (exec 9<> "/dev/tcp/127.0.0.1/$port" &&
+                head -c $((RANDOM % 3000)) /dev/urandom >&9 &&
+                sleep 0.$((RANDOM % 9))) 2> /dev/null &
+        done
+        sleep 0.02
+    done
+}
+# shellcheck disable=SC2086
+"$RELAY" 3 0 0 0 $through > /dev/null &
+relay=$!
+strangers &
+strangers=$!
+same 'strangers on every wire' --cube "$scratch/closed.cube"
+kill $relay $strangers
+wait $relay $strangers 2> /dev/null
+
+# A node that knows another key, and one without any.
+cat > "$scratch/one.cube" <<-END
+	dimension = 0;
+	key = "cube.key";
+	links = ( { node = 0; to = "host"; tcp = "127.0.0.1:$base"; } );
+END
+"$INCODE" cube "$scratch/one.cube" > "$scratch/straps"
+openssl rand -hex 32 > "$scratch/other.key"
+refused() { # NAME SED
+    local began=$SECONDS
+    # shellcheck disable=SC2046
+    "$BUILD/"$(sed "$2" "$scratch/straps") 2> "$scratch/said" &
+    node=$!
+    timeout 60 "$INCODE" run "$points" -q -o "$scratch/out.npy" --patience 2 \
+        --cube "$scratch/one.cube" 2> "$scratch/errors"
+    status=$?
+    kill $node
+    wait $node 2> /dev/null
+    check "links/$1" "exit $status: $(last "$scratch/errors")" \
+        test $status = 4 -a $((SECONDS - began)) -lt 10
+    check "links/$1: it is named" "$(last "$scratch/errors")" \
+        grep -q '^incode: node 0 link 0: ' "$scratch/errors"
+}
+rm -f "$scratch/out.npy"
+refused 'another key: exit 4' 's/cube.key/other.key/'
+refused 'no key: exit 4' 's/--key [^ ]*//'
+check 'links/no output without a key' 'it left one' test ! -e "$scratch/out.npy"
+sed -i 's/--key [^ ]*//; s/127.0.0.1/0.0.0.0/' "$scratch/straps"
+# shellcheck disable=SC2046
+"$BUILD/"$(cat "$scratch/straps") 2> "$scratch/said" &
+node=$!
+sleep 0.3
+kill $node
+wait $node 2> /dev/null
+check 'links/without a key on loopback only' "$(cat "$scratch/said")" \
+    grep -q 'no --key: listens for this machine' "$scratch/said"
+
+printf 'dimension = 1;\nlinks = (\n{ node = 0; to = 3; };\n' \
+    > "$scratch/bad.cube"
+"$INCODE" run "$points" --cube "$scratch/bad.cube" 2> "$scratch/errors"
+status=$?
+check 'links/a bad cube file' "exit $status: $(last "$scratch/errors")" \
+    test $status = 3
+check 'links/a bad cube file: its line' "$(last "$scratch/errors")" \
+    grep -qE "^incode: $scratch/bad.cube:[0-9]+: .*; " "$scratch/errors"
