@@ -38,6 +38,15 @@ static int take_requests(struct host_service *s,
     return 0;
 }
 
+/* Whether letters of that node have been lost before this one: then what it
+ * says is a part that must not be taken for the whole. */
+static bool missing(struct host_service *s, const struct host_node *node,
+                    uint32_t letters)
+{
+    s->loss = s->loss || letters != node->received;
+    return letters != node->received;
+}
+
 /* Rows go straight to their place; a commit may follow any of them. */
 static int take_results(struct host_service *s,
                         const struct cube_message *message,
@@ -45,20 +54,21 @@ static int take_results(struct host_service *s,
 {
     struct node_result_reader reader;
     enum node_result_event event;
-    uint32_t epoch;
-    if (message->size < sizeof epoch) {
-        return unsound(message, "sent results without an epoch", error);
+    struct node_result_header header;
+    if (message->size < sizeof header) {
+        return unsound(message, "sent results without a header", error);
     }
-    memcpy(&epoch, message->data, sizeof epoch);
+    memcpy(&header, message->data, sizeof header);
     struct host_node *node = &s->node[message->source];
     node->results++;
-    if (!host_ledger_current(&s->ledger, message->source, epoch)) {
+    if (missing(s, node, header.letters) ||
+        !host_ledger_current(&s->ledger, message->source, header.epoch)) {
         return 0;
     }
     /* Four bytes are the least that a tetrahedron takes. */
     size_t room = message->size / 4u + 1;
-    node_result_open(&reader, message->data + sizeof epoch,
-                     message->size - sizeof epoch,
+    node_result_open(&reader, message->data + sizeof header,
+                     message->size - sizeof header,
                      s->order->bricks * INCODE_BRICK_POINTS);
     do {
         size_t count;
@@ -138,6 +148,9 @@ static int take_finished(struct host_service *s,
         return unsound(message, "sent statistics in another language", error);
     }
     memcpy(&finished, message->data, sizeof finished);
+    if (missing(s, node, finished.letters)) {
+        return 0;
+    }
     if (finished.epoch != 0 &&
         !host_ledger_current(&s->ledger, message->source, finished.epoch)) {
         return unsound(message, "sent statistics out of turn", error);

@@ -125,6 +125,7 @@ static bool send_unspill(struct host_service *s, uint16_t to,
         return false;
     }
     body.header.last = list->faces == 0;
+    body.header.letters = node->sent - node->missed;
     if (body.header.last) {
         node->unspills_first = (node->unspills_first + 1) % HOST_UNSPILLS_MAX;
         node->unspills_count--;
@@ -324,16 +325,44 @@ static bool pages_wait(const struct host_service *s)
 
 /* --- generations ---------------------------------------------------------- */
 
+/* Whether the host can speak by that node: by a wire, and on to another. */
+static bool speaks(const struct host_service *s, const struct cube_wiring *w,
+                   uint16_t gate)
+{
+    unsigned dimension = s->machine->dimension;
+    bool on = dimension == 0;
+    for (unsigned d = 0; d < dimension; d++) {
+        on = on || !wiring_is_dead(w, w->dead_count, gate, d, dimension);
+    }
+    return on && !wiring_is_dead(w, w->dead_count, gate, dimension, dimension);
+}
+
 /* The node by which the host speaks from now on: as before, or the other one
  * that has a wire to the host. */
 static uint16_t choose_gate(const struct host_service *s,
                             const struct cube_wiring *next)
 {
-    unsigned dimension = s->machine->dimension;
     uint16_t other = next->gate != 0 ? 0 : s->machine->spare_node;
-    bool dead = wiring_is_dead(next, next->dead_count, next->gate, dimension,
-                               dimension);
-    return dead ? other : next->gate;
+    return !speaks(s, next, next->gate) && speaks(s, next, other) ? other
+                                                                  : next->gate;
+}
+
+/* The gate must be there, and what was given up must not be on the way. */
+static int check_renewed(const struct host_service *s, struct host_error *error)
+{
+    const struct cube_wiring *w = cube_wiring(s->cube);
+    unsigned dimension = s->machine->dimension;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        bool dead = wiring_is_dead(w, w->dead_count, i, dimension, dimension);
+        if (i == w->gate ? dead : s->node[i].given_up && !dead) {
+            return host_fail(error, HOST_CUBE,
+                             "node %u link %u: lost, and the cube cannot go "
+                             "on without it; look after that node and its "
+                             "wires, and run again",
+                             i, host_watch_link(s, i));
+        }
+    }
+    return 0;
 }
 
 /* After a loss: all nodes begin again, with what is not committed. */
@@ -364,15 +393,8 @@ static int renew(struct host_service *s, uint64_t now_us,
     cube_renew(s->cube, &next);
     s->generations++;
     host_watch_begin(s, now_us);
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (i == next.gate ? s->node[i].lost
-                           : s->node[i].given_up && !s->node[i].lost) {
-            return host_fail(error, HOST_CUBE,
-                             "node %u link %u: lost, and the cube cannot go "
-                             "on without it; look after that node and its "
-                             "wires, and run again",
-                             i, host_watch_link(s, i));
-        }
+    if (check_renewed(s, error) != 0) {
+        return error->code;
     }
     if (s->started) {
         unsigned workers = s->workers == 1 ? 1 : s->living;

@@ -93,11 +93,13 @@ struct host_service {
     struct host_spill spill;
     struct host_progress progress;
     bool started, finished;
-    bool dealt;           /* the first jobs of this generation are out */
-    bool over;            /* all is here that is needed */
-    bool loss;            /* a new generation is due */
-    bool wire_lost;       /* the one in use is dead */
-    unsigned living;      /* nodes that are not lost */
+    bool dealt;          /* the first jobs of this generation are out */
+    bool over;           /* all is here that is needed */
+    bool loss;           /* a new generation is due */
+    bool wire_lost;      /* the one in use is dead */
+    bool probe, probing; /* nodes are called one by one: in the next generation;
+                            now, until all have answered */
+    unsigned living;     /* nodes that are not lost */
     unsigned here, ready; /* of them, that are up; that have their setup */
     unsigned working;     /* that have a job */
     unsigned turn;        /* the node to be served next */

@@ -10,6 +10,7 @@ enum {
     CALL_EVERY_US = 5000,      /* but no more than one node in this time */
     CALL_AGAIN_US = 2000000,   /* a call may have been lost with a node; */
     CALL_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
+    PROBE_US = 3000000,
     WIRE_DOWN_US_MAX = 8000000,
     BRING_UP_US_MAX = 9000000
 };
@@ -35,18 +36,42 @@ static void close_start(struct host_service *s, unsigned i)
     node->before = s->report[i].statistics;
 }
 
+static unsigned distance(const struct host_service *s, unsigned node)
+{
+    return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gate);
+}
+
+/* Calls one more node: of those that have not answered one that is nearest to
+ * the gate, so that the way to it leads over nodes that have. */
+static void call_next(struct host_service *s)
+{
+    unsigned best = UINT32_MAX;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->node[i].lost && !s->report[i].here &&
+            (best == UINT32_MAX || distance(s, i) < distance(s, best))) {
+            best = i;
+        }
+    }
+    s->probing = best != UINT32_MAX;
+    if (s->probing) {
+        s->node[best].call_due = true;
+    }
+}
+
 void host_watch_begin(struct host_service *service, uint64_t now_us)
 {
     struct host_service *s = service;
     s->loss = false;
+    s->probing = s->probe;
+    s->probe = false;
     s->living = s->here = s->ready = 0;
     s->began_us = now_us;
     s->call_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
-        node->lost = !cube_reaches(s->cube, (uint16_t)i);
+        node->lost = node->given_up || !cube_reaches(s->cube, (uint16_t)i);
         s->living += !node->lost;
-        node->call_due = !node->lost;
+        node->call_due = !node->lost && !s->probing;
         node->called_us = now_us;
         node->calling = false;
         node->call_again_us = CALL_AGAIN_US_MIN;
@@ -56,6 +81,9 @@ void host_watch_begin(struct host_service *service, uint64_t now_us)
         if (node->lost) {
             close_start(s, i);
         }
+    }
+    if (s->probing) {
+        call_next(s);
     }
 }
 
@@ -96,7 +124,8 @@ int host_watch_answer(struct host_service *service,
                          message->source);
     }
     memcpy(&here, message->data, sizeof here);
-    if (!report->here) {
+    bool first = !report->here;
+    if (first) {
         /* It has had nothing but calls yet.  The first of them may have gone
          * to a link's end that was just about to start again. */
         report->here = true;
@@ -114,12 +143,18 @@ int host_watch_answer(struct host_service *service,
         s->loss = true;
     }
     node->calling = false;
+    if (first && s->probing) {
+        call_next(s);
+    }
     return 0;
 }
 
 /* Has each node called once a period, one after the other. */
 static void call_in_turn(struct host_service *s, uint64_t now_us)
 {
+    if (s->probing) {
+        return;
+    }
     uint64_t every = CALLS_EVERY_US / s->machine->nodes;
     every = every < CALL_EVERY_US ? CALL_EVERY_US : every;
     for (unsigned i = 0; i < s->machine->nodes && now_us - s->call_us >= every;
@@ -171,43 +206,17 @@ static int fail_wrong(const struct cube_wrong *wrong, struct host_error *error)
                      wrong->node, wrong->link, peer, expected);
 }
 
-static unsigned distance(const struct host_service *s, unsigned node)
-{
-    return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gate);
-}
-
-/* Gives up the nodes that patience has run out for: of those, the ones that
- * are nearest to the gate, since the others speak through them. */
-static void give_up(struct host_service *s)
-{
-    unsigned nearest = UINT32_MAX;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (s->node[i].silent_us > s->patience_us && distance(s, i) < nearest) {
-            nearest = distance(s, i);
-        }
-    }
-    for (unsigned i = 0; i < s->machine->nodes && nearest != UINT32_MAX; i++) {
-        struct host_node *node = &s->node[i];
-        bool silent = node->silent_us > s->patience_us;
-        node->silent_us = silent ? 0 : node->silent_us;
-        if (silent && distance(s, i) == nearest &&
-            (s->machine->kill == NULL ||
-             !s->machine->kill(s->machine->context, i))) {
-            node->given_up = true;
-            s->loss = true;
-        }
-    }
-}
-
+/* Nodes that are silent, and what follows.  One that takes nothing off its
+ * links holds up all that is on the way to it and behind, and so makes others
+ * silent: at first nobody is blamed, but each is called alone. */
 static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
 {
-    bool enough = false;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    uint64_t limit = s->patience_us;
+    if (s->probing && limit > PROBE_US) {
+        limit = PROBE_US;
+    }
+    for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];
-        if (!node->lost && (node->calling || node->call_due)) {
-            node->silent_us += elapsed_us;
-            enough = enough || node->silent_us > s->patience_us;
-        }
         if (node->calling && now_us - node->called_us >= node->call_again_us) {
             node->call_due = true;
             node->called_us = now_us;
@@ -215,9 +224,21 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
                                       ? 2 * node->call_again_us
                                       : CALL_AGAIN_US;
         }
-    }
-    if (enough) {
-        give_up(s);
+        if (!s->started || node->lost || !(node->calling || node->call_due)) {
+            continue;
+        }
+        node->silent_us += elapsed_us;
+        if (node->silent_us <= limit) {
+            continue;
+        }
+        node->silent_us = 0;
+        s->probe = true;
+        if (s->probing && s->machine->kill != NULL &&
+            s->machine->kill(s->machine->context, i)) {
+            continue; /* the machine will say that it has started it again */
+        }
+        node->given_up = s->probing;
+        s->loss = true;
     }
 }
 

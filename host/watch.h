@@ -4,9 +4,9 @@
  * it has had and sent; another start than before, or a count that does not
  * match, is a loss.  So is a node that the machine had to start again, a dead
  * link that the cube has found, and a node that does not answer for the length
- * of the service's patience: the machine ends it, if it can start it again, and
- * it counts as lost otherwise.  A node that others speak through is blamed
- * before them.
+ * of the service's patience, and for a moment more in the next generation, when
+ * it is called alone: the machine ends it, if it can start it again, and it
+ * counts as lost otherwise.
  *
  * Memory: none of its own.  Work: constant a message; one pass over the nodes
  * at each check, every 20 ms.

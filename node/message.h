@@ -12,6 +12,7 @@
 #define NODE_MESSAGE_H
 
 #include <assert.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "../incode/triangulator.h"
@@ -35,10 +36,10 @@ enum node_message_type {
     NODE_STOP,      /* nothing, to all: the run is over */
     NODE_CALL,      /* struct node_call_message: asks for NODE_HERE */
     /* To the host. */
-    NODE_READY = 32,      /* struct node_ready_message */
-    NODE_PAGE_REQUEST,    /* uint32 page numbers; also to a holder */
-    NODE_RESULT,          /* uint32 job epoch, then records: result.h */
-    NODE_SPILL,           /* struct node_spill_header, then faces */
+    NODE_READY = 32,   /* struct node_ready_message */
+    NODE_PAGE_REQUEST, /* uint32 page numbers; also to a holder */
+    NODE_RESULT,       /* struct node_result_header, then records: result.h */
+    NODE_SPILL,        /* struct node_spill_header, then faces */
     NODE_UNSPILL_REQUEST, /* struct node_spill_header */
     NODE_FINISHED,        /* struct node_finished_message */
     NODE_FAULT,           /* text without a final 0 */
@@ -79,11 +80,20 @@ struct node_job_message {
     struct incode_job job;
 };
 
+/* `letters`, here and below: those to the receiver before this one.  Where it
+ * has had others, some were lost, and this one does not count: what follows
+ * from a part alone would be wrong. */
+struct node_result_header {
+    uint32_t epoch;
+    uint32_t letters;
+};
+
 struct node_spill_header {
     uint32_t epoch;
-    uint32_t brick; /* of NODE_UNSPILL and its request */
-    uint32_t count; /* faces that follow */
-    uint32_t last;  /* NODE_UNSPILL: no more of this brick */
+    uint32_t brick;   /* of NODE_UNSPILL and its request */
+    uint32_t count;   /* faces that follow */
+    uint32_t last;    /* NODE_UNSPILL: no more of this brick */
+    uint32_t letters; /* NODE_UNSPILL */
 };
 
 /* The memory map of a node, bytes: what its board holds outside the arena,
@@ -104,8 +114,9 @@ struct node_ready_message {
 
 /* Of all jobs and roles since the start of the node. */
 struct node_finished_message {
-    uint32_t epoch;   /* of the job that is done; 0: it is a report alone */
-    uint32_t start;   /* the epoch of this start of the node */
+    uint32_t epoch; /* of the job that is done; 0: it is a report alone */
+    uint32_t start; /* the epoch of this start of the node */
+    uint32_t letters, reserved;
     uint64_t wall_us; /* from each job's arrival to its last result */
     uint64_t busy_us; /* processor time of the node */
     uint64_t bytes_in, bytes_out; /* payload of messages, at this node */
@@ -119,10 +130,12 @@ struct node_finished_message {
 static_assert(sizeof(struct incode_face) == 12, "face layout");
 static_assert(sizeof(struct incode_job) == 56, "job layout");
 static_assert(sizeof(struct node_job_message) == 64, "job layout");
-static_assert(sizeof(struct node_spill_header) == 16, "spill layout");
+static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
 static_assert(sizeof(struct node_setup_message) ==
                   16 + sizeof(struct incode_setup),
               "setup layout");
+static_assert(offsetof(struct node_finished_message, wall_us) == 16,
+              "statistics layout");
 static_assert(sizeof(struct node_finished_message) <= CUBE_PAYLOAD_MAX,
               "statistics fit a message");
 static_assert(4 + INCODE_PAGE_BYTES <= CUBE_PAYLOAD_MAX,

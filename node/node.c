@@ -295,6 +295,7 @@ static bool send_finished(struct node *n, uint32_t epoch)
     finished.busy_us = n->board->busy_us(n->board->context);
     finished.epoch = epoch;
     finished.start = n->board->identity.epoch;
+    finished.letters = n->letters.sent;
     INCODE_ASSERT(node_letters_write(&n->letters, CUBE_HOST, NODE_FINISHED,
                                      &finished, sizeof finished) == 0);
     return true;

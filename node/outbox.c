@@ -31,7 +31,7 @@ void node_outbox_close(struct node_outbox *box, uint8_t type, size_t size)
     }
 }
 
-const struct node_outbox_slot *node_outbox_first(const struct node_outbox *box)
+struct node_outbox_slot *node_outbox_first(const struct node_outbox *box)
 {
     return box->used == 0 ? NULL : &box->slots[box->first];
 }

@@ -46,7 +46,7 @@ uint8_t *node_outbox_open(struct node_outbox *box);
 void node_outbox_close(struct node_outbox *box, uint8_t type, size_t size);
 
 /* The oldest closed message, or NULL. */
-const struct node_outbox_slot *node_outbox_first(const struct node_outbox *box);
+struct node_outbox_slot *node_outbox_first(const struct node_outbox *box);
 void node_outbox_drop(struct node_outbox *box);
 
 #endif

@@ -5,8 +5,8 @@
 #include "../incode/check.h"
 
 enum {
-    EPOCH_BYTES = 4, /* before the records of a batch */
-    BATCH_BYTES = CUBE_PAYLOAD_MAX - EPOCH_BYTES,
+    HEADER_BYTES = sizeof(struct node_result_header),
+    BATCH_BYTES = CUBE_PAYLOAD_MAX - HEADER_BYTES,
     /* Tetrahedra that a batch takes however they come, a star each. */
     BATCH_TETRAHEDRA =
         BATCH_BYTES / (NODE_RESULT_STAR_MAX + NODE_RESULT_TETRAHEDRON_MAX),
@@ -42,8 +42,9 @@ static size_t port_emit_room(void *context)
 static void open_batch(struct node_worker *w)
 {
     uint8_t *data = node_outbox_open(&w->results);
-    memcpy(data, &w->epoch, EPOCH_BYTES);
-    node_result_begin(&w->writer, data + EPOCH_BYTES, BATCH_BYTES);
+    struct node_result_header header = {w->epoch, 0};
+    memcpy(data, &header, sizeof header);
+    node_result_begin(&w->writer, data + HEADER_BYTES, BATCH_BYTES);
     w->open = true;
 }
 
@@ -51,7 +52,7 @@ static void close_batch(struct node_worker *w)
 {
     if (w->open) {
         node_outbox_close(&w->results, NODE_RESULT,
-                          EPOCH_BYTES + w->writer.size);
+                          HEADER_BYTES + w->writer.size);
         w->open = false;
     }
 }
@@ -99,7 +100,7 @@ static void port_commit(void *context, uint32_t brick)
 static void close_spill(struct node_worker *w)
 {
     if (w->spill_count > 0) {
-        struct node_spill_header header = {w->epoch, 0, w->spill_count, 0};
+        struct node_spill_header header = {w->epoch, 0, w->spill_count, 0, 0};
         memcpy(node_outbox_open(&w->spills), &header, sizeof header);
         node_outbox_close(&w->spills, NODE_SPILL,
                           sizeof header +
@@ -146,7 +147,7 @@ static bool port_unspill(void *context, uint32_t brick)
         return false;
     }
     close_spill(w); /* what was spilled before is part of the list */
-    struct node_spill_header header = {w->epoch, brick, 0, 0};
+    struct node_spill_header header = {w->epoch, brick, 0, 0, 0};
     memcpy(node_outbox_open(&w->spills), &header, sizeof header);
     node_outbox_close(&w->spills, NODE_UNSPILL_REQUEST, sizeof header);
     return true;
@@ -243,7 +244,7 @@ static void take_unspill(struct node_worker *w, const uint8_t *data,
         w->fault = "a spilled list of a wrong size";
         return;
     }
-    if (header.epoch != w->epoch) {
+    if (header.epoch != w->epoch || header.letters != w->letters->received) {
         return;
     }
     memcpy(faces, data + sizeof header, header.count * sizeof faces[0]);
@@ -327,9 +328,16 @@ static void send_wanted(struct node_worker *w)
 /* Sends the first message of an outbox; false where the link has no room. */
 static bool send_first(struct node_worker *w, struct node_outbox *box)
 {
-    const struct node_outbox_slot *slot = node_outbox_first(box);
-    if (slot == NULL || node_letters_write(w->letters, CUBE_HOST, slot->type,
-                                           slot->data, slot->size) != 0) {
+    struct node_outbox_slot *slot = node_outbox_first(box);
+    if (slot == NULL) {
+        return false;
+    }
+    if (slot->type == NODE_RESULT) {
+        memcpy(slot->data + offsetof(struct node_result_header, letters),
+               &w->letters->sent, sizeof w->letters->sent);
+    }
+    if (node_letters_write(w->letters, CUBE_HOST, slot->type, slot->data,
+                           slot->size) != 0) {
         return false;
     }
     w->bytes_out += slot->size;

@@ -83,6 +83,8 @@ static void end(void)
     host_tetrahedra_free(&tets);
 }
 
+static bool gap; /* letters do not say how many went before them */
+
 static int send(uint16_t source, uint8_t type, const void *data, size_t size,
                 struct host_error *error)
 {
@@ -91,6 +93,12 @@ static int send(uint16_t source, uint8_t type, const void *data, size_t size,
     assert_non_null(copy);
     if (size > 0) {
         memcpy(copy, data, size);
+    }
+    if (type == NODE_RESULT && size >= 8 && source < NODES && !gap) {
+        memcpy(copy + 4, &service.node[source].received, 4);
+    }
+    if (type == NODE_FINISHED && size >= 16 && source < NODES && !gap) {
+        memcpy(copy + 8, &service.node[source].received, 4);
     }
     struct cube_message message = {source, (uint16_t)size, type, copy};
     int status = host_intake(&service, &message, error);
@@ -137,11 +145,12 @@ static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick)
 {
     struct node_result_writer writer;
     const uint32_t apexes[1][3] = {{1, 2, 3}};
-    memcpy(data, &epoch, 4);
-    node_result_begin(&writer, data + 4, 100);
+    struct node_result_header header = {epoch, 0};
+    memcpy(data, &header, sizeof header);
+    node_result_begin(&writer, data + sizeof header, 100);
     assert_int_equal(node_result_star(&writer, 0, apexes, 1), 1);
     assert_int_equal(node_result_commit(&writer, brick), 1);
-    return 4 + writer.size;
+    return sizeof header + writer.size;
 }
 
 /* Results of a job that is no more are counted as read, and dropped. */
@@ -163,6 +172,32 @@ static void test_epochs(void **unused)
     /* The same brick a second time cannot be. */
     assert_int_equal(send(0, NODE_RESULT, data, size, &error), HOST_CUBE);
     end();
+}
+
+/* What comes after a letter that was lost does not count, and is a loss. */
+static void test_gaps(void **unused)
+{
+    (void)unused;
+    static struct node_finished_message finished;
+    uint8_t data[128];
+    struct host_error error = {0};
+    for (int i = 0; i < 2; i++) {
+        begin();
+        size_t size = batch(data, service.ledger.job[0].epoch, 0);
+        service.node[0].received = 1;
+        finished.epoch = service.ledger.job[0].epoch;
+        gap = true;
+        assert_int_equal(
+            i == 0 ? send(0, NODE_RESULT, data, size, &error)
+                   : send(0, NODE_FINISHED, &finished, sizeof finished, &error),
+            0);
+        gap = false;
+        assert_true(service.loss);
+        assert_int_equal(service.ledger.committed, 0);
+        assert_int_equal(tets.count, 0);
+        assert_false(service.node[0].reported);
+        end();
+    }
 }
 
 /* A node that has not committed all its bricks is not done. */
@@ -264,9 +299,10 @@ static void test_fault(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_any_bytes),  cmocka_unit_test(test_epochs),
-        cmocka_unit_test(test_unfinished), cmocka_unit_test(test_answers),
-        cmocka_unit_test(test_starts),     cmocka_unit_test(test_fault),
+        cmocka_unit_test(test_any_bytes), cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_gaps),      cmocka_unit_test(test_unfinished),
+        cmocka_unit_test(test_answers),   cmocka_unit_test(test_starts),
+        cmocka_unit_test(test_fault),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -21,8 +21,8 @@ static void test_layouts(void **unused)
     assert_int_equal(sizeof(struct node_setup_message), 96);
     assert_int_equal(offsetof(struct node_job_message, job.lo), 16);
     assert_int_equal(sizeof(struct node_job_message), 64);
-    assert_int_equal(sizeof(struct node_spill_header), 16);
-    assert_int_equal(offsetof(struct node_finished_message, wall_us), 8);
+    assert_int_equal(sizeof(struct node_spill_header), 20);
+    assert_int_equal(offsetof(struct node_finished_message, wall_us), 16);
     assert_int_equal(sizeof(struct node_finished_message) % 8, 0);
     assert_true(sizeof(struct node_ready_message) <= CUBE_PAYLOAD_MAX);
     assert_int_equal(sizeof(struct node_ready_message) % 4, 0);

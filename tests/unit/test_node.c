@@ -37,7 +37,7 @@ struct waiting {
     struct node_spill_header unspill;
     struct host_spill_list list;
     bool unspills, ready, finished;
-    uint32_t results, credit;
+    uint32_t results, credit, sent;
 };
 
 static struct {
@@ -186,7 +186,7 @@ static void take_result(const struct cube_message *m)
     memcpy(&epoch, m->data, 4);
     assert_true(host_ledger_current(&world.ledger, m->source, epoch));
     world.waiting[m->source].results++;
-    node_result_open(&reader, m->data + 4, m->size - 4u,
+    node_result_open(&reader, m->data + 8, m->size - 8u,
                      64 * world.order.bricks);
     do {
         uint32_t(*rows)[4] = host_tetrahedra_room(&world.tets, 500, &error);
@@ -251,6 +251,14 @@ static void take(const struct cube_message *m)
     }
 }
 
+/* Letters are counted: they say so themselves, where it matters. */
+static int write_to(uint16_t to, uint8_t type, const void *data, size_t size)
+{
+    int status = cube_write(world.cube, to, type, data, size);
+    world.waiting[to].sent += status == 0;
+    return status;
+}
+
 static void serve(uint16_t to)
 {
     struct waiting *w = &world.waiting[to];
@@ -265,13 +273,13 @@ static void serve(uint16_t to)
     } body;
     uint32_t credit = w->results + world.setup.credits;
     if (credit != w->credit &&
-        cube_write(world.cube, to, NODE_CREDIT, &credit, sizeof credit) == 0) {
+        write_to(to, NODE_CREDIT, &credit, sizeof credit) == 0) {
         w->credit = credit;
     }
     while (w->count > 0) {
         body.page = w->pages[w->first];
         size_t size = host_page(&world.order, body.page, body.data);
-        if (cube_write(world.cube, to, NODE_PAGE, &body, 4 + size) != 0) {
+        if (write_to(to, NODE_PAGE, &body, 4 + size) != 0) {
             break;
         }
         w->first = (w->first + 1) % QUEUE;
@@ -284,11 +292,11 @@ static void serve(uint16_t to)
                                          &back.header.count, &error),
                          0);
         back.header.last = w->list.faces == 0;
+        back.header.letters = w->sent;
         w->unspills = !back.header.last;
-        assert_int_equal(
-            cube_write(world.cube, to, NODE_UNSPILL, &back,
-                       sizeof back.header + 12 * back.header.count),
-            0);
+        assert_int_equal(write_to(to, NODE_UNSPILL, &back,
+                                  sizeof back.header + 12 * back.header.count),
+                         0);
     }
 }
 
@@ -327,8 +335,7 @@ static void give_jobs(void)
         memcpy(job.job.hi, region->hi, sizeof region->hi);
         job.epoch =
             host_ledger_open(&world.ledger, i, region->first, region->last);
-        while (cube_write(world.cube, (uint16_t)i, NODE_JOB, &job,
-                          sizeof job) != 0) {
+        while (write_to((uint16_t)i, NODE_JOB, &job, sizeof job) != 0) {
             step();
         }
     }
@@ -398,6 +405,7 @@ static void run(const struct host_points *points, struct shape shape,
     }
     for (unsigned i = 0; i < world.nodes; i++) {
         world.waiting[i].credit = world.setup.credits;
+        world.waiting[i].sent = 1; /* the setup */
     }
     give_jobs();
     while (world.finished < world.workers) {
