@@ -408,7 +408,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                           (uint8_t)cube->stamp,
                           (uint8_t)(cube->stamp >> 8)};
     LINK_ASSERT(size <= CUBE_PAYLOAD_MAX);
-    cube->statistics.unreachable += ways == 0;
+    cube->statistics.unreachable += ways == 0 && dest != CUBE_ALL;
     if (room_on(cube, ways, HEAD + size) == 0) {
         return CUBE_AGAIN;
     }
@@ -428,26 +428,39 @@ unsigned cube_room(const struct cube *cube, uint16_t dest)
     return room_on(cube, ways_out(cube, dest), MESSAGE_MAX);
 }
 
+bool cube_read_from(struct cube *cube, unsigned d, struct cube_message *message)
+{
+    LINK_ASSERT(cube->held == CUBE_LINKS_MAX && d < cube->count);
+    pass_on_from(cube, d);
+    const struct cube_arrival *a = &cube->arrivals[d];
+    if (!a->there || (a->ways & (uint32_t)1 << LOCAL) == 0) {
+        return false;
+    }
+    const uint8_t *head = a->message.data;
+    message->source = (uint16_t)field16(head + 2);
+    message->type = head[4];
+    message->size = (uint16_t)(a->message.size - HEAD);
+    message->data = head + HEAD;
+    cube->held = d;
+    return true;
+}
+
 bool cube_read(struct cube *cube, struct cube_message *message)
 {
-    LINK_ASSERT(cube->held == CUBE_LINKS_MAX);
     for (unsigned i = 0; i < cube->count; i++) {
         unsigned d = cube->turn + i;
-        d = d < cube->count ? d : d - cube->count;
-        pass_on_from(cube, d);
-        struct cube_arrival *a = &cube->arrivals[d];
-        if (!a->there || (a->ways & (uint32_t)1 << LOCAL) == 0) {
-            continue;
+        if (cube_read_from(cube, d < cube->count ? d : d - cube->count,
+                           message)) {
+            return true;
         }
-        const uint8_t *head = a->message.data;
-        message->source = (uint16_t)field16(head + 2);
-        message->type = head[4];
-        message->size = (uint16_t)(a->message.size - HEAD);
-        message->data = head + HEAD;
-        cube->held = d;
-        return true;
     }
     return false;
+}
+
+void cube_put_back(struct cube *cube)
+{
+    LINK_ASSERT(cube->held < cube->count);
+    cube->held = CUBE_LINKS_MAX;
 }
 
 void cube_release(struct cube *cube)

@@ -139,6 +139,12 @@ unsigned cube_room(const struct cube *cube, uint16_t dest);
 bool cube_read(struct cube *cube, struct cube_message *message);
 void cube_release(struct cube *cube);
 
+/* The same from link d alone; and instead of cube_release, to leave it unread
+ * for now. */
+bool cube_read_from(struct cube *cube, unsigned d,
+                    struct cube_message *message);
+void cube_put_back(struct cube *cube);
+
 /* State of link d: counters, and whether its peer is up. */
 const struct link_statistics *cube_link_statistics(const struct cube *cube,
                                                    unsigned d);
