@@ -116,7 +116,7 @@ $(obj)/node/%.o: node/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
-$(mpi_host) $(mpi_node): private HOSTED += $(MPI_CFLAGS)
+$(mpi_host) $(mpi_node) $(obj)/tests/bench/mpi_hops.o: private HOSTED += $(MPI_CFLAGS)
 $(obj)/transport/drivers/%.o: transport/drivers/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
@@ -164,6 +164,12 @@ $(BUILD)/tests/points $(BUILD)/tests/relay: $(BUILD)/tests/%: \
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
+
+$(BUILD)/tests/mpi_hops: $(obj)/tests/bench/mpi_hops.o \
+		$(obj)/transport/drivers/mpi.o $(BUILD)/libcore.a
+	@mkdir -p $(@D)
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
 # CGAL, for comparison in `make bench` alone.  -frounding-math: its filters
 # are wrong without it.

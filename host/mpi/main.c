@@ -73,8 +73,8 @@ int main(int argc, char **argv)
                            strerror(errno));
     }
     /* The launcher knows how a rank was lost. */
-    bool heard = host_launch_report(status, ranks.lost, ranks.stuck);
-    if (status != 0 && !(heard && (ranks.lost != 0 || ranks.stuck))) {
+    bool heard = host_launch_report(status, ranks.lost, ranks.terminated);
+    if (status != 0 && !(heard && (ranks.lost != 0 || ranks.terminated))) {
         (void)fprintf(stderr, "incode: %s\n", error.text);
     }
     host_ranks_close(&ranks, status);

@@ -134,7 +134,7 @@ static int check(void *context, struct host_error *error)
                          r->lost - 1, r->lost);
     }
     if (terminated) {
-        r->stuck = true;
+        r->terminated = true;
         return host_fail(error, HOST_CUBE,
                          "mpirun: it ends the job; where it names a rank, that "
                          "is the one lost, else run again");
@@ -197,7 +197,7 @@ static void machine_stop(void *context)
         return;
     }
     r->running = false;
-    if (r->lost != 0 || r->stuck) {
+    if (r->lost != 0 || r->terminated) {
         for (unsigned i = 0; i < r->wires; i++) {
             r->pipe[i].closed = true; /* nobody is there to part from */
         }
@@ -233,9 +233,9 @@ struct host_machine host_ranks_machine(struct host_ranks *ranks)
 
 void host_ranks_close(struct host_ranks *ranks, int status)
 {
-    if (ranks->lost != 0 || ranks->stuck) {
+    if (ranks->lost != 0 || ranks->terminated || ranks->stuck) {
         (void)fflush(NULL);
-        _exit(status == 0 ? HOST_CUBE : status);
+        _exit(status);
     }
     leave(ranks);
 }

@@ -28,6 +28,7 @@ struct host_ranks {
     unsigned cubes_due;       /* until the ranks may leave */
     unsigned cubes, ended;    /* begun so far; nodes of this one */
     bool open, running, left; /* the place; a cube; MPI */
+    bool terminated;          /* the job is ended from outside */
     bool stuck;               /* a rank does not answer */
     int lost;                 /* rank; 0: none */
 };
@@ -42,8 +43,8 @@ int host_ranks_begin(struct host_ranks *ranks, unsigned nodes, uint64_t memory,
 struct host_machine host_ranks_machine(struct host_ranks *ranks);
 
 /* Lets the other ranks go and ends MPI, where that has not been done; `status`
- * is what the program will end with.  Does not return where a rank is lost or
- * stuck. */
+ * is what the program will end with.  Does not return where ranks are left that
+ * do not hear: mpirun ends them then. */
 void host_ranks_close(struct host_ranks *ranks, int status);
 
 #endif

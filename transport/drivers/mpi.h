@@ -95,7 +95,8 @@ void mpi_pipe_end(struct mpi_pipe *pipe);
 void mpi_ring(struct mpi_place *place, int rank);
 
 /* Sleeps until one of the pipes has bytes, or room where it had none, or
- * `request` (or none: MPI_REQUEST_NULL) is complete, no longer than wait_us. */
+ * `request` (NULL: none), which is rank 0's to fulfil, is complete; no longer than
+ * wait_us. */
 void mpi_sleep(struct mpi_place *place, struct mpi_pipe *pipes, unsigned count,
                MPI_Request *request, uint64_t wait_us);
 
