@@ -8,6 +8,7 @@
 
 #include "../incode/predicates.h"
 #include "arguments.h"
+#include "bench_links.h"
 #include "convert.h"
 #include "gen.h"
 #include "launch.h"
@@ -211,14 +212,18 @@ static int command_bench(int argc, char **argv, struct host_error *error)
         {"nodes", 'n', "N", 0, "Up to N nodes. Default: 8", 0}, {0}};
     struct host_run_options run;
     struct simple s = {.nodes = 8};
-    parse(argc, argv, options, "paper",
+    parse(argc, argv, options, "paper|links",
           "Measures this machine: paper prints Tables 2 and 4 of Cignoni, "
-          "Laforenza, Perego, Scopigno and Montani (1995).",
+          "Laforenza, Perego, Scopigno and Montani (1995); links prints what a "
+          "link does over each driver.",
           1, &s);
+    if (strcmp(s.argument[0], "links") == 0) {
+        return host_bench_links(error);
+    }
     if (strcmp(s.argument[0], "paper") != 0) {
         return host_fail(error, HOST_USAGE,
                          "bench %s: not in this version; allowed: "
-                         "paper",
+                         "paper, links",
                          s.argument[0]);
     }
     host_run_defaults(&run);
@@ -296,7 +301,7 @@ int main(int argc, char **argv)
         "  digest TETS          print what tells triangulations apart\n"
         "  convert IN OUT       from one file format to another\n"
         "  cube FILE            check a cube file, print its nodes' straps\n"
-        "  bench paper          the paper's tables on this machine\n"
+        "  bench paper|links    the paper's tables on this machine; its links\n"
         "  sim --seeds A..B     whole cubes in virtual time, with faults\n\n"
         "incode COMMAND --help says more of each.",
         NULL,

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The same bytes over every kind of wire, also where the wire suffers.
-# 50 seconds.
+# 60 seconds.
 . tests/system/lib.sh
 
 points=$scratch/points.npy
@@ -141,3 +141,14 @@ check 'links/a bad cube file' "exit $status: $(last "$scratch/errors")" \
     test $status = 3
 check 'links/a bad cube file: its line' "$(last "$scratch/errors")" \
     grep -qE "^incode: $scratch/bad.cube:[0-9]+: .*; " "$scratch/errors"
+
+timeout 60 "$INCODE" bench links > "$scratch/bench" 2> "$scratch/errors"
+status=$?
+check 'links/bench links' "exit $status: $(last "$scratch/errors")" \
+    test $status = 0
+for driver in 'tcp, loopback' 'tcp, with a key' 'serial, pseudo-terminal' \
+    'serial, paced to 115200 baud'; do
+    check "links/bench links: $driver" "$(cat "$scratch/bench")" \
+        grep -qE "^$driver +[0-9.]+ +(-|[0-9.]+ %) +[0-9]+ +[0-9]+ " \
+        "$scratch/bench"
+done

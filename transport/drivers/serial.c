@@ -33,6 +33,14 @@ static void drain_by_clock(struct serial_pipe *pipe)
         gone < pipe->ahead_millibytes ? (uint32_t)gone : pipe->ahead_millibytes;
 }
 
+/* Bytes that may be ahead of the wire: a process that sleeps needs some time to
+ * wake. */
+static size_t ahead_most(const struct serial_pipe *pipe)
+{
+    size_t bytes = (size_t)((uint64_t)pipe->baud * SERIAL_AHEAD_US / 10000000);
+    return bytes > SERIAL_AHEAD_BYTES ? bytes : SERIAL_AHEAD_BYTES;
+}
+
 /* Bytes that may be given to the kernel now. */
 static size_t room(struct serial_pipe *pipe)
 {
@@ -46,7 +54,8 @@ static size_t room(struct serial_pipe *pipe)
             ahead = (size_t)queued;
         }
     }
-    return ahead < SERIAL_AHEAD_BYTES ? SERIAL_AHEAD_BYTES - ahead : 0;
+    size_t most = ahead_most(pipe);
+    return ahead < most ? most - ahead : 0;
 }
 
 /* Bytes moved, 0 for the present, or closed. */
@@ -125,7 +134,7 @@ uint64_t serial_wait_us(const struct serial_pipe *pipe)
         return UINT64_MAX;
     }
     /* Until half of what may be ahead is on the line. */
-    return (uint64_t)SERIAL_AHEAD_BYTES / 2 * 10000000 / pipe->baud;
+    return (uint64_t)ahead_most(pipe) / 2 * 10000000 / pipe->baud;
 }
 
 /* --- terminals ----------------------------------------------------------- */

@@ -2,7 +2,8 @@
  * port, a USB adapter or a pseudo-terminal.  What is above the opening is here;
  * serial_port.h finds and opens real ports.
  *
- * No more than SERIAL_AHEAD_BYTES are given to the kernel ahead of the wire, by
+ * No more than SERIAL_AHEAD_BYTES, or on a fast line the bytes of
+ * SERIAL_AHEAD_US, are given to the kernel ahead of the wire, by
  * its own count where it has one and by the clock where the baud rate is given:
  * a link measures the line then, and not the kernel's queue.
  *
@@ -20,7 +21,7 @@
 
 #include "../link.h"
 
-enum { SERIAL_AHEAD_BYTES = 512 };
+enum { SERIAL_AHEAD_BYTES = 512, SERIAL_AHEAD_US = 4000 };
 
 struct serial_pipe {
     int fd;        /* open, non-blocking; -1: none */
