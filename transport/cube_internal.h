@@ -44,6 +44,7 @@ struct cube {
     bool again;         /* a message waits only for that turn to pass */
     uint8_t note[WIRING_BYTES_MAX]; /* the wiring, as it is told */
     size_t note_size;
+    uint64_t now_us;    /* of the last poll */
     uint64_t looked_us; /* when links were looked at last */
 };
 

@@ -21,7 +21,7 @@ static void spread(struct cube *cube)
     cube->note_size = wiring_pack(&cube->wiring, cube->note);
     for (unsigned d = 0; d < cube->count; d++) {
         cube->neighbours[d].agreed = false;
-        cube->neighbours[d].told_us -= CUBE_GOSSIP_US;
+        tell(cube, d, cube->now_us, true);
     }
 }
 
@@ -48,7 +48,7 @@ void cube_renew(struct cube *cube, const struct cube_wiring *next)
 {
     uint32_t present = cube->wiring.generation;
     LINK_ASSERT(is_host(cube) && next->dead_count <= CUBE_DEAD_MAX &&
-                next->gate < 1u << cube->config.dimension);
+                (next->gate == 0 || next->gate == cube->config.spare_node));
     cube->wiring = *next;
     if (next->generation <= present) {
         cube->wiring.generation = present + 1;
@@ -104,8 +104,6 @@ static void take_note(struct cube *cube, unsigned d,
     cube->neighbours[d].agreed = wiring_same(&theirs, &cube->wiring);
     if (ask && cube->neighbours[d].agreed) {
         tell(cube, d, now_us, false);
-    } else if (!cube->neighbours[d].agreed) {
-        tell(cube, d, now_us, true);
     }
 }
 
@@ -188,10 +186,17 @@ bool cube_reaches(const struct cube *cube, uint16_t node)
 
 /* --- each poll ----------------------------------------------------------- */
 
+/* Whether a neighbour who listens has not said the same yet. */
+static bool lags(const struct cube *cube, unsigned d)
+{
+    return !cube->neighbours[d].agreed && link_state(cube->links[d]) == LINK_UP;
+}
+
 void cube_gossip(struct cube *cube, uint64_t now_us)
 {
     struct link_message note;
     bool ask;
+    cube->now_us = now_us;
     look(cube, now_us);
     for (unsigned d = 0; d < cube->count; d++) {
         const struct link_statistics *s = link_statistics(cube->links[d]);
@@ -207,8 +212,7 @@ void cube_gossip(struct cube *cube, uint64_t now_us)
     }
     for (unsigned d = 0; d < cube->count; d++) {
         struct cube_neighbour *n = &cube->neighbours[d];
-        if (!n->agreed && n->comings > 0 &&
-            now_us - n->told_us >= CUBE_GOSSIP_US) {
+        if (lags(cube, d) && now_us - n->told_us >= CUBE_GOSSIP_US) {
             tell(cube, d, now_us, true);
         }
     }
@@ -221,7 +225,7 @@ uint64_t cube_gossip_due_us(const struct cube *cube, uint64_t now_us)
         const struct cube_neighbour *n = &cube->neighbours[d];
         uint64_t passed = now_us - n->told_us;
         uint64_t left = passed < CUBE_GOSSIP_US ? CUBE_GOSSIP_US - passed : 0;
-        if (!n->agreed && n->comings > 0 && left < due) {
+        if (lags(cube, d) && left < due) {
             due = left;
         }
     }

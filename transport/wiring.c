@@ -48,59 +48,6 @@ size_t wiring_pack(const struct cube_wiring *wiring, uint8_t *bytes)
     return (size_t)(at - bytes);
 }
 
-static bool sound(const struct cube_wiring *wiring, unsigned dimension)
-{
-    unsigned nodes = 1u << dimension;
-    bool right = wiring->gate < nodes;
-    for (unsigned i = 0; i < wiring->dead_count; i++) {
-        const struct cube_dead *d = &wiring->dead[i];
-        right &= d->node < nodes &&
-                 (d->dimension <= dimension || d->dimension == CUBE_WHOLE_NODE);
-    }
-    for (unsigned i = 0; i < wiring->wrong_count; i++) {
-        const struct cube_wrong *w = &wiring->wrong[i];
-        right &= w->node < nodes || w->node == CUBE_HOST;
-    }
-    return right;
-}
-
-bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
-                   size_t size, unsigned dimension)
-{
-    const uint8_t *at = bytes;
-    memset(wiring, 0, sizeof *wiring);
-    if (size < WIRING_HEAD) {
-        return false;
-    }
-    wiring->generation = get(&at, 4);
-    wiring->host_epoch = get(&at, 4);
-    wiring->gate = (uint16_t)get(&at, 2);
-    wiring->settled = (uint16_t)get(&at, 1);
-    wiring->dead_count = (uint16_t)get(&at, 1);
-    wiring->wrong_count = (uint16_t)get(&at, 1);
-    (void)get(&at, 1);
-    if (wiring->dead_count > CUBE_DEAD_MAX ||
-        wiring->settled > wiring->dead_count ||
-        wiring->wrong_count > CUBE_WRONG_MAX ||
-        size !=
-            WIRING_HEAD + 3u * wiring->dead_count + 7u * wiring->wrong_count) {
-        return false;
-    }
-    for (unsigned i = 0; i < wiring->dead_count; i++) {
-        wiring->dead[i].node = (uint16_t)get(&at, 2);
-        wiring->dead[i].dimension = (uint8_t)get(&at, 1);
-    }
-    for (unsigned i = 0; i < wiring->wrong_count; i++) {
-        struct cube_wrong *w = &wiring->wrong[i];
-        w->node = (uint16_t)get(&at, 2);
-        w->link = (uint8_t)get(&at, 1);
-        w->refusal = (uint8_t)get(&at, 1);
-        w->peer_node = (uint16_t)get(&at, 2);
-        w->peer_link = (uint8_t)get(&at, 1);
-    }
-    return sound(wiring, dimension);
-}
-
 /* --- sets ---------------------------------------------------------------- */
 
 /* The order in which entries are kept. */
@@ -222,6 +169,79 @@ bool wiring_merge(struct cube_wiring *mine, const struct cube_wiring *theirs,
         changed |= wiring_add_wrong(mine, theirs->wrong[i]);
     }
     return changed;
+}
+
+/* --- from afar ----------------------------------------------------------- */
+
+static bool sound(const struct cube_wiring *wiring, unsigned dimension)
+{
+    unsigned nodes = 1u << dimension;
+    bool right = wiring->gate < nodes;
+    for (unsigned i = 0; i < wiring->dead_count; i++) {
+        const struct cube_dead *d = &wiring->dead[i];
+        bool link = d->dimension < dimension;
+        right &= d->node < nodes &&
+                 (link || d->dimension == dimension ||
+                  d->dimension == CUBE_WHOLE_NODE) &&
+                 (!link || (d->node >> d->dimension & 1) == 0);
+    }
+    for (unsigned i = 0; i < wiring->wrong_count; i++) {
+        const struct cube_wrong *w = &wiring->wrong[i];
+        right &= w->node < nodes || w->node == CUBE_HOST;
+    }
+    return right;
+}
+
+/* Whether what was found stands as if it had been added here. */
+static bool in_order(const struct cube_wiring *wiring, unsigned dimension)
+{
+    struct cube_wiring again = *wiring;
+    again.dead_count = again.settled;
+    again.wrong_count = 0;
+    for (unsigned i = wiring->settled; i < wiring->dead_count; i++) {
+        (void)wiring_add_dead(&again, wiring->dead[i], dimension);
+    }
+    for (unsigned i = 0; i < wiring->wrong_count; i++) {
+        (void)wiring_add_wrong(&again, wiring->wrong[i]);
+    }
+    return wiring_same(&again, wiring);
+}
+
+bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
+                   size_t size, unsigned dimension)
+{
+    const uint8_t *at = bytes;
+    memset(wiring, 0, sizeof *wiring);
+    if (size < WIRING_HEAD) {
+        return false;
+    }
+    wiring->generation = get(&at, 4);
+    wiring->host_epoch = get(&at, 4);
+    wiring->gate = (uint16_t)get(&at, 2);
+    wiring->settled = (uint16_t)get(&at, 1);
+    wiring->dead_count = (uint16_t)get(&at, 1);
+    wiring->wrong_count = (uint16_t)get(&at, 1);
+    (void)get(&at, 1);
+    if (wiring->dead_count > CUBE_DEAD_MAX ||
+        wiring->settled > wiring->dead_count ||
+        wiring->wrong_count > CUBE_WRONG_MAX ||
+        size !=
+            WIRING_HEAD + 3u * wiring->dead_count + 7u * wiring->wrong_count) {
+        return false;
+    }
+    for (unsigned i = 0; i < wiring->dead_count; i++) {
+        wiring->dead[i].node = (uint16_t)get(&at, 2);
+        wiring->dead[i].dimension = (uint8_t)get(&at, 1);
+    }
+    for (unsigned i = 0; i < wiring->wrong_count; i++) {
+        struct cube_wrong *w = &wiring->wrong[i];
+        w->node = (uint16_t)get(&at, 2);
+        w->link = (uint8_t)get(&at, 1);
+        w->refusal = (uint8_t)get(&at, 1);
+        w->peer_node = (uint16_t)get(&at, 2);
+        w->peer_link = (uint8_t)get(&at, 1);
+    }
+    return sound(wiring, dimension) && in_order(wiring, dimension);
 }
 
 /* --- a new generation ---------------------------------------------------- */

@@ -112,6 +112,27 @@ static void read_messages(struct end *end, bool trusted)
     }
 }
 
+static const uint8_t news[] = "what is so";
+
+static void tell(struct end *end, bool ask)
+{
+    link_note(end->link, news, 1 + end->sent % sizeof news, ask);
+}
+
+static void read_note(struct end *end, bool trusted)
+{
+    struct link_message note;
+    bool ask;
+    if (!link_take_note(end->link, &note, &ask)) {
+        return;
+    }
+    if (note.size < 1 || note.size > LINK_NOTE_MAX ||
+        (trusted &&
+         (note.size > sizeof news || memcmp(note.data, news, note.size)))) {
+        abort();
+    }
+}
+
 static void insert(struct pipe *pipe, size_t at, const uint8_t *bytes,
                    size_t size)
 {
@@ -223,10 +244,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                 forge(pipe, &script);
             }
             break;
+        case 3:
+            tell(step >> 7 ? &a : &b, (step & 8) != 0);
+            break;
         default:
             now += 1u << (step >> 3) % 18;
             (void)link_poll(step >> 7 ? a.link : b.link, now);
             read_messages(step >> 7 ? &a : &b, !hostile);
+            read_note(step >> 7 ? &a : &b, !hostile);
             break;
         }
     }
