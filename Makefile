@@ -155,7 +155,7 @@ $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) -fsanitize=fuzzer $^ $(HOST_LIBS) -o $@
 
--include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
+-include $(shell find $(BUILD) -name '*.d' -type f 2>/dev/null)
 
 # The tools that the system tests change point sets with, and bytes on a wire.
 points: $(BUILD)/tests/points $(BUILD)/tests/relay
@@ -266,7 +266,8 @@ test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps openssl \
 	gcc-arm-none-eabi libnewlib-arm-none-eabi
 bench_packages = $(run_packages) g++ libcgal-dev jq
-full_packages  = $(test_packages) $(bench_packages) debootstrap
+full_packages  = $(test_packages) $(bench_packages) debootstrap cpio \
+	qemu-system-arm gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 
 deps: deps-test
 deps-run:

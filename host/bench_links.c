@@ -13,7 +13,7 @@
 
 #include "../transport/drivers/serial.h"
 #include "../transport/drivers/sim.h"
-#include "../transport/drivers/sodium.h"
+#include "../transport/drivers/secure_sodium.h"
 #include "../transport/drivers/tcp_wire.h"
 #include "cluster.h"
 #include "progress.h"

@@ -10,7 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "../transport/drivers/sodium.h"
+#include "../transport/drivers/secure_sodium.h"
 #include "cluster.h"
 #include "progress.h"
 #include "run.h"
@@ -236,8 +236,12 @@ static int begin(const struct host_run_options *options,
     static struct host_remote remote;
     static char program[4096];
     (void)result;
-    if (host_cluster_program(options->node_program, program, sizeof program,
-                             error) != 0 ||
+    bool needed = false;
+    for (unsigned i = 0; i < the_file.nodes; i++) {
+        needed = needed || the_file.local[i];
+    }
+    if ((needed && host_cluster_program(options->node_program, program,
+                                        sizeof program, error) != 0) ||
         host_remote_start(&remote, &the_file, program, error) != 0) {
         return error->code;
     }

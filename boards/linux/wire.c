@@ -6,7 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "../../transport/drivers/sodium.h"
+#include "../../transport/drivers/secure_sodium.h"
 
 enum { LOOK_US = 500000 };
 

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "../../transport/drivers/sodium.h"
+#include "../../transport/drivers/secure_sodium.h"
 
 enum { ROOM = 1 << 16 };
 

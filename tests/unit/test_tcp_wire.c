@@ -18,7 +18,7 @@
 
 #include <cmocka.h>
 
-#include "../../transport/drivers/sodium.h"
+#include "../../transport/drivers/secure_sodium.h"
 #include "../../transport/drivers/tcp_wire.h"
 
 static uint64_t clock_us(void)

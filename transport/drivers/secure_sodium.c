@@ -1,4 +1,4 @@
-#include "sodium.h"
+#include "secure_sodium.h"
 
 #include <sodium.h>
 #include <string.h>

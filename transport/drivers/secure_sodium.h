@@ -4,8 +4,8 @@
  *
  *     secure_shake_init(&shake, &secure_sodium, key, true, nonce);
  */
-#ifndef TRANSPORT_DRIVERS_SODIUM_H
-#define TRANSPORT_DRIVERS_SODIUM_H
+#ifndef TRANSPORT_DRIVERS_SECURE_SODIUM_H
+#define TRANSPORT_DRIVERS_SECURE_SODIUM_H
 
 #include "../secure.h"
 
