@@ -91,10 +91,12 @@ static int read_key(struct host_cube_file *file, const config_setting_t *where,
                      "key: not a file's name; write it in "
                      "quotes");
     }
-    snprintf(file->key_path, sizeof file->key_path, "%.*s%s",
-             name[0] == '/' || slash == NULL ? 0
-                                             : (int)(slash - file->path) + 1,
-             file->path, name);
+    int beside =
+        name[0] == '/' || slash == NULL ? 0 : (int)(slash - file->path) + 1;
+    if (snprintf(file->key_path, sizeof file->key_path, "%.*s%s", beside,
+                 file->path, name) >= (int)sizeof file->key_path) {
+        return wrong(file, where, error, "key: too long a path; move the file");
+    }
     FILE *key = fopen(file->key_path, "re");
     size_t got = key == NULL ? 0 : fread(text, 1, 64, key);
     if (key != NULL) {

@@ -35,7 +35,7 @@ struct host_cube_file {
     uint64_t memory;
     unsigned window;
     unsigned dead_s; /* a link silent so long is given up; 0: never */
-    char key_path[1024];
+    char key_path[HOST_STRAP_BYTES];
     bool has_key;
     uint8_t key[SECURE_KEY_BYTES];
     bool lines; /* there are serial lines */

@@ -202,7 +202,8 @@ static void reset(void *context, int status)
 {
     const struct linux_board *board = context;
     if (status == 0 && board->again != NULL) {
-        execv("/proc/self/exe", board->again);
+        char *no_environment[] = {NULL};
+        execve("/proc/self/exe", board->again, no_environment);
     }
     _exit(status);
 }
@@ -271,6 +272,20 @@ static void start_alone(struct straps *straps, struct linux_board *linux_board,
 #endif
 }
 
+static struct node_identity identity_of(const struct straps *straps)
+{
+    struct node_identity id;
+    memset(&id, 0, sizeof id);
+    id.self = (uint16_t)straps->node;
+    id.dimension = (uint8_t)straps->dimension;
+    id.window = (uint8_t)straps->window;
+    id.epoch = (uint32_t)straps->epoch;
+    id.lines = straps->lines != 0;
+    id.dead_us = (uint32_t)straps->dead;
+    id.host_wire = straps->host_wire != 0;
+    return id;
+}
+
 int main(int argc, char **argv)
 {
     static struct straps straps = {.stack = 65536, .memory = 4u << 20};
@@ -303,6 +318,10 @@ int main(int argc, char **argv)
     }
     size_t net = straps.wires_count * sizeof(struct tcp_wire);
     net = (net + PAGE - 1) / PAGE * PAGE;
+    if (board.arena_bytes <= net) {
+        complain("--memory does not hold the wires");
+        return 4;
+    }
     board.arena_bytes -= net;
     board.fixed_bytes += net;
     linux_board.links_count = straps.links_count + straps.wires_count;
@@ -321,13 +340,7 @@ int main(int argc, char **argv)
         board.pipes[i] = linux_wire_pipe(&linux_board.wire[i]);
     }
     board.context = &linux_board;
-    board.identity.self = (uint16_t)straps.node;
-    board.identity.dimension = (uint8_t)straps.dimension;
-    board.identity.window = (uint8_t)straps.window;
-    board.identity.epoch = (uint32_t)straps.epoch;
-    board.identity.lines = straps.lines != 0;
-    board.identity.dead_us = (uint32_t)straps.dead;
-    board.identity.host_wire = straps.host_wire != 0;
+    board.identity = identity_of(&straps);
     board.now_us = now_us;
     board.busy_us = busy_us;
     board.idle = idle;

@@ -19,18 +19,15 @@ static uint64_t clock_us(void)
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
-/* Ten bits a byte: the line sends baud / 10 bytes a second. */
+/* Ten bits a byte: the line sends baud / 10 bytes a second, which is as many
+ * millionths of a byte a microsecond. */
 static void drain_by_clock(struct serial_pipe *pipe)
 {
     uint64_t now_us = pipe->now_us(), gone = now_us - pipe->ahead_us;
-    gone = gone > 1000000 ? 1000000 : gone;
-    gone = gone * pipe->baud / 10000;
-    if (gone == 0) {
-        return; /* shorter than a thousandth of a byte: counted later */
-    }
+    gone = (gone > 1000000 ? 1000000 : gone) * pipe->baud / 10;
     pipe->ahead_us = now_us;
-    pipe->ahead_millibytes -=
-        gone < pipe->ahead_millibytes ? (uint32_t)gone : pipe->ahead_millibytes;
+    pipe->ahead_microbytes -=
+        gone < pipe->ahead_microbytes ? gone : pipe->ahead_microbytes;
 }
 
 /* Bytes that may be ahead of the wire: a process that sleeps needs some time to
@@ -48,7 +45,7 @@ static size_t room(struct serial_pipe *pipe)
     int queued = 0;
     if (pipe->baud != 0) {
         drain_by_clock(pipe);
-        ahead = (pipe->ahead_millibytes + 999) / 1000;
+        ahead = (size_t)((pipe->ahead_microbytes + 999999) / 1000000);
         if (pipe->counts && ioctl(pipe->fd, TIOCOUTQ, &queued) == 0 &&
             queued > (int)ahead) {
             ahead = (size_t)queued;
@@ -77,7 +74,7 @@ static int serial_send(void *context, const uint8_t *bytes, size_t size)
     int taken = most == 0 ? 0 : result(pipe, write(pipe->fd, bytes, most));
     pipe->blocked = taken >= 0 && (size_t)taken < size;
     if (taken > 0 && pipe->baud != 0) {
-        pipe->ahead_millibytes += 1000 * (uint32_t)taken;
+        pipe->ahead_microbytes += UINT64_C(1000000) * (unsigned)taken;
     }
     return taken;
 }

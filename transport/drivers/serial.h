@@ -28,7 +28,7 @@ struct serial_pipe {
     uint32_t baud; /* 0: as fast as the kernel takes */
     bool blocked;  /* had no room for all bytes at the last send */
     bool closed;   /* the other end is gone, or the port; it may come back */
-    uint32_t ahead_millibytes; /* not sent yet, by the clock */
+    uint64_t ahead_microbytes; /* not sent yet, by the clock */
     uint64_t ahead_us;         /* when that was counted, */
     uint64_t (*now_us)(void);  /* on this clock: the monotonic one */
     bool counts;               /* the kernel says what it has not sent */

@@ -263,7 +263,7 @@ static int look(struct serial_port *port)
     port->pipe.fd = fd;
     port->pipe.counts = true;
     port->pipe.closed = false;
-    port->pipe.ahead_millibytes = 0;
+    port->pipe.ahead_microbytes = 0;
     port->fault[0] = '\0';
     return 0;
 }
