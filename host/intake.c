@@ -228,7 +228,11 @@ int host_intake(struct host_service *service,
         return unsound(message, "is not of this cube", error);
     }
     struct host_node *node = &service->node[message->source];
-    int status = take(service, message, error);
+    bool expected = message->type == NODE_HERE || message->type == NODE_FAULT ||
+                    (service->started && !node->setup_due);
+    /* Without a setup from this host it works for one before. */
+    service->loss = service->loss || !expected;
+    int status = expected ? take(service, message, error) : 0;
     node->received++;
     node->silent_us = 0;
     return status;

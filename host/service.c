@@ -365,7 +365,24 @@ static int check_renewed(const struct host_service *s, struct host_error *error)
     return 0;
 }
 
-/* After a loss: all nodes begin again, with what is not committed. */
+/* In a new generation all nodes begin again, with what is not committed. */
+static int begin_again(struct host_service *s, uint64_t now_us,
+                       struct host_error *error)
+{
+    host_watch_begin(s, now_us);
+    if (check_renewed(s, error) != 0) {
+        return error->code;
+    }
+    if (s->started) {
+        unsigned workers = s->workers == 1 ? 1 : s->living;
+        (void)host_ledger_abandon(&s->ledger, workers, s->order, s->tets);
+        host_spill_clear(&s->spill);
+        set_up(s);
+    }
+    return 0;
+}
+
+/* After a loss: a new generation, without what was given up. */
 static int renew(struct host_service *s, uint64_t now_us,
                  struct host_error *error)
 {
@@ -392,17 +409,7 @@ static int renew(struct host_service *s, uint64_t now_us,
     next.gate = choose_gate(s, &next);
     cube_renew(s->cube, &next);
     s->generations++;
-    host_watch_begin(s, now_us);
-    if (check_renewed(s, error) != 0) {
-        return error->code;
-    }
-    if (s->started) {
-        unsigned workers = s->workers == 1 ? 1 : s->living;
-        (void)host_ledger_abandon(&s->ledger, workers, s->order, s->tets);
-        host_spill_clear(&s->spill);
-        set_up(s);
-    }
-    return 0;
+    return begin_again(s, now_us, error);
 }
 
 /* One round of the loop: read, serve, and sleep where nothing moved. */
@@ -410,6 +417,11 @@ static int round_trip(struct host_service *s, struct host_error *error)
 {
     uint64_t now = now_of(s);
     unsigned moved = (unsigned)cube_poll(s->cube, now);
+    /* Nodes that have served another start of the host know a later one. */
+    if (cube_wiring(s->cube)->generation != s->generation &&
+        begin_again(s, now, error) != 0) {
+        return error->code;
+    }
     if (read_all(s, &moved, error) != 0) {
         return error->code;
     }

@@ -95,6 +95,7 @@ struct host_service {
     bool started, finished;
     bool dealt;          /* the first jobs of this generation are out */
     bool over;           /* all is here that is needed */
+    uint32_t generation; /* of the wiring that is followed */
     bool loss;           /* a new generation is due */
     bool wire_lost;      /* the one in use is dead */
     bool probe, probing; /* nodes are called one by one: in the next generation;

@@ -1,6 +1,5 @@
 #include "watch.h"
 
-#include <stdio.h>
 #include <string.h>
 
 enum {
@@ -61,6 +60,7 @@ static void call_next(struct host_service *s)
 void host_watch_begin(struct host_service *service, uint64_t now_us)
 {
     struct host_service *s = service;
+    s->generation = cube_wiring(s->cube)->generation;
     s->loss = false;
     s->probing = s->probe;
     s->probe = false;
@@ -181,29 +181,15 @@ unsigned host_watch_link(const struct host_service *service, unsigned node)
                      : 31u - (unsigned)__builtin_clz(away);
 }
 
-static int fail_wrong(const struct cube_wrong *wrong, struct host_error *error)
+static int fail_wrong(const struct host_service *s, struct host_error *error)
 {
-    char peer[24] = "the host", expected[24] = "the host";
-    if (wrong->refusal != LINK_WRONG_WIRE) {
-        return host_fail(error, HOST_CUBE,
-                         "node %u link %u: its peer is %s; run the same "
-                         "version of the program everywhere",
-                         wrong->node, wrong->link,
-                         wrong->refusal == LINK_WRONG_VERSION
-                             ? "of another version"
-                             : "made for other sizes of frames");
-    }
-    if (wrong->peer_node != CUBE_HOST) {
-        snprintf(peer, sizeof peer, "node %u", wrong->peer_node);
-    }
-    if (wrong->node != CUBE_HOST) {
-        snprintf(expected, sizeof expected, "node %u",
-                 wrong->node ^ 1u << wrong->link);
-    }
-    return host_fail(error, HOST_CUBE,
-                     "wiring: node %u link %u is wired to "
-                     "%s, expected %s; put that wire right",
-                     wrong->node, wrong->link, peer, expected);
+    const struct cube_wrong *wrong = &cube_wiring(s->cube)->wrong[0];
+    char text[CUBE_FAULT_BYTES];
+    (void)cube_wiring_fault(s->cube, text);
+    return host_fail(error, HOST_CUBE, "wiring: %s; %s", text,
+                     wrong->refusal == LINK_WRONG_WIRE
+                         ? "put that wire right and run again"
+                         : "run the same version of the program everywhere");
 }
 
 /* Nodes that are silent, and what follows.  One that takes nothing off its
@@ -306,7 +292,7 @@ int host_watch_check(struct host_service *service, uint64_t now_us,
         return error->code;
     }
     if (wiring->wrong_count > 0) {
-        return fail_wrong(&wiring->wrong[0], error);
+        return fail_wrong(s, error);
     }
     if (s->machine->restarts != NULL &&
         s->machine->restarts(s->machine->context) != s->restarts) {

@@ -61,6 +61,7 @@ static void begin(void)
     service.order = &order;
     service.tets = &tets;
     service.workers = NODES;
+    service.started = true;
     service.node = calloc(NODES, sizeof *service.node);
     service.report = calloc(NODES, sizeof *service.report);
     assert_non_null(service.node);

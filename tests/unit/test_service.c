@@ -59,6 +59,7 @@ static struct {
     uint16_t spare;
     uint32_t dead_us, epoch;
     struct event events[EVENTS];
+    double host_fails; /* when; 0: never */
     uint64_t now_us;
 } world;
 
@@ -235,8 +236,10 @@ static void machine_idle(void *context, uint64_t wait_us)
 static int machine_check(void *context, struct host_error *error)
 {
     (void)context;
-    (void)error;
-    return 0;
+    double when = world.host_fails * (double)undisturbed_us;
+    return when > 0.0 && (double)world.now_us >= when
+               ? host_fail(error, HOST_CUBE, "the host fails; as it should")
+               : 0;
 }
 
 static bool machine_ended(void *context)
@@ -299,7 +302,9 @@ static int run(enum host_strategy strategy, struct host_digest *digest,
         host_digest(&tets, digest);
     }
     host_tetrahedra_free(&tets);
-    end_world();
+    if (world.host_fails == 0.0) {
+        end_world();
+    }
     return status;
 }
 
@@ -442,6 +447,26 @@ static void test_gate(void **unused)
     }
 }
 
+/* Nodes that were left in the midst of a run serve the next host. */
+static void test_next_host(void **unused)
+{
+    (void)unused;
+    for (unsigned k = 1; k < 7; k++) {
+        struct host_digest digest;
+        struct host_error error;
+        prepare();
+        start_world();
+        world.host_fails = 0.1 * k;
+        assert_int_equal(run(HOST_SPATIAL, &digest, &error), HOST_CUBE);
+        assert_string_equal(error.text, "the host fails; as it should");
+        world.host_fails = 0.0;
+        if (run(HOST_SPATIAL, &digest, &error) != 0) {
+            fail_msg("%s", error.text);
+        }
+        assert_string_equal(digest.text, expected.text);
+    }
+}
+
 /* Links that go dead are gone round. */
 static void test_cut(void **unused)
 {
@@ -477,10 +502,10 @@ static void test_wrong_wire(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_restarts),   cmocka_unit_test(test_mixtures),
-        cmocka_unit_test(test_stopped),    cmocka_unit_test(test_gone),
-        cmocka_unit_test(test_gate),       cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_wrong_wire),
+        cmocka_unit_test(test_restarts), cmocka_unit_test(test_mixtures),
+        cmocka_unit_test(test_stopped),  cmocka_unit_test(test_gone),
+        cmocka_unit_test(test_gate),     cmocka_unit_test(test_next_host),
+        cmocka_unit_test(test_cut),      cmocka_unit_test(test_wrong_wire),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
