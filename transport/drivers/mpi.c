@@ -10,6 +10,13 @@
 
 /* --- the place ------------------------------------------------------------ */
 
+/* Where ranks share processors, Open MPI gives the processor away in each test
+ * that finds nothing: right for those who wait by testing (as it does itself
+ * at start and end), but a rank here computes between its tests and sleeps when
+ * it has nothing to do.  Its library has this switch, and no public name for
+ * it; another MPI has neither. */
+bool opal_progress_set_yield_when_idle(bool yield) __attribute__((weak));
+
 /* The words of the ranks that share this machine's memory. */
 static void share_words(struct mpi_place *place)
 {
@@ -59,11 +66,16 @@ int mpi_place_open(struct mpi_place *place)
         return -1;
     }
     share_words(place);
+    place->yields = opal_progress_set_yield_when_idle != NULL &&
+                    opal_progress_set_yield_when_idle(false);
     return 0;
 }
 
 void mpi_place_close(struct mpi_place *place)
 {
+    if (place->yields) {
+        (void)opal_progress_set_yield_when_idle(true);
+    }
     MPI_Win_free(&place->window);
     MPI_Comm_free(&place->local);
     MPI_Comm_free(&place->comm);
@@ -112,6 +124,15 @@ static bool ready(struct mpi_pipe *pipe)
            (pipe->blocked && done(pipe->out[slot_of(pipe->sent)]));
 }
 
+/* A peer that was rung before the message was there sleeps again. */
+static void settle(struct mpi_pipe *pipe)
+{
+    if (pipe->pending && done(pipe->out[slot_of(pipe->sent - 1)])) {
+        pipe->pending = false;
+        mpi_ring(pipe->place, pipe->peer);
+    }
+}
+
 void mpi_sleep(struct mpi_place *place, struct mpi_pipe *pipes, unsigned count,
                MPI_Request *request, uint64_t wait_us)
 {
@@ -127,9 +148,10 @@ void mpi_sleep(struct mpi_place *place, struct mpi_pipe *pipes, unsigned count,
             slice = MPI_LOOK_US;
         }
         for (unsigned i = 0; i < count; i++) {
+            settle(&pipes[i]);
             some = some || ready(&pipes[i]);
             if (slice > MPI_LOOK_US &&
-                (place->bell[pipes[i].peer] == NULL || pipes[i].blocked)) {
+                (place->bell[pipes[i].peer] == NULL || pipes[i].pending)) {
                 slice = MPI_LOOK_US;
             }
         }
@@ -194,6 +216,7 @@ static int mpi_send(void *context, const uint8_t *bytes, size_t size)
     }
     pipe->blocked = sent < size;
     if (sent > 0) {
+        pipe->pending = true;
         mpi_ring(pipe->place, pipe->peer);
     }
     return (int)sent;
@@ -206,6 +229,7 @@ static int mpi_receive(void *context, uint8_t *bytes, size_t size)
     if (pipe->closed) {
         return LINK_PIPE_CLOSED;
     }
+    settle(pipe);
     for (unsigned i = 0; i < MPI_PIPE_SLOTS && got < size; i++) {
         unsigned slot = slot_of(pipe->taken);
         if (pipe->in_size < 0) {
@@ -220,7 +244,7 @@ static int mpi_receive(void *context, uint8_t *bytes, size_t size)
             pipe->closed = pipe->in_size == 0;
             if (pipe->closed) {
                 pipe->taken++;
-                pipe->blocked = false;
+                pipe->blocked = pipe->pending = false;
                 pipe->in_size = -1;
                 break;
             }

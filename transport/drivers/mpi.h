@@ -3,11 +3,12 @@
  * Ranks of one machine wake each other by a word of memory that they share;
  * where a peer is on another machine, a rank looks every MPI_LOOK_US.
  *
- * A hop costs more than the way is long: between ranks that share processors a
- * message of 8 bytes takes 6 us, and 50 to 90 us there and back for each rank
- * that passes it on (tests/bench/mpi_hops.c).  So pipes lead straight from the
- * host to nodes 0 .. 7, which against one pipe to node 0 takes 15 to 30 % off
- * the time of runs on 8 to 64 nodes; between nodes they are the cube's edges.
+ * A rank between costs more than the way is long: two that share processors
+ * take 4 to 7 us to hand over 8 bytes, each rank between them 15 us more, and
+ * half of the bytes a second (tests/bench/mpi_hops.c).  So pipes lead straight
+ * from the host to nodes 0 .. 7, which against one pipe to node 0 takes 15 to
+ * 30 % off the time of runs on 8 to 64 nodes; between nodes they are the cube's
+ * edges.
  *
  * Memory: a pipe is MPI_PIPE_SLOTS buffers of MPI_PIPE_BYTES each way, and
  * struct mpi_place one pointer a rank.  MPI itself never holds more than twice
@@ -59,6 +60,7 @@ struct mpi_place {
     MPI_Win window; /* a word of each of them: */
     _Atomic uint32_t *bell[MPI_RANKS_MAX]; /* it sleeps; NULL: elsewhere */
     int rank, ranks;
+    bool yields;                /* MPI does by itself, at start and end */
     int process[MPI_RANKS_MAX]; /* of this machine; 0: elsewhere */
 };
 
@@ -66,6 +68,7 @@ struct mpi_pipe {
     struct mpi_place *place;
     int peer, tag;
     bool blocked;         /* there was no room for all */
+    bool pending;         /* the last message may not be on its way yet */
     bool closed;          /* the peer has ended it */
     uint32_t sent, taken; /* messages; their slots by the low bits */
     size_t at;            /* of the oldest message received */
@@ -95,8 +98,8 @@ void mpi_pipe_end(struct mpi_pipe *pipe);
 void mpi_ring(struct mpi_place *place, int rank);
 
 /* Sleeps until one of the pipes has bytes, or room where it had none, or
- * `request` (NULL: none), which is rank 0's to fulfil, is complete; no longer than
- * wait_us. */
+ * `request` (NULL: none), which is rank 0's to fulfil, is complete; no longer
+ * than wait_us. */
 void mpi_sleep(struct mpi_place *place, struct mpi_pipe *pipes, unsigned count,
                MPI_Request *request, uint64_t wait_us);
 
