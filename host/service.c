@@ -95,6 +95,9 @@ static bool send_page(struct host_service *s, uint16_t to)
         uint8_t data[INCODE_PAGE_BYTES];
     } body;
     struct host_node *node = &s->node[to];
+    if (cube_room(s->cube, to) == 0) {
+        return false;
+    }
     body.page = node->pages[node->pages_first];
     size_t size = host_page(s->order, body.page, body.data);
     if (!send_letter(s, to, NODE_PAGE, &body, 4 + size)) {

@@ -40,9 +40,9 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
     p->kind = kinds[draw(state, 0, 7)];
     p->sequential = one_in(state, 6);
     p->partition = one_in(state, 3) ? HOST_UNIFORM : HOST_ADAPTIVE;
-    p->index = one_in(state, 8)   ? INCODE_NAIVE
-               : one_in(state, 6) ? INCODE_GRID
-                                  : INCODE_KD;
+    p->index = one_in(state, 8) && p->nodes <= 64 ? INCODE_NAIVE
+               : one_in(state, 6)                 ? INCODE_GRID
+                                                  : INCODE_KD;
     p->face_rule = one_in(state, 3) ? INCODE_FACE_PAPER : INCODE_FACE_OWN;
     p->shuffle_seed = one_in(state, 2) ? sim_draw(state) : 0;
     uint64_t most = p->nodes > 64             ? 600
