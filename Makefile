@@ -68,7 +68,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all unit points bare run test test-full bench firmware fuzz fuzzers lint install \
+.PHONY: all unit points planted bare run test test-full bench firmware fuzz fuzzers lint install \
 	clean help deps deps-run deps-test deps-bench deps-full FORCE
 
 all: $(BUILD)/incode $(BUILD)/incode-node $(BUILD)/incode-mpi \
@@ -156,6 +156,19 @@ $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 	$(Q)$(CC) $(HOSTED) -fsanitize=fuzzer $^ $(HOST_LIBS) -o $@
 
 -include $(shell find $(BUILD) -name '*.d' -type f 2>/dev/null)
+
+# The program with a fault in it, for the test that the simulation finds it.
+planted: $(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch
+$(BUILD)/tests/incode-twice: planted = incode/star.c -DINCODE_PLANT_TWICE
+$(BUILD)/tests/incode-twice: incode/star.c
+$(BUILD)/tests/incode-lost-batch: planted = \
+	host/intake.c -DINCODE_PLANT_LOST_BATCH
+$(BUILD)/tests/incode-lost-batch: host/intake.c
+$(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch: \
+		$(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
+	@mkdir -p $(@D)
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $(planted) $(filter %.o %.a,$^) $(HOST_LIBS) -o $@
 
 # The tools that the system tests change point sets with, and bytes on a wire.
 points: $(BUILD)/tests/points $(BUILD)/tests/relay

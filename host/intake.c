@@ -61,6 +61,11 @@ static int take_results(struct host_service *s,
     memcpy(&header, message->data, sizeof header);
     struct host_node *node = &s->node[message->source];
     node->results++;
+#ifdef INCODE_PLANT_LOST_BATCH /* a fault that the simulation has to find */
+    if (node->results % 8 == 0) {
+        return 0;
+    }
+#endif
     if (missing(s, node, header.letters) ||
         !host_ledger_current(&s->ledger, message->source, header.epoch)) {
         return 0;

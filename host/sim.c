@@ -13,7 +13,7 @@ enum {
     TRIES_MAX = 50,   /* for a kind of fault that is wanted and possible */
     REBOOT_US = 3000,
     TIME_US_MAX = 1800000000, /* half an hour in virtual time, */
-    STEPS_MAX = 30000000      /* or so many steps: it hangs */
+    STEPS_MAX = 60000000      /* or so many steps: it hangs */
 };
 
 /* A fault to be taken back.  A partition has a node and a link: all wires of

@@ -6,11 +6,14 @@ const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
     "loss",    "flip", "delete",    "insert", "repeat", "burst",     "stall",
     "one-way", "cut",  "partition", "pause",  "crash",  "slow-host", "tiny"};
 
+/* A slow wire does not wake its node for every byte. */
+enum { FIFO_BYTES = 64 };
+
 /* Numbers of nodes, by weight. */
 static const struct {
     unsigned dimension, weight;
-} cubes[] = {{0, 60}, {1, 130}, {2, 260}, {3, 270}, {4, 170}, {5, 80},
-             {6, 20}, {7, 4},   {8, 3},   {9, 2},   {10, 1}};
+} cubes[] = {{0, 60}, {1, 130}, {2, 260}, {3, 275}, {4, 173}, {5, 80},
+             {6, 16}, {7, 3},   {8, 1},   {9, 1},   {10, 1}};
 
 static uint64_t draw(uint64_t *state, uint64_t lo, uint64_t hi)
 {
@@ -50,6 +53,11 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
                     : p->index == INCODE_GRID ? 1000
                                               : 300;
     p->points = host_world_draw_log(state, 30, most);
+    if (p->wanted[HOST_SIM_TINY] && p->nodes <= 8) {
+        /* What the least memory does not hold. */
+        p->index = INCODE_KD;
+        p->points = draw(state, 2500, 4500);
+    }
 }
 
 static void draw_wire(struct sim_quality *q, uint64_t *state, bool fast)
@@ -72,9 +80,14 @@ static void draw_cube(struct host_sim_plan *p, uint64_t *state)
     p->memory_more = p->wanted[HOST_SIM_TINY] || large
                          ? draw(state, 0, 8) * 1024
                          : host_world_draw_log(state, 16384, 1 << 20);
-    draw_wire(&p->wire, state, large);
-    draw_wire(&p->host_wire, state, p->nodes > 16);
+    bool fast = large || p->wanted[HOST_SIM_TINY];
+    draw_wire(&p->wire, state, fast);
+    draw_wire(&p->host_wire, state, fast || p->nodes > 16);
     p->gather_us = (uint32_t)host_world_draw_log(state, 1, 500);
+    uint64_t slow = p->wire.bytes_per_s == 0 ? UINT32_MAX : p->wire.bytes_per_s;
+    if (p->gather_us < FIFO_BYTES * UINT64_C(1000000) / slow) {
+        p->gather_us = (uint32_t)(FIFO_BYTES * UINT64_C(1000000) / slow);
+    }
     p->step_us = (uint32_t)host_world_draw_log(state, 5, 1000);
     p->host_us = p->wanted[HOST_SIM_SLOW_HOST]
                      ? (uint32_t)host_world_draw_log(state, 500, 5000)

@@ -15,6 +15,10 @@ static void put_back(struct incode_triangulator *t)
     struct incode_star *star = &t->star;
     for (uint32_t i = 0; i < star->faces; i++)
         incode_afl_toggle(&t->afl, star->v, star->b[i], star->c[i]);
+#ifdef INCODE_PLANT_TWICE /* a fault that the simulation has to find */
+    if (star->faces > 0 && t->setup.shuffle_seed != 0)
+        incode_afl_toggle(&t->afl, star->v, star->b[0], star->c[0]);
+#endif
     star->faces = 0;
 }
 

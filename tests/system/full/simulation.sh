@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# 5,000 seeds, over the first 1,000 of which every kind of fault strikes at
+# least 100 times while work is open, and the small run with each single frame
+# and each restart.
+. tests/system/lib.sh
+SECONDS_MAX=20000
+said=$scratch/said
+
+# seeds FIRST LAST
+seeds() {
+    incode sim --seeds "$1..$2" > "$said" 2>&1
+    local status=$?
+    grep -A 2 'FAILED$' "$said"
+    check "simulation/seeds $1 to $2" "exit $status: $(last "$said")" \
+        [ $status = 0 ]
+}
+
+seeds 1 1000
+tail -n 16 "$said"
+for kind in loss flip delete insert repeat burst stall one-way cut partition \
+    pause crash slow-host tiny; do
+    strikes=$(awk -v kind="$kind" '$1 == kind { print $2 }' "$said" | tail -n 1)
+    check "simulation/strikes $kind" "only ${strikes:-0} times" \
+        [ "${strikes:-0}" -ge 100 ]
+done
+seeds 1001 5000
+
+INCODE_SIM_STRIDE=1 timeout 3600 "$BUILD/tests/test_sim" > "$said" 2>&1
+check "simulation/each frame" "$(last "$said")" [ $? = 0 ]
+grep ' runs' "$said"
