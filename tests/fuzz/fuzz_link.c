@@ -127,8 +127,8 @@ static void read_note(struct end *end, bool trusted)
         return;
     }
     if (note.size < 1 || note.size > LINK_NOTE_MAX ||
-        (trusted &&
-         (note.size > sizeof news || memcmp(note.data, news, note.size)))) {
+        (trusted && (note.size > sizeof news ||
+                     memcmp(note.data, news, note.size) != 0))) {
         abort();
     }
 }
