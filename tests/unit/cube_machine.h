@@ -341,23 +341,28 @@ static inline void reboot(struct machine *m, unsigned i)
     open_place(m, i);
 }
 
-/* Writes to all, the generation as payload; reads and checks that. */
+/* Writes to all, the generation again and again; reads and checks that. */
 static inline void chatter(struct machine *m, unsigned i, bool reads,
                            uint64_t counts[2])
 {
+    enum { WORDS = CUBE_PAYLOAD_MAX / 4 };
     struct cube *cube = m->places[i].cube;
     struct cube_message message;
-    uint32_t generation = cube_wiring(cube)->generation, heard;
-    unsigned to = draw(m) % m->count;
-    if (to != i && cube_write(cube, m->places[to].self, 1, &generation,
-                              sizeof generation) == 0) {
+    uint32_t generation = cube_wiring(cube)->generation, words[WORDS];
+    unsigned to = draw(m) % m->count, count = 1 + draw(m) % WORDS;
+    for (unsigned k = 0; k < count; k++) {
+        words[k] = generation;
+    }
+    if (to != i &&
+        cube_write(cube, m->places[to].self, 1, words, 4u * count) == 0) {
         assert_true(generation > 0);
         counts[WRITTEN]++;
     }
     while (reads && cube_read(cube, &message)) {
-        assert_int_equal(message.size, sizeof heard);
-        memcpy(&heard, message.data, sizeof heard);
-        assert_int_equal(heard, generation);
+        memcpy(words, message.data, message.size);
+        for (unsigned k = 0; k < message.size / 4u; k++) {
+            assert_int_equal(words[k], generation);
+        }
         cube_release(cube);
         counts[READ]++;
     }

@@ -52,6 +52,46 @@ static void notes_that_are_lost_are_told_again(void **unused)
     destroy(m);
 }
 
+/* Who is told first writes at once; what comes to those who are told later
+ * waits until they are. */
+static void nothing_of_the_new_generation_is_lost(void **unused)
+{
+    struct line_quality bad = perfect;
+    struct cube_config c = {.window = 4};
+    uint32_t written = 0, read = 0;
+    (void)unused;
+    bad.drop = 0.005;
+    struct machine *m = build(3, &c, &bad, 3);
+    settle(m, 1);
+    for (uint32_t generation = 2; generation <= 40; generation++) {
+        bool wrote[ENDS_MAX] = {false};
+        struct cube_message message;
+        struct cube *host = m->places[m->nodes].cube;
+        struct cube_wiring next = *cube_wiring(host);
+        cube_renew(host, &next);
+        for (unsigned i = 0; i < 400000 && (read < written || i < 100); i++) {
+            unsigned who = draw(m) % m->count, to = draw(m) % m->count;
+            struct cube *cube = m->places[who].cube;
+            m->now_us += 10;
+            cube_poll(cube, m->now_us);
+            if (wiring_of(m, who)->generation == generation && !wrote[who] &&
+                who != to &&
+                cube_write(cube, m->places[to].self, 1, "new", 3) == 0) {
+                wrote[who] = true;
+                written++;
+            }
+            while (cube_read(cube, &message)) {
+                cube_release(cube);
+                read++;
+            }
+        }
+        assert_int_equal(read, written);
+        settle(m, generation);
+    }
+    assert_true(written > 100);
+    destroy(m);
+}
+
 /* Notes cost nothing once all agree. */
 static void all_is_quiet_when_all_agree(void **unused)
 {
@@ -157,6 +197,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_of_an_old_generation_is_read),
         cmocka_unit_test(notes_that_are_lost_are_told_again),
+        cmocka_unit_test(nothing_of_the_new_generation_is_lost),
         cmocka_unit_test(all_is_quiet_when_all_agree),
         cmocka_unit_test(a_node_that_restarts_is_told),
         cmocka_unit_test(a_host_that_restarts_is_in_charge),

@@ -216,7 +216,7 @@ static void random_sets_of_dead_links_and_nodes(void **unused)
     (void)unused;
     for (unsigned dimension = 1; dimension <= CUBE_DIMENSION_MAX; dimension++) {
         open_cube(&c, dimension, 0);
-        unsigned rounds = dimension < 7 ? 2000 : 8000u >> (dimension - 4);
+        unsigned rounds = dimension < 7 ? 800 : 4000u >> (dimension - 4);
         for (unsigned round = 0; round < rounds; round++) {
             c.wiring.gate = (uint16_t)(draw(&c) % c.nodes);
             unsigned count = 1 + draw(&c) % CUBE_DEAD_MAX;

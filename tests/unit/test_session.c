@@ -221,6 +221,48 @@ static void farewell_to_the_dead_ends_in_time(void **unused)
     }
 }
 
+/* --- what is not sent yet ------------------------------------------------ */
+
+/* End 0 forgets what it has not begun to send; what arrives is whole, and the
+ * count is right. */
+static void what_is_unsent_is_forgotten(void **unused)
+{
+    struct line_quality slow = perfect;
+    struct link_message message;
+    (void)unused;
+    slow.bytes_per_s = 100000;
+    slow.room = 100;
+    for (uint64_t seed = 0; seed < 40; seed++) {
+        struct pair *p = new_pair(&small, &slow, seed);
+        struct end *from = &p->ends[0], *to = &p->ends[1];
+        uint8_t bytes[LINK_MESSAGE_MAX] = {0};
+        unsigned written = 0, forgotten = 0, read = 0;
+        for (unsigned i = 0; i < 3000; i++) {
+            size_t size = 1 + mix((uint32_t)seed * 3000 + i) % 1600;
+            memset(bytes, (uint8_t)size, size);
+            p->now_us += 200;
+            written +=
+                i < 2000 && link_write(from->link, bytes, size, NULL, 0) == 0;
+            if (i % (20 + seed) == 19) {
+                forgotten += link_forget_unsent(from->link);
+            }
+            link_poll(from->link, p->now_us);
+            link_poll(to->link, p->now_us);
+            while (link_read(to->link, &message)) {
+                memset(bytes, (uint8_t)message.size, message.size);
+                assert_memory_equal(message.data, bytes, message.size);
+                link_release(to->link);
+                read++;
+            }
+        }
+        assert_true(forgotten > 20 && read > 20 && link_idle(from->link));
+        assert_int_equal(read + forgotten, written);
+        assert_int_equal(link_statistics(from->link)->messages_dropped,
+                         forgotten);
+        free_pair(p);
+    }
+}
+
 /* --- test vectors -------------------------------------------------------- */
 
 /* What one end hears is written by hand; what it says is looked at. */
@@ -362,6 +404,7 @@ static void test_vectors(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_unsent_is_forgotten),
         cmocka_unit_test(test_vectors),
         cmocka_unit_test(a_cut_wire_goes_on_where_it_was),
         cmocka_unit_test(a_peer_that_stops_for_long_is_called_silent),

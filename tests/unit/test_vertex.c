@@ -33,7 +33,7 @@ static void greet_all(struct actor *a)
         if (node == host && to == host) {
             continue;
         }
-        number = node * 100000 + to;
+        number = node * 1000 + to;
         demand(nwrite(v, &number, sizeof number, to, i % 9, &flag) ==
                (int)sizeof number);
         demand(flag == 0);
@@ -43,7 +43,7 @@ static void greet_all(struct actor *a)
         demand(nread(v, &number, sizeof number, &source, &type, NULL) ==
                (int)sizeof number);
         unsigned from = place_of(a->stage->machine, (uint16_t)source);
-        demand(number == source * 100000 + node && !heard[from]);
+        demand(number == source * 1000 + node && !heard[from]);
         demand(type == (node == host ? ends - 1 : node) % 9);
         heard[from] = true;
     }
