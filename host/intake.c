@@ -16,6 +16,15 @@ static int unsound(const struct cube_message *message, const char *what,
                      message->source, what, message->type, message->size);
 }
 
+/* Whether letters of that node have been lost before this one: then what it
+ * says is a part that must not be taken for the whole. */
+static bool missing(struct host_service *s, const struct host_node *node,
+                    uint32_t letters)
+{
+    s->loss = s->loss || letters != node->received;
+    return letters != node->received;
+}
+
 static int take_requests(struct host_service *s,
                          const struct cube_message *message,
                          struct host_error *error)
@@ -36,15 +45,6 @@ static int take_requests(struct host_service *s,
                     HOST_PAGES_QUEUED_MAX] = page;
     }
     return 0;
-}
-
-/* Whether letters of that node have been lost before this one: then what it
- * says is a part that must not be taken for the whole. */
-static bool missing(struct host_service *s, const struct host_node *node,
-                    uint32_t letters)
-{
-    s->loss = s->loss || letters != node->received;
-    return letters != node->received;
 }
 
 /* Rows go straight to their place; a commit may follow any of them. */
@@ -132,6 +132,9 @@ static int take_unspill_request(struct host_service *s,
                        error);
     }
     memcpy(&header, message->data, sizeof header);
+    if (missing(s, node, header.letters)) {
+        return 0; /* what was lost may have been part of the list */
+    }
     uint32_t at =
         (node->unspills_first + node->unspills_count++) % HOST_UNSPILLS_MAX;
     node->unspills[at].header = header;

@@ -93,7 +93,7 @@ struct node_spill_header {
     uint32_t brick;   /* of NODE_UNSPILL and its request */
     uint32_t count;   /* faces that follow */
     uint32_t last;    /* NODE_UNSPILL: no more of this brick */
-    uint32_t letters; /* NODE_UNSPILL */
+    uint32_t letters; /* NODE_UNSPILL and its request */
 };
 
 /* The memory map of a node, bytes: what its board holds outside the arena,

@@ -332,9 +332,11 @@ static bool send_first(struct node_worker *w, struct node_outbox *box)
     if (slot == NULL) {
         return false;
     }
-    if (slot->type == NODE_RESULT) {
-        memcpy(slot->data + offsetof(struct node_result_header, letters),
-               &w->letters->sent, sizeof w->letters->sent);
+    if (slot->type != NODE_SPILL) {
+        size_t at = slot->type == NODE_RESULT
+                        ? offsetof(struct node_result_header, letters)
+                        : offsetof(struct node_spill_header, letters);
+        memcpy(slot->data + at, &w->letters->sent, sizeof w->letters->sent);
     }
     if (node_letters_write(w->letters, CUBE_HOST, slot->type, slot->data,
                            slot->size) != 0) {

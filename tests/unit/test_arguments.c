@@ -112,6 +112,7 @@ static void test_options(void **unused)
                                         "--shuffle-seed=9",
                                         "--verify",
                                         "--host-rate=1024",
+                                        "--patience=7",
                                         "a.xyz",
                                         NULL};
     assert_int_equal(parse(words, &o, &error), 0);
@@ -126,6 +127,7 @@ static void test_options(void **unused)
     assert_true(o.verify);
     assert_int_equal(o.hindrance.bytes_a_second, 1024);
     assert_int_equal(o.hindrance.slow_us, 30000000);
+    assert_int_equal(o.patience_s, 7);
 }
 
 /* Exit status 2, and the message says what is allowed. */

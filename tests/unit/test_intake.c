@@ -98,6 +98,9 @@ static int send(uint16_t source, uint8_t type, const void *data, size_t size,
     if (type == NODE_RESULT && size >= 8 && source < NODES && !gap) {
         memcpy(copy + 4, &service.node[source].received, 4);
     }
+    if (type == NODE_UNSPILL_REQUEST && size >= 20 && source < NODES && !gap) {
+        memcpy(copy + 16, &service.node[source].received, 4);
+    }
     if (type == NODE_FINISHED && size >= 16 && source < NODES && !gap) {
         memcpy(copy + 8, &service.node[source].received, 4);
     }
