@@ -497,6 +497,12 @@ static int explain(const struct launch *l, unsigned nodes, int status,
                          "what stopped it, and run again",
                          rank - 1, rank, how);
     }
+    if (WIFSIGNALED(status)) {
+        return host_fail(error, HOST_CUBE,
+                         "mpirun: ended by signal %d (%s); look for what "
+                         "stopped it, and run again",
+                         WTERMSIG(status), strsignal(WTERMSIG(status)));
+    }
     if (rank == 0 || l->host_pid != 0) {
         return host_fail(error, HOST_CUBE,
                          "host (rank 0): %s, and the job with it; look for "
@@ -560,7 +566,8 @@ int host_launch_mpi(char **argv, const struct host_run_options *options,
         (void)raise(caught);
     }
     if (whole) {
-        exit(l->report.status); /* it has said why itself */
+        error->code = l->report.status; /* it has said why itself */
+        return error->code;
     }
     return explain(l, nodes, status, error);
 }

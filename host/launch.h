@@ -24,7 +24,8 @@ int host_launch_rank(void);
  * where that fails. */
 int host_launch_become(int rank, char **argv, struct host_error *error);
 
-/* Starts mpirun with as many ranks as options ask for and waits for their end.
+/* Starts mpirun with as many ranks as options ask for and waits for their end:
+ * the run's status, with no text in *error where rank 0 has said it itself.
  * argv: those of `incode run`. */
 int host_launch_mpi(char **argv, const struct host_run_options *options,
                     struct host_error *error);

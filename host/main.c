@@ -322,7 +322,9 @@ int main(int argc, char **argv)
     }
     int status = dispatch(argc - command, argv + command, &error);
     if (status != 0) {
-        fprintf(stderr, "incode: %s\n", error.text);
+        if (error.text[0] != '\0') { /* else it is said */
+            fprintf(stderr, "incode: %s\n", error.text);
+        }
         return status;
     }
     if (fflush(stdout) != 0) {

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "../../incode/predicates.h"
@@ -58,6 +59,7 @@ int main(int argc, char **argv)
     static char name[] = "incode run";
     argp_err_exit_status = HOST_USAGE;
     (void)signal(SIGPIPE, SIG_IGN);
+    prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
     MPI_Init(&argc, &argv);
     argv[0] = name;
     const char *fault = incode_arithmetic_fault();

@@ -198,3 +198,9 @@ ends 'mpi/a node killed under mpirun' 137 '^incode: node [01] \(rank [12]\): '
 
 found=$(ls -A "$TMPDIR")
 check 'mpi/no session left' "$found" test -z "$found"
+
+# It has no time to clean up after itself.
+start 2 "$INCODE"
+began=$SECONDS
+kill -KILL "$(pid_of mpirun 1)"
+ends 'mpi/mpirun killed' 4 '^incode: (mpirun|node [01] \(rank [12]\)): '
