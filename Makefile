@@ -61,6 +61,7 @@ node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 	$(node_drivers:%.c=$(BUILD)/node/%.o)
 # Host and node as ranks of Open MPI; no other program is linked with it.
 mpi_host     := $(obj)/host/mpi/main.o $(obj)/host/mpi/ranks.o \
+	$(obj)/host/mpi/bench.o \
 	$(obj)/transport/drivers/mpi.o
 mpi_node     := $(obj)/boards/mpi/main.o $(obj)/transport/drivers/mpi.o
 unit_tests   := $(unit:tests/unit/%.c=$(BUILD)/tests/%)

@@ -374,6 +374,124 @@ static int run_driver(const struct driver *driver, struct host_bench_row *row,
                            driver->name);
 }
 
+/* --- sim: both ends here, in virtual time --------------------------------- */
+
+enum { SIM_BYTES_A_SECOND = 300000, SIM_STEP_US = 20, SIM_COUNT = 400 };
+
+struct sim_bench {
+    uint64_t now_us;
+    struct sim_wire wire;
+    struct link *link[2];
+    uint32_t got[2], due[2];
+    bool echo;
+};
+
+/* One step of time: end 1 echoes, where that is asked. */
+static void sim_turn(struct sim_bench *s, size_t size)
+{
+    static const uint8_t bytes[MESSAGE];
+    struct link_message message;
+    s->now_us += SIM_STEP_US;
+    for (unsigned who = 0; who < 2; who++) {
+        (void)link_poll_receive(s->link[who], s->now_us);
+        while (link_read(s->link[who], &message)) {
+            link_release(s->link[who]);
+            s->got[who]++;
+            s->due[who] += s->echo && who == 1 ? 1 : 0;
+        }
+        while (s->due[who] > 0 &&
+               link_write(s->link[who], bytes, size, NULL, 0) == 0) {
+            s->due[who]--;
+        }
+        (void)link_poll_send(s->link[who], s->now_us);
+    }
+}
+
+/* Virtual microseconds until end 0 has had `count` messages. */
+static double sim_count(struct sim_bench *s, uint32_t count, bool echo,
+                        size_t size)
+{
+    uint64_t begin = s->now_us;
+    s->echo = echo;
+    s->got[0] = 0;
+    s->due[0] = count;
+    s->due[1] = echo ? 0 : count;
+    while (s->got[0] < count && s->now_us - begin < PATIENCE_US) {
+        sim_turn(s, size);
+    }
+    return (double)(s->now_us - begin);
+}
+
+static int run_sim(struct host_bench_row *row, struct host_error *error)
+{
+    static struct sim_bench s;
+    static const struct sim_quality quality = {.bytes_per_s =
+                                                   SIM_BYTES_A_SECOND,
+                                               .latency_us = 100,
+                                               .room = 512,
+                                               .bytes = SIM_BYTES_MIN};
+    struct host_bench_end end;
+    void *memory[3] = {malloc(sim_wire_bytes(&quality)), NULL, NULL};
+    open_line(&(struct wire){0}, &end, -1, 0, 0);
+    memset(&s, 0, sizeof s);
+    if (memory[0] != NULL) {
+        sim_wire_init(&s.wire, memory[0], &quality, &s.now_us, 1);
+    }
+    for (unsigned who = 0; who < 2 && memory[0] != NULL; who++) {
+        struct link_config c = end.settings;
+        c.epoch = who + 1;
+        c.node = (uint16_t)who;
+        c.peer_node = (uint16_t)(1 - who);
+        c.pipe = sim_pipe(&s.wire.end[who]);
+        memory[1 + who] = malloc(link_bytes(&c));
+        s.link[who] = memory[1 + who] == NULL
+                          ? NULL
+                          : link_init(memory[1 + who], link_bytes(&c), &c);
+    }
+    if (s.link[0] != NULL && s.link[1] != NULL) {
+        (void)sim_count(&s, 1, true, SMALL);
+        row->round_trip_us = sim_count(&s, 1, true, SMALL);
+        row->hop_us = sim_count(&s, 1, true, MESSAGE) / 2;
+        uint64_t used = used_us();
+        double us = sim_count(&s, SIM_COUNT, false, MESSAGE);
+        row->cpu_us = (double)(used_us() - used) / (2.0 * SIM_COUNT);
+        row->bytes_per_s = 1e6 * SIM_COUNT * MESSAGE / us;
+    }
+    bool made = s.link[1] != NULL;
+    for (unsigned i = 0; i < 3; i++) {
+        free(memory[i]);
+    }
+    return made ? 0 : host_fail_memory(error, "the simulated links");
+}
+
+/* --- mpi: a program of its own -------------------------------------------- */
+
+/* False: there is no mpirun, or it does not start two ranks. */
+static bool run_mpi(struct host_bench_row *row)
+{
+    char path[4096], command[4400];
+    struct host_error ignored = {0};
+    if (host_cluster_program(NULL, path, sizeof path - 8, &ignored) != 0) {
+        return false;
+    }
+    strcpy(strrchr(path, '/') + 1, "incode-mpi");
+    snprintf(command, sizeof command,
+             "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "
+             "timeout 30 mpirun --oversubscribe --bind-to none "
+             "--mca pml ob1 --mca btl self,vader -np 2 '%s' "
+             "bench-link 2> /dev/null",
+             path);
+    FILE *said = popen(command, "re");
+    bool good =
+        said != NULL && fscanf(said, "%lf %lf %lf %lf %lf", &row->bytes_per_s,
+                               &row->round_trip_us, &row->hop_us, &row->cpu_us,
+                               &row->retransmitted) == 5;
+    if (said != NULL) {
+        (void)pclose(said);
+    }
+    return good;
+}
+
 static void print_row(const char *name, double line_bytes_per_s,
                       const struct host_bench_row *row)
 {
@@ -408,6 +526,17 @@ int host_bench_links(struct host_error *error)
             return error->code;
         }
         print_row(drivers[i].name, 0.1 * drivers[i].baud, &row);
+    }
+    struct host_bench_row sim = {0}, mpi = {0};
+    if (run_sim(&sim, error) != 0) {
+        return error->code;
+    }
+    print_row("sim, 3000000 baud, 100 us away", SIM_BYTES_A_SECOND, &sim);
+    if (run_mpi(&mpi)) {
+        print_row("mpi, two ranks", 0, &mpi);
+    } else {
+        printf("%-30s not measured: mpirun does not start two ranks here\n",
+               "mpi, two ranks");
     }
     return 0;
 }

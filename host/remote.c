@@ -85,7 +85,10 @@ int host_remote_start(struct host_remote *remote,
                       struct host_error *error)
 {
     int status = 0;
-    (void)sodium_init(); /* the fastest code for this processor */
+    if (sodium_init() < 0) { /* the fastest code for this processor */
+        return host_fail(error, HOST_BROKEN,
+                         "libsodium does not start; install it anew");
+    }
     memset(remote, 0, sizeof *remote);
     remote->file = file;
     remote->program = program;

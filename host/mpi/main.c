@@ -14,6 +14,7 @@
 #include "../arguments.h"
 #include "../launch.h"
 #include "../run.h"
+#include "bench.h"
 #include "ranks.h"
 
 static struct host_ranks ranks;
@@ -61,6 +62,9 @@ int main(int argc, char **argv)
     (void)signal(SIGPIPE, SIG_IGN);
     prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
     MPI_Init(&argc, &argv);
+    if (argc == 2 && strcmp(argv[1], HOST_MPI_BENCH) == 0) {
+        return host_mpi_bench();
+    }
     argv[0] = name;
     const char *fault = incode_arithmetic_fault();
     int status = fault == NULL
