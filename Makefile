@@ -117,7 +117,8 @@ $(obj)/node/%.o: node/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
-$(mpi_host) $(mpi_node) $(obj)/tests/bench/mpi_hops.o: private HOSTED += $(MPI_CFLAGS)
+$(mpi_host) $(mpi_node) $(obj)/tests/bench/mpi_hops.o \
+	$(obj)/tests/unit/test_mpi.o: private HOSTED += $(MPI_CFLAGS)
 $(obj)/transport/drivers/%.o: transport/drivers/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
@@ -179,6 +180,11 @@ $(BUILD)/tests/points $(BUILD)/tests/relay: $(BUILD)/tests/%: \
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
 
+$(BUILD)/tests/test_mpi: $(obj)/tests/unit/test_mpi.o \
+		$(obj)/transport/drivers/mpi.o $(BUILD)/libcore.a
+	@mkdir -p $(@D)
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -lcmocka -o $@
 $(BUILD)/tests/mpi_hops: $(obj)/tests/bench/mpi_hops.o \
 		$(obj)/transport/drivers/mpi.o $(BUILD)/libcore.a
 	@mkdir -p $(@D)
