@@ -1,6 +1,7 @@
 #include "bench_links.h"
 
 #include <errno.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -295,10 +296,27 @@ static int open_line(struct wire *wire, struct host_bench_end *end, int fd,
     return 0;
 }
 
-static int no_pair(int fds[2])
+/* Where the two ends of a keyed wire meet: a port that is free before they
+ * part. */
+static struct tcp_address meeting;
+
+static int choose_meeting(int fds[2])
 {
+    struct sockaddr_in free_port = {.sin_family = AF_INET,
+                                    .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t size = sizeof free_port;
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    int status =
+        fd < 0 ? -1
+               : bind(fd, (struct sockaddr *)&free_port, size) |
+                     getsockname(fd, (struct sockaddr *)&free_port, &size);
+    if (fd >= 0) {
+        close(fd);
+    }
+    memcpy(&meeting.to, &free_port, sizeof free_port);
+    meeting.size = size;
     fds[0] = fds[1] = -1;
-    return 0;
+    return status;
 }
 
 static int open_net(struct wire *wire, struct host_bench_end *end, int fd,
@@ -307,13 +325,9 @@ static int open_net(struct wire *wire, struct host_bench_end *end, int fd,
     static const uint8_t key[SECURE_KEY_BYTES] = "for measuring only";
     struct tcp_wire_config config = {
         .listens = role == 1, .suite = &secure_sodium, .key = key};
-    char address[32];
     (void)fd, (void)baud;
-    /* Both ends know the port by their common parent. */
-    snprintf(address, sizeof address, "127.0.0.1:%d",
-             20000 + (int)(role == 1 ? getppid() : getpid()) % 40000);
-    if (tcp_address_parse(&config.address, address) != 0 ||
-        tcp_wire_open(&wire->net, &config) != 0) {
+    config.address = meeting;
+    if (tcp_wire_open(&wire->net, &config) != 0) {
         return -1;
     }
     end->pipe = tcp_wire_pipe(&wire->net);
@@ -510,7 +524,7 @@ int host_bench_links(struct host_error *error)
 {
     static const struct driver drivers[] = {
         {"tcp, loopback", 0, tcp_pair, open_tcp},
-        {"tcp, with a key", 0, no_pair, open_net},
+        {"tcp, with a key", 0, choose_meeting, open_net},
         {"serial, pseudo-terminal", 0, serial_pair, open_line},
         {"serial, paced to 115200 baud", 115200, serial_pair, open_line},
         {"serial, paced to 921600 baud", 921600, serial_pair, open_line},

@@ -30,7 +30,7 @@ same "the host's end closed and reopened" --nodes 8 --link serial \
 # --- a cube file, and a bad network -----------------------------------------
 
 RELAY=${RELAY:-$BUILD/tests/relay}
-base=$((20000 + RANDOM % 20000))
+base=$((10000 + RANDOM % 20000))
 openssl rand -hex 32 > "$scratch/cube.key"
 
 # make_cube FILE [KEY]: 8 nodes on TCP, started by the host, each wire through

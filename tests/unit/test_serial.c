@@ -359,11 +359,13 @@ static void little_is_written_ahead(void **unused)
     assert_int_equal(p.send(p.context, bytes, 4096), 0);
     assert_true(serial_wait_us(&pipe) > 1000 && serial_wait_us(&pipe) < 60000);
     now += 10000; /* 100 bytes */
-    assert_int_equal(p.send(p.context, bytes, 4096), 100);
-    now += 50;
     assert_int_equal(p.send(p.context, bytes, 4096), 0);
-    now += 50;
-    assert_int_equal(p.send(p.context, bytes, 4096), 1);
+    assert_int_equal(p.send(p.context, bytes, 100), 100);
+    now += SERIAL_AHEAD_BYTES / 2 * 100 - 100;
+    assert_int_equal(p.send(p.context, bytes, 4096), 0);
+    now += 100;
+    assert_int_equal(p.send(p.context, bytes, 4096), SERIAL_AHEAD_BYTES / 2);
+    assert_int_equal(p.send(p.context, bytes, 1), 0);
     now += 10000000;
     assert_int_equal(p.send(p.context, bytes, 4096), SERIAL_AHEAD_BYTES);
     close(fds[0]);

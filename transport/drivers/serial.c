@@ -70,6 +70,11 @@ static int serial_send(void *context, const uint8_t *bytes, size_t size)
         return LINK_PIPE_CLOSED;
     }
     size_t most = room(pipe);
+    /* No dribble: a few bytes would wake the other end, whose few would wake
+     * this one. */
+    if (most < size && most < ahead_most(pipe) / 2) {
+        most = 0;
+    }
     most = most < size ? most : size;
     int taken = most == 0 ? 0 : result(pipe, write(pipe->fd, bytes, most));
     pipe->blocked = taken >= 0 && (size_t)taken < size;

@@ -51,7 +51,7 @@ check 'vm/the host program for arm64' "$(last "$scratch/said")" \
 
 # --- the machine --------------------------------------------------------------
 
-port=$((20000 + RANDOM % 20000))
+port=$((10000 + RANDOM % 20000))
 disk=$scratch/disk
 mkdir -p "$disk/bin" "$disk/proc" "$disk/sys" "$disk/dev"
 cp "$vm/root/bin/busybox" "$vm/build/incode" "$disk/bin/"
