@@ -226,9 +226,10 @@ static char **command_for(char **argv, char *ranks, char *self)
     static char *const always[] = {
         "mpirun", "--oversubscribe", "--bind-to", "none", "-x", SOCKET_NAME};
     static char *const as_root[] = {"--allow-run-as-root"};
-    /* One machine: no look for networks. */
+    /* One machine: no look for networks, nor for a way to log in elsewhere. */
     static char *const at_home[] = {"--mca", "pml", "ob1",
-                                    "--mca", "btl", "self,vader"};
+                                    "--mca", "btl", "self,vader",
+                                    "--mca", "plm", "isolated"};
     size_t count = 0, at = 0;
     while (argv[count] != NULL) {
         count++;

@@ -5,7 +5,7 @@
  * With the last cube that is due the other ranks leave, and MPI ends: what is
  * done afterwards is not lost with a rank.
  *
- * Memory: CUBE_HOST_WIRES_MAX pipes of 64 KiB (see drivers/mpi.h).  Work: constant a call,
+ * Memory: CUBE_HOST_WIRES_MAX pipes of 64 KiB.  Work: constant a call,
  * but for check, which looks at every rank of this machine.
  *
  *     host_ranks_open(&ranks, &error);                  after MPI_Init
