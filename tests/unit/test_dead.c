@@ -206,7 +206,7 @@ static void many_dead_links(void **unused)
         for (unsigned i = 0; cut < CUBE_DEAD_MAX && i < m->nodes; i++) {
             struct line_wire *wire =
                 m->places[i ^ draw(m) % 2].wires[draw(m) % m->dimension];
-            cut += !wire->lines[0].broken;
+            cut += !wire->sim.cut;
             line_cut(wire, true);
         }
         until_reported(m, cut);

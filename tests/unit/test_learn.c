@@ -109,7 +109,7 @@ static void noise_teaches_nothing(void **unused)
             uint64_t byte = line_draw(&random) >> 32;
             noise[k] = byte % 5 == 0 ? 0 : (uint8_t)(byte >> 8);
         }
-        line_send(&wire->ends[1], noise, size);
+        line_put(wire, 1, noise, size);
         now_us += 100;
         assert_false(learner_poll(&learner, &learned));
     }

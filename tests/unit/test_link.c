@@ -100,12 +100,10 @@ static void lost_credits_are_asked_for(void **unused)
         step(p, 200);
     }
     p->ends[1].lazy = false;
-    p->wire.lines[1].quality.drop = 1;
-    p->wire.lines[1].next_drop = 0;
+    sim_line_deaf(&p->wire.sim.line[1], true);
     step(p, 200);
     step(p, 200);
-    p->wire.lines[1].quality.drop = 0;
-    p->wire.lines[1].next_drop = 1e300;
+    sim_line_deaf(&p->wire.sim.line[1], false);
     uint32_t before = p->ends[1].read;
     for (unsigned i = 0; i < 10000 && p->ends[1].read == before; i++) {
         step(p, 200);
@@ -140,7 +138,7 @@ static void every_kind_of_damage(void **unused)
         p->ends[0].size_max = 1608;
         p->ends[1].size_max = 700;
         run(p, 150, 100 + 50 * (uint32_t)(seed % 9), 600000000);
-        damaged += p->wire.lines[0].damaged + p->wire.lines[1].damaged;
+        damaged += line_damaged(&p->wire);
         again += link_statistics(p->ends[0].link)->retransmitted;
         duplicates += link_statistics(p->ends[1].link)->duplicates;
         free_pair(p);
@@ -158,14 +156,14 @@ static void garbage_between_frames(void **unused)
     for (unsigned i = 0; i < 40000 && !finished(p); i++) {
         if (i % 7 == 0) {
             for (unsigned k = 0; k < 1 + i % 700; k++) {
-                line_put(&p->wire.lines[i % 2],
-                         (uint8_t)(line_draw(&random) >> 40));
+                uint8_t byte = (uint8_t)(line_draw(&random) >> 40);
+                line_put(&p->wire, i % 2, &byte, 1);
             }
         }
         if (i % 61 == 0) {
-            for (unsigned k = 0; k < 3000; k++) {
-                line_put(&p->wire.lines[i % 2], 0x55); /* without a zero */
-            }
+            uint8_t run_on[3000]; /* without a zero */
+            memset(run_on, 0x55, sizeof run_on);
+            line_put(&p->wire, i % 2, run_on, sizeof run_on);
         }
         step(p, 100);
     }
@@ -192,13 +190,10 @@ static void sleeping_until_due_is_enough(void **unused)
         while (!finished(p)) {
             uint64_t due = UINT64_MAX;
             for (unsigned who = 0; who < 2; who++) {
-                const struct line *in = p->wire.ends[who].in;
+                uint64_t at = sim_next_us(p->wire.ends[who].in, 0);
+                uint64_t byte = at > p->now_us ? at - p->now_us : 0;
                 uint64_t mine = link_next_due_us(p->ends[who].link, p->now_us);
-                if (in->begin < in->end) {
-                    uint64_t at = in->arrival_us[in->begin % LINE_BYTES];
-                    uint64_t byte = at > p->now_us ? at - p->now_us : 0;
-                    mine = byte < mine ? byte : mine;
-                }
+                mine = byte < mine ? byte : mine;
                 due = mine < due ? mine : due;
             }
             step(p, (uint32_t)due);

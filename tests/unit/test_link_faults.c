@@ -166,7 +166,7 @@ static void spoil(struct world *w)
 static void strike(struct world *w)
 {
     unsigned kind = draw(w) % 400;
-    struct line *line = &w->wire.lines[draw(w) % 2];
+    struct sim_line *line = &w->wire.sim.line[draw(w) % 2];
     if (kind < KINDS) {
         w->struck[kind]++;
     }
@@ -187,18 +187,18 @@ static void strike(struct world *w)
         w->ends[draw(w) % 2].lazy ^= true;
         break;
     case 5: /* one way is dead */
-        line->quality.drop = 1;
-        line->next_drop = 0;
+        sim_line_deaf(line, true);
         break;
     case 6:
         w->now_us += draw(w) % 5000000;
         break;
     case 7:
-        w->wire.lines[0].broken = w->wire.lines[1].broken = true;
+        sim_line_deaf(&w->wire.sim.line[0], true);
+        sim_line_deaf(&w->wire.sim.line[1], true);
         break;
     default:
         if (kind < 20) {
-            w->wire.lines[0].broken = w->wire.lines[1].broken = false;
+            line_cut(&w->wire, false);
         }
     }
 }
@@ -208,7 +208,7 @@ static void recover(struct world *w, uint32_t step_us)
 {
     struct end *a = &w->ends[0], *b = &w->ends[1];
     line_set(&w->wire, &w->quality);
-    w->wire.lines[0].broken = w->wire.lines[1].broken = false;
+    line_cut(&w->wire, false);
     a->lazy = b->lazy = false;
     uint64_t want_a = a->count + 60, want_b = b->count + 60;
     uint64_t deadline = w->now_us + QUIET_US;
