@@ -317,17 +317,19 @@ static void finish(struct run *r)
     }
 }
 
-/* What is left in the host's queues when all is done. */
-static int check_host(const struct run *r, struct host_error *error)
+/* What is left in the queues of host and nodes when all is done. */
+static int check_queues(const struct run *r, struct host_error *error)
 {
     const struct host_service *s = &r->service;
     uint64_t left = s->over ? 0 : s->spill.faces;
     for (unsigned i = 0; i < r->plan->nodes && !s->over; i++) {
+        const struct host_world_node *node = &r->world.node[i];
         left += s->node[i].pages_count + s->node[i].unspills_count;
+        left += node->state == HOST_WORLD_UP ? node_held(node->node) : 0;
     }
     if (s->ledger.committed != s->ledger.bricks || left > 0) {
         return host_fail(error, HOST_BROKEN,
-                         "host: %u of %u bricks committed and %llu slots of "
+                         "cube: %u of %u bricks committed and %llu slots of "
                          "queues in use at the end; replay it",
                          s->ledger.committed, s->ledger.bricks,
                          (unsigned long long)left);
@@ -357,7 +359,7 @@ static int serve(struct run *r, struct host_machine *machine,
         status = host_service_run(s, error);
         finish(r);
     }
-    status = status != 0 ? status : check_host(r, error);
+    status = status != 0 ? status : check_queues(r, error);
     r->calm_us = 0;
     r->world.strike_us = 0;
     host_service_end(s);

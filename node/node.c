@@ -420,6 +420,15 @@ uint64_t node_wait_us(const struct node *node)
     return due < IDLE_MAX_US ? due : IDLE_MAX_US;
 }
 
+uint32_t node_held(const struct node *node)
+{
+    if (!node->set_up) {
+        return 0;
+    }
+    return node->role == NODE_HOLDS ? node->holder.queued
+                                    : node_worker_held(&node->worker);
+}
+
 void node_run(struct node *node)
 {
     const struct node_board *board = node->board;

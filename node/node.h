@@ -37,6 +37,9 @@ enum node_event node_step(struct node *node);
 /* Microseconds until node_step must be called even if no byte comes. */
 uint64_t node_wait_us(const struct node *node);
 
+/* Slots of the role's queues that are in use: 0 when no job is open. */
+uint32_t node_held(const struct node *node);
+
 /* Steps and sleeps until the host ends the run. */
 void node_run(struct node *node);
 

@@ -366,12 +366,15 @@ unsigned node_worker_send(struct node_worker *worker)
     return sent;
 }
 
+uint32_t node_worker_held(const struct node_worker *worker)
+{
+    return worker->open + worker->results.used + worker->spills.used +
+           worker->spill_count + worker->wanted_count + worker->in_flight;
+}
+
 bool node_worker_done(const struct node_worker *worker)
 {
-    return worker->working && worker->drained && !worker->open &&
-           worker->results.used == 0 && worker->spills.used == 0 &&
-           worker->spill_count == 0 && worker->wanted_count == 0 &&
-           worker->in_flight == 0;
+    return worker->working && worker->drained && node_worker_held(worker) == 0;
 }
 
 void node_worker_end(struct node_worker *worker, uint64_t now_us)

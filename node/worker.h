@@ -71,6 +71,9 @@ unsigned node_worker_work(struct node_worker *worker);
 /* Sends what may leave; returns the number of messages. */
 unsigned node_worker_send(struct node_worker *worker);
 
+/* Slots in use: messages that wait to leave, pages that are on their way. */
+uint32_t node_worker_held(const struct node_worker *worker);
+
 /* Whether every result has left and the statistics are due. */
 bool node_worker_done(const struct node_worker *worker);
 
