@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The same bytes over every kind of wire, also where the wire suffers.
-# 60 seconds.
+# 70 seconds.
 . tests/system/lib.sh
 
 points=$scratch/points.npy
@@ -132,6 +132,55 @@ kill $node
 wait $node 2> /dev/null
 check 'links/without a key on loopback only' "$(cat "$scratch/said")" \
     grep -q 'no --key: listens for this machine' "$scratch/said"
+
+# Nodes that a user starts; node 0 is lost for good, and the host has a second
+# wire.
+cat > "$scratch/second.cube" <<-END
+	dimension = 2;
+	key = "cube.key";
+	dead = 1;
+	links = (
+	    { node = 0; to = "host"; tcp = "127.0.0.1:$base"; },
+	    { node = 3; to = "host"; tcp = "127.0.0.1:$((base + 1))"; },
+	    { node = 0; to = 1; tcp = "127.0.0.1:$((base + 2))"; },
+	    { node = 0; to = 2; tcp = "127.0.0.1:$((base + 3))"; },
+	    { node = 1; to = 3; tcp = "127.0.0.1:$((base + 4))"; },
+	    { node = 2; to = 3; tcp = "[::1]:$((base + 5))"; }
+	);
+END
+"$INCODE" cube "$scratch/second.cube" > "$scratch/straps"
+nodes=
+while read -r straps; do
+    # shellcheck disable=SC2086
+    "$BUILD/"$straps 2> /dev/null < /dev/null &
+    nodes="$nodes $!"
+done < "$scratch/straps"
+same 'nodes that a user started' --cube "$scratch/second.cube"
+same 'the same nodes again' --cube "$scratch/second.cube"
+rm -f "$scratch/out.npy"
+timeout 60 "$INCODE" run "$points" -q --cube "$scratch/second.cube" \
+    --patience 5 --host-rate 2000000 --host-rate-time 1 \
+    -o "$scratch/out.npy" --stats "$scratch/stats.json" \
+    2> "$scratch/errors" &
+host=$!
+for _ in $(seq 100); do # a connection from the host to node 0
+    grep -qi ":$(printf '%04X' "$base") [0-9A-F:]* 01 " /proc/net/tcp && break
+    sleep 0.05
+done
+sleep 0.4
+read -r node _ <<< "$nodes"
+kill -KILL "$node"
+wait $host
+status=$?
+check 'links/node 0 lost, by the second wire' \
+    "exit $status: $(last "$scratch/errors")" \
+    cmp -s "$scratch/first.npy" "$scratch/out.npy"
+check 'links/node 0 lost in mid-run' 'no generation was begun for it' \
+    test "$(stat_of "$scratch/stats.json" generations)" -gt 1
+# shellcheck disable=SC2086
+kill -KILL $nodes 2> /dev/null
+# shellcheck disable=SC2086
+wait $nodes 2> /dev/null
 
 printf 'dimension = 1;\nlinks = (\n{ node = 0; to = 3; };\n' \
     > "$scratch/bad.cube"
