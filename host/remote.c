@@ -266,6 +266,12 @@ int host_remote_prepare(struct host_run_options *options,
                          "--nodes %u: the cube of %s has %u; leave it out",
                          asked, options->cube, the_file.nodes);
     }
+    if (options->table) {
+        return host_fail(error, HOST_USAGE,
+                         "--table: compares with one node, and the cube of %s "
+                         "has its own; leave it out",
+                         options->cube);
+    }
     options->nodes = the_file.nodes;
     options->memory = the_file.memory;
     options->link = the_file.lines ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
