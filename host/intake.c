@@ -21,8 +21,11 @@ static int unsound(const struct cube_message *message, const char *what,
 static bool missing(struct host_service *s, const struct host_node *node,
                     uint32_t letters)
 {
-    s->loss = s->loss || letters != node->received;
-    return letters != node->received;
+    if (letters == node->received) {
+        return false;
+    }
+    s->loss = true;
+    return true;
 }
 
 static int take_requests(struct host_service *s,
@@ -238,9 +241,13 @@ int host_intake(struct host_service *service,
     struct host_node *node = &service->node[message->source];
     bool expected = message->type == NODE_HERE || message->type == NODE_FAULT ||
                     (service->started && !node->setup_due);
-    /* Without a setup from this host it works for one before. */
-    service->loss = service->loss || !expected;
-    int status = expected ? take(service, message, error) : 0;
+    int status = 0;
+    if (expected) {
+        status = take(service, message, error);
+    } else {
+        /* Without a setup from this host: it works for one before. */
+        service->loss = true;
+    }
     node->received++;
     node->silent_us = 0;
     return status;

@@ -12,6 +12,7 @@ enum {
     WINDOW_DEFAULT = 32,
     IDLE_US_MAX = 20000,
     PATIENCE_US = 60000000,
+    FRUITLESS_MAX = 64,
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
     CREDITS_SHARED = 128
@@ -385,6 +386,22 @@ static int begin_again(struct host_service *s, uint64_t now_us,
     return 0;
 }
 
+/* Boards that reset themselves would have the run begin for ever. */
+static int check_progress(struct host_service *s, struct host_error *error)
+{
+    s->fruitless =
+        s->ledger.committed == s->committed_before ? s->fruitless + 1 : 0;
+    s->committed_before = s->ledger.committed;
+    return s->fruitless <= FRUITLESS_MAX
+               ? 0
+               : host_fail(error, HOST_CUBE,
+                           "node %u link %u: %u losses in a row, and nothing "
+                           "done between them; look after that node and its "
+                           "wires, and run again",
+                           s->blamed, host_watch_link(s, s->blamed),
+                           s->fruitless);
+}
+
 /* After a loss: a new generation, without what was given up. */
 static int renew(struct host_service *s, uint64_t now_us,
                  struct host_error *error)
@@ -395,6 +412,9 @@ static int renew(struct host_service *s, uint64_t now_us,
     if (s->started && s->ledger.committed == s->ledger.bricks) {
         s->over = true; /* nothing is lost that is needed */
         return 0;
+    }
+    if (check_progress(s, error) != 0) {
+        return error->code;
     }
     next.generation++;
     if (s->wire_lost) {

@@ -97,6 +97,10 @@ struct host_service {
     bool over;           /* all is here that is needed */
     uint32_t generation; /* of the wiring that is followed */
     bool loss;           /* a new generation is due */
+    unsigned blamed;     /* the node of the last loss, as far as is known */
+    /* Losses in a row without a brick between them that was committed. */
+    unsigned fruitless;
+    uint32_t committed_before;
     bool wire_lost;      /* the one in use is dead */
     bool probe, probing; /* nodes are called one by one: in the next generation;
                             now, until all have answered */

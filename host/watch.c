@@ -124,6 +124,9 @@ int host_watch_answer(struct host_service *service,
                          message->source);
     }
     memcpy(&here, message->data, sizeof here);
+    if (node->start != 0 && node->start != here.start) {
+        s->blamed = message->source;
+    }
     bool first = !report->here;
     if (first) {
         /* It has had nothing but calls yet.  The first of them may have gone
@@ -224,6 +227,7 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
             continue; /* the machine will say that it has started it again */
         }
         node->given_up = s->probing;
+        s->blamed = i;
         s->loss = true;
     }
 }
@@ -250,6 +254,7 @@ static int check_wire(struct host_service *s, uint64_t now_us,
     }
     if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX) {
         s->wire_lost = true;
+        s->blamed = gate;
         s->loss = true;
     }
     return 0;

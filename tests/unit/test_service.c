@@ -60,6 +60,8 @@ static struct {
     uint32_t dead_us, epoch;
     struct event events[EVENTS];
     double host_fails; /* when; 0: never */
+    bool sick;         /* node 0 starts again whenever it has work */
+    unsigned busy;     /* its steps in a row that did something */
     uint64_t now_us;
 } world;
 
@@ -222,6 +224,13 @@ static void machine_idle(void *context, uint64_t wait_us)
             enum node_event event = node_step(world.node[i]);
             world.ended[i] = event == NODE_STOPPED;
             moved = moved || event == NODE_BUSY;
+            world.busy = i != 0               ? world.busy
+                         : event == NODE_BUSY ? world.busy + 1
+                                              : 0;
+            if (world.sick && world.busy > 3) {
+                start_node(0);
+                world.busy = 0;
+            }
         }
     }
     world.now_us += moved ? 20 : wait_us < 1000 ? wait_us + 1 : 1000;
@@ -447,6 +456,21 @@ static void test_gate(void **unused)
     }
 }
 
+/* A board that resets itself whenever it has work does not go on for ever. */
+static void test_for_ever(void **unused)
+{
+    struct host_digest digest;
+    struct host_error error;
+    (void)unused;
+    prepare();
+    start_world();
+    world.sick = true;
+    assert_int_equal(run(HOST_SEQUENTIAL, &digest, &error), HOST_CUBE);
+    if (strstr(error.text, "node 0 link 3: ") == NULL) {
+        fail_msg("%s", error.text);
+    }
+}
+
 /* Nodes that were left in the midst of a run serve the next host. */
 static void test_next_host(void **unused)
 {
@@ -506,10 +530,11 @@ static void test_wrong_wire(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_restarts), cmocka_unit_test(test_mixtures),
-        cmocka_unit_test(test_stopped),  cmocka_unit_test(test_gone),
-        cmocka_unit_test(test_gate),     cmocka_unit_test(test_next_host),
-        cmocka_unit_test(test_cut),      cmocka_unit_test(test_wrong_wire),
+        cmocka_unit_test(test_restarts),   cmocka_unit_test(test_mixtures),
+        cmocka_unit_test(test_stopped),    cmocka_unit_test(test_gone),
+        cmocka_unit_test(test_gate),       cmocka_unit_test(test_for_ever),
+        cmocka_unit_test(test_next_host),  cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_wrong_wire),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
