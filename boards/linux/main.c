@@ -12,6 +12,8 @@
  *
  *     incode-node --node 3 --dimension 2 --key cube.key \
  *                 --wire 0=listen:10.0.0.3:7001 --wire 1=call:10.0.0.1:7001
+ *
+ * Without --node and --dimension it waits until a neighbour says who it is.
  */
 #include <fcntl.h>
 #include <link.h>
@@ -25,7 +27,10 @@
 #include <unistd.h>
 
 #include "../../node/node.h"
+#include "../../transport/learn.h"
 #include "wire.h"
+
+#define UNNAMED UINT64_MAX
 
 enum { PAGE = 4096, SANITIZED_STATIC = 8192, KEY_DIGITS = 64 };
 
@@ -102,6 +107,9 @@ static bool wires_fit(const struct straps *straps)
 {
     unsigned links = (unsigned)straps->dimension +
                      (straps->node == 0 || straps->host_wire != 0 ? 1 : 0);
+    if (straps->node == UNNAMED) {
+        links = straps->links_count + straps->wires_count;
+    }
     if (straps->wires_count == 0) {
         return straps->links_count == links;
     }
@@ -145,7 +153,9 @@ static bool read_straps(char **argv, struct straps *straps)
         }
     }
     return argv[0] == NULL && straps->dimension <= CUBE_DIMENSION_MAX &&
-           straps->node < UINT64_C(1) << straps->dimension && wires_fit(straps);
+           (straps->node == UNNAMED ||
+            straps->node < UINT64_C(1) << straps->dimension) &&
+           wires_fit(straps);
 }
 
 /* Adds the writable segments in whole pages, as the kernel counts them. */
@@ -272,6 +282,28 @@ static void start_alone(struct straps *straps, struct linux_board *linux_board,
 #endif
 }
 
+/* Waits until a neighbour has said who this node is; NULL: as it has wires. */
+static const char *learn(const struct node_board *board, struct straps *straps)
+{
+    static struct learner learner;
+    struct linux_board *links = board->context;
+    struct learned learned;
+    learner_init(&learner, board->pipes, links->links_count);
+    while (!learner_poll(&learner, &learned)) {
+        idle(links, 50000);
+    }
+    straps->node = learned.self;
+    straps->dimension = learned.dimension;
+    straps->host_wire =
+        learned.self != 0 && links->links_count > learned.dimension;
+    unsigned count = learned.dimension +
+                     (straps->node == 0 || straps->host_wire != 0 ? 1u : 0u);
+    return count == links->links_count
+               ? NULL
+               : "its neighbour takes it for a node with another number of "
+                 "wires; see incode cube FILE";
+}
+
 static struct node_identity identity_of(const struct straps *straps)
 {
     struct node_identity id;
@@ -286,9 +318,22 @@ static struct node_identity identity_of(const struct straps *straps)
     return id;
 }
 
+static void fill_in(struct node_board *board, struct linux_board *linux_board)
+{
+    for (unsigned i = 0; i < linux_board->links_count; i++) {
+        board->pipes[i] = linux_wire_pipe(&linux_board->wire[i]);
+    }
+    board->context = linux_board;
+    board->now_us = now_us;
+    board->busy_us = busy_us;
+    board->idle = idle;
+    board->reset = reset;
+}
+
 int main(int argc, char **argv)
 {
-    static struct straps straps = {.stack = 65536, .memory = 4u << 20};
+    static struct straps straps = {
+        .node = UNNAMED, .stack = 65536, .memory = 4u << 20};
     static struct linux_board linux_board;
     static struct node_board board;
     const char *why = NULL;
@@ -336,15 +381,13 @@ int main(int argc, char **argv)
     for (unsigned i = 0; i < straps.links_count; i++) {
         linux_wire_inherit(&linux_board.wire[i], straps.links[i]);
     }
-    for (unsigned i = 0; i < linux_board.links_count; i++) {
-        board.pipes[i] = linux_wire_pipe(&linux_board.wire[i]);
+    fill_in(&board, &linux_board);
+    why = straps.node == UNNAMED ? learn(&board, &straps) : NULL;
+    if (why != NULL) {
+        complain(why);
+        return 2;
     }
-    board.context = &linux_board;
     board.identity = identity_of(&straps);
-    board.now_us = now_us;
-    board.busy_us = busy_us;
-    board.idle = idle;
-    board.reset = reset;
     struct node *node = node_start(&board, &why);
     if (node == NULL) {
         complain(why);

@@ -182,6 +182,26 @@ kill -KILL $nodes 2> /dev/null
 # shellcheck disable=SC2086
 wait $nodes 2> /dev/null
 
+# Nodes that nobody has told who they are, the host's neighbour last.
+cat > "$scratch/nameless.cube" <<-END
+	dimension = 1;
+	key = "cube.key";
+	links = ( { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 90))"; },
+	          { node = 1; to = 0; tcp = "127.0.0.1:$((base + 91))"; } );
+END
+nameless=
+while read -r straps; do
+    # shellcheck disable=SC2086
+    "$BUILD/"$straps 2> "$scratch/said" &
+    nameless="$! $nameless"
+done < <("$INCODE" cube "$scratch/nameless.cube" | grep '^incode-node ' |
+    sed 's/--node [0-9]* //; s/--dimension [0-9]* //' | tac)
+same 'nodes that learn who they are' --cube "$scratch/nameless.cube"
+# shellcheck disable=SC2086
+kill $nameless
+# shellcheck disable=SC2086
+wait $nameless 2> /dev/null
+
 printf 'dimension = 1;\nlinks = (\n{ node = 0; to = 3; };\n' \
     > "$scratch/bad.cube"
 "$INCODE" run "$points" --cube "$scratch/bad.cube" 2> "$scratch/errors"
