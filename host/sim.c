@@ -34,7 +34,7 @@ struct run {
     struct host_tetrahedra tets;
     uint64_t random, calm_us, event_us;
     unsigned events;
-    bool open, crash_due;
+    bool open, crash_due, broken;
     uint64_t frames;                  /* seen by `decide` */
     uint64_t before[HOST_SIM_FAULTS]; /* strikes before work was open */
     struct lasting lasting[LASTING_MAX];
@@ -161,6 +161,12 @@ static void strike(void *context)
         weather(r, false);
         return;
     }
+    if (w->now_us >= r->event_us && r->plan->wanted[HOST_SIM_DEAD_WIRE] &&
+        !r->broken) {
+        r->broken = true;
+        host_world_cut(w, (unsigned)draw(r, 0, w->wires - 2), true);
+        r->outcome->struck[HOST_SIM_DEAD_WIRE] += r->open;
+    }
     if (w->now_us >= r->event_us) {
         bool more = any_event_wanted(r->plan) && r->events > 0;
         for (unsigned tries = 0; more && tries < TRIES_MAX; tries++) {
@@ -248,6 +254,7 @@ static int open_world(struct run *r, struct host_error *error)
         .dimension = (unsigned)__builtin_ctz(p->nodes),
         .memory = memory_of(r),
         .window = (uint8_t)p->window,
+        .dead_us = p->dead_us,
         .wire = p->wire,
         .host_wire = p->host_wire,
         .gather_us = p->gather_us,

@@ -3,8 +3,9 @@
 #include <string.h>
 
 const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
-    "loss",    "flip", "delete",    "insert", "repeat", "burst",     "stall",
-    "one-way", "cut",  "partition", "pause",  "crash",  "slow-host", "tiny"};
+    "loss",  "flip",  "delete",    "insert", "repeat",
+    "burst", "stall", "one-way",   "cut",    "partition",
+    "pause", "crash", "slow-host", "tiny",   "dead-wire"};
 
 /* A slow wire does not wake its node for every byte. */
 enum { FIFO_BYTES = 64 };
@@ -117,6 +118,21 @@ static void draw_faults(struct host_sim_plan *p, uint64_t *state)
     p->calm_us = host_world_draw_log(state, 200000, 20000000);
 }
 
+/* A wire breaks for good where another way is left.  What else would have
+ * links given up that come back, until none is left, does not happen then. */
+static void draw_death(struct host_sim_plan *p)
+{
+    uint64_t state = sim_seed(p->seed, 78);
+    if (p->nodes < 4 || p->nodes > 64 || !one_in(&state, 5)) {
+        return;
+    }
+    p->wanted[HOST_SIM_DEAD_WIRE] = true;
+    for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_CRASH; k++) {
+        p->wanted[k] = false;
+    }
+    p->dead_us = (uint32_t)draw(&state, 4000000, 8000000);
+}
+
 void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
                         unsigned nodes)
 {
@@ -126,12 +142,13 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
     plan->nodes_given = nodes;
     plan->nodes = draw_nodes(&state);
     plan->nodes = nodes != 0 ? nodes : plan->nodes;
-    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+    for (int k = 0; k < HOST_SIM_DEAD_WIRE; k++) {
         plan->wanted[k] = one_in(&state, 3);
     }
     draw_work(plan, &state);
     draw_cube(plan, &state);
     draw_faults(plan, &state);
+    draw_death(plan);
 }
 
 void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)

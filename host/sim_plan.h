@@ -25,6 +25,7 @@ enum host_sim_fault {
     HOST_SIM_SLOW_HOST,
     HOST_SIM_TINY, /* memories so small that pages are dropped or faces spilled
                     */
+    HOST_SIM_DEAD_WIRE, /* a wire between two nodes breaks for good */
     HOST_SIM_FAULTS
 };
 
@@ -53,6 +54,8 @@ struct host_sim_plan {
     uint32_t gap_us;           /* between two events, more or less */
     uint32_t lasts_us_max;     /* each of them */
     unsigned events_max;
+    uint32_t
+        dead_us; /* a link that is silent so long is given up; 0: none is */
     uint64_t calm_us; /* after the work began: no more faults */
     /* One fault alone, at frame `frame` of all that are sent: what becomes of
      * it, or a restart of the node that sends it.  0: none. */

@@ -409,6 +409,7 @@ static int open_node(struct host_world *w, unsigned i)
     n->board.identity.self = (uint16_t)i;
     n->board.identity.dimension = (uint8_t)dimension;
     n->board.identity.window = w->options.window;
+    n->board.identity.dead_us = w->options.dead_us;
     n->board.now_us = node_now_us;
     n->board.busy_us = node_busy_us;
     n->board.idle = node_idle;

@@ -28,6 +28,7 @@ struct host_world_options {
     uint64_t memory; /* bytes a node, stack included */
     uint8_t window;  /* frames; 0: the node's choice */
     struct sim_quality wire, host_wire;
+    uint32_t dead_us;   /* as in struct node_identity */
     uint32_t gather_us; /* bytes that come closer together wake a node once */
     uint32_t step_us;   /* a step of a node that has work, more or less */
     uint32_t host_us;   /* a round of the host's loop */
