@@ -146,6 +146,20 @@ static bool any_event_wanted(const struct host_sim_plan *plan)
     return any;
 }
 
+static void break_for_good(struct run *r)
+{
+    struct host_world *w = &r->world;
+    r->broken = true;
+    if (r->plan->wanted[HOST_SIM_DEAD_WIRE]) {
+        host_world_cut(w, (unsigned)draw(r, 0, w->wires - 2), true);
+        r->outcome->struck[HOST_SIM_DEAD_WIRE] += r->open;
+    }
+    if (r->plan->wanted[HOST_SIM_DEAD_NODE]) {
+        host_world_kill(w, (unsigned)draw(r, 1, w->options.nodes - 1));
+        r->outcome->struck[HOST_SIM_DEAD_NODE] += r->open;
+    }
+}
+
 /* The world's clock has come to where something is to be done. */
 static void strike(void *context)
 {
@@ -161,11 +175,8 @@ static void strike(void *context)
         weather(r, false);
         return;
     }
-    if (w->now_us >= r->event_us && r->plan->wanted[HOST_SIM_DEAD_WIRE] &&
-        !r->broken) {
-        r->broken = true;
-        host_world_cut(w, (unsigned)draw(r, 0, w->wires - 2), true);
-        r->outcome->struck[HOST_SIM_DEAD_WIRE] += r->open;
+    if (w->now_us >= r->event_us && !r->broken) {
+        break_for_good(r);
     }
     if (w->now_us >= r->event_us) {
         bool more = any_event_wanted(r->plan) && r->events > 0;
@@ -353,6 +364,7 @@ static int serve(struct run *r, struct host_machine *machine,
     s->order = &r->order;
     s->tets = &r->tets;
     s->window = p->host_window;
+    s->patience_us = p->patience_us;
     s->workers = p->sequential ? 1 : p->nodes;
     s->setup.setup.index = (uint8_t)p->index;
     s->setup.setup.face_rule = (uint8_t)p->face_rule;

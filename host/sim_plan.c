@@ -3,9 +3,9 @@
 #include <string.h>
 
 const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
-    "loss",  "flip",  "delete",    "insert", "repeat",
-    "burst", "stall", "one-way",   "cut",    "partition",
-    "pause", "crash", "slow-host", "tiny",   "dead-wire"};
+    "loss",      "flip",    "delete",    "insert",    "repeat", "burst",
+    "stall",     "one-way", "cut",       "partition", "pause",  "crash",
+    "slow-host", "tiny",    "dead-wire", "dead-node"};
 
 /* A slow wire does not wake its node for every byte. */
 enum { FIFO_BYTES = 64 };
@@ -118,15 +118,19 @@ static void draw_faults(struct host_sim_plan *p, uint64_t *state)
     p->calm_us = host_world_draw_log(state, 200000, 20000000);
 }
 
-/* A wire breaks for good where another way is left.  What else would have
- * links given up that come back, until none is left, does not happen then. */
+/* A wire breaks or a node dies for good where another way is left.  What else
+ * would have links given up that come back, until none is left, does not happen
+ * then. */
 static void draw_death(struct host_sim_plan *p)
 {
     uint64_t state = sim_seed(p->seed, 78);
-    if (p->nodes < 4 || p->nodes > 64 || !one_in(&state, 5)) {
+    if (p->nodes < 4 || p->nodes > 64 || !one_in(&state, 4)) {
         return;
     }
-    p->wanted[HOST_SIM_DEAD_WIRE] = true;
+    bool node = one_in(&state, 2);
+    p->wanted[HOST_SIM_DEAD_WIRE] = !node || one_in(&state, 4);
+    p->wanted[HOST_SIM_DEAD_NODE] = node;
+    p->patience_us = draw(&state, 9000000, 15000000);
     for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_CRASH; k++) {
         p->wanted[k] = false;
     }

@@ -26,6 +26,7 @@ enum host_sim_fault {
     HOST_SIM_TINY, /* memories so small that pages are dropped or faces spilled
                     */
     HOST_SIM_DEAD_WIRE, /* a wire between two nodes breaks for good */
+    HOST_SIM_DEAD_NODE, /* a node, but for node 0, never comes back */
     HOST_SIM_FAULTS
 };
 
@@ -54,8 +55,10 @@ struct host_sim_plan {
     uint32_t gap_us;           /* between two events, more or less */
     uint32_t lasts_us_max;     /* each of them */
     unsigned events_max;
-    uint32_t
-        dead_us; /* a link that is silent so long is given up; 0: none is */
+    /* A link that is silent so long is given up; 0: none is.  Patience with a
+     * node that is silent; 0: the host's own. */
+    uint32_t dead_us;
+    uint64_t patience_us;
     uint64_t calm_us; /* after the work began: no more faults */
     /* One fault alone, at frame `frame` of all that are sent: what becomes of
      * it, or a restart of the node that sends it.  0: none. */

@@ -244,6 +244,16 @@ void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
     wake_at(world, node, n->busy_until_us);
 }
 
+void host_world_kill(struct host_world *world, unsigned node)
+{
+    host_world_crash(world, node, 0, false);
+    if (world->node[node].state == HOST_WORLD_OFF) {
+        world->node[node].state = HOST_WORLD_ENDED;
+        world->ended++;
+        wake_at(world, node, UINT64_MAX);
+    }
+}
+
 void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
 {
     struct host_world_node *n = &world->node[node];

@@ -108,6 +108,9 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us);
 void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
                       bool unplugged);
 
+/* The node never comes back. */
+void host_world_kill(struct host_world *world, unsigned node);
+
 /* NULL, or what a node left behind that was not its own. */
 const char *host_world_damage(const struct host_world *world);
 
