@@ -84,6 +84,12 @@ static void draw_cube(struct host_sim_plan *p, uint64_t *state)
     bool fast = large || p->wanted[HOST_SIM_TINY];
     draw_wire(&p->wire, state, fast);
     draw_wire(&p->host_wire, state, fast || p->nodes > 16);
+    if (p->wanted[HOST_SIM_SLOW_HOST] && p->wanted[HOST_SIM_TINY]) {
+        /* Many pages, and what a round of the host sends is what it has room
+         * for: more than a few bytes. */
+        p->host_wire.room += 8192;
+        p->host_wire.bytes += 8192;
+    }
     p->gather_us = (uint32_t)host_world_draw_log(state, 1, 500);
     uint64_t slow = p->wire.bytes_per_s == 0 ? UINT32_MAX : p->wire.bytes_per_s;
     if (p->gather_us < FIFO_BYTES * UINT64_C(1000000) / slow) {
@@ -124,7 +130,7 @@ static void draw_faults(struct host_sim_plan *p, uint64_t *state)
 static void draw_death(struct host_sim_plan *p)
 {
     uint64_t state = sim_seed(p->seed, 78);
-    if (p->nodes < 4 || p->nodes > 64 || !one_in(&state, 4)) {
+    if (p->nodes < 4 || p->nodes > 64 || draw(&state, 1, 5) > 2) {
         return;
     }
     bool node = one_in(&state, 2);
