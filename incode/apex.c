@@ -83,7 +83,7 @@ void incode_search_box(struct incode_triangulator *t, struct incode_search *s)
         all = all && q->lo[d] <= t->setup.lo[d] && q->hi[d] >= t->setup.hi[d];
     }
     q->boxed = !all;
-    q->timid = true;
+    q->timid = !s->flat;
     q->cursor = 0;
 }
 
@@ -113,7 +113,7 @@ void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,
     incode_query_face(q);
     /* A radius that vanished among denormals could not grow again. */
     s->radius = radius > DBL_MIN ? radius : DBL_MIN;
-    s->final = false;
+    s->final = s->flat = false;
     s->looked = 0;
     incode_search_box(t, s);
 }
@@ -140,6 +140,13 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
         s->looked += t->stats.candidates - before;
         if (r == INCODE_WALK_WAIT)
             return INCODE_WAIT;
+        if (q->question == INCODE_QUERY_SUPPORT) {
+            t->supports[t->support_next] = q->support;
+            t->support_next = (t->support_next + 1) % INCODE_SUPPORTS;
+            if (t->support_count < INCODE_SUPPORTS)
+                t->support_count++;
+            return INCODE_OK;
+        }
         if (s->final) {
             incode_count_candidates(t, s->looked);
             if (q->best == INCODE_NONE)
@@ -153,7 +160,7 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
         q->done = true;
         memcpy(q->done_lo, q->lo, sizeof q->lo);
         memcpy(q->done_hi, q->hi, sizeof q->hi);
-        s->radius *= 4;
+        s->radius *= s->flat ? 2 : 4;
         incode_search_box(t, s);
     }
 }
@@ -375,8 +382,12 @@ void incode_search_from(struct incode_make *n, struct incode_search *s)
     s->radius = g->radius > DBL_MIN ? g->radius : DBL_MIN;
     s->looked = g->near;
     s->final = false;
+    s->flat = n->flat.known;
+    q->flat = n->flat;
     if (n->best == INCODE_GATHER_NONE) {
         q->sphere = n->sphere;
+        s->radius *= 2;
+        incode_search_box(n->t, s);
         return;
     }
     if (n->bare)
@@ -387,6 +398,95 @@ void incode_search_from(struct incode_make *n, struct incode_search *s)
     q->done = true;
     memcpy(q->done_lo, g->lo, sizeof g->lo);
     memcpy(q->done_hi, g->hi, sizeof g->hi);
+}
+
+/* ---- faces among points flat up to rounding ---- */
+
+enum { FLAT_POINTS = 3, FLAT_ASKED = 12 };
+
+/* Whether no sphere tells where the apex is, and points at hand are in doubt
+ * about the face or the face itself is thin. */
+static bool is_doubtful(const struct incode_make *n)
+{
+    const struct incode_gather *g = &n->t->gather;
+    const struct incode_sphere *s = &n->sphere;
+    uint32_t count = 0;
+    if (n->best != INCODE_GATHER_NONE)
+        return !n->bare && incode_sphere_is_vast(s);
+    if (!n->regular)
+        return true;
+    for (uint32_t i = 0; i < g->near && count < FLAT_POINTS; i++) {
+        uint32_t at = g->at[i];
+        double r[3];
+        incode_gather_relative(g, at, r);
+        double level = __builtin_fabs(incode_dot(s->n, r));
+        count += at != g->self && at != n->b && at != n->c &&
+                 level < 1e3 * incode_plane_error(s, r);
+    }
+    return count == FLAT_POINTS;
+}
+
+/* Whether a support of the face's direction is known. */
+static bool has_support(const struct incode_make *n)
+{
+    const struct incode_triangulator *t = n->t;
+    for (uint32_t i = 0; i < t->support_count; i++)
+        if (incode_support_faces(&t->supports[i], n->sphere.n))
+            return true;
+    return false;
+}
+
+/* Lets some points at hand say how far the apex may be: where one's sphere is
+ * too ill-conditioned to tell, another's may do.  True: the best at hand is
+ * it. */
+static bool reach_fits(struct incode_make *n)
+{
+    const struct incode_gather *g = &n->t->gather;
+    uint32_t asked = 0;
+    bool fits = false;
+    if (n->best == INCODE_GATHER_NONE)
+        return false;
+    for (uint32_t i = 0; i <= g->near && asked < FLAT_ASKED && !fits; i++) {
+        uint32_t at = i == 0 ? n->best : g->at[i - 1];
+        double p[3];
+        copy_point(p, g, at);
+        if (at == g->self || at == n->b || at == n->c ||
+            incode_orient3d(&n->t->stats.tally, n->pv, n->pb, n->pc, p) <= 0)
+            continue;
+        const double *const q[4] = {n->pv, n->pb, n->pc, p};
+        incode_flat_lessen(&n->flat, q, g->scale);
+        asked++;
+        fits = true;
+        for (int d = 0; d < 3; d++)
+            fits = fits && n->flat.reach * (1 + 1e-9) < g->rhi[d] &&
+                   n->flat.reach * (1 + 1e-9) < -g->rlo[d];
+    }
+    return fits;
+}
+
+static enum incode_near contest_flat(struct incode_make *n,
+                                     struct incode_search *s)
+{
+    const struct incode_triangulator *t = n->t;
+    const struct incode_gather *g = &t->gather;
+    n->flat.known = true;
+    n->flat.reach = __builtin_inf();
+    n->flat.spread = 0;
+    n->flat.regular = n->regular;
+    if (n->regular)
+        memcpy(n->flat.c0, n->pencil.c0, sizeof n->flat.c0);
+    n->flat.supports = t->supports;
+    n->flat.count = t->support_count;
+    if (n->best == INCODE_GATHER_NONE && n->regular)
+        for (uint32_t i = 0; i < g->near; i++)
+            consider(n, g->at[i]);
+    if (reach_fits(n))
+        return INCODE_NEAR_FOUND;
+    if (n->regular && !has_support(n))
+        incode_query_support(&s->query, n->pv, n->sphere.n, g->scale);
+    else
+        incode_search_from(n, s);
+    return INCODE_NEAR_SEARCH;
 }
 
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
@@ -413,7 +513,14 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     if (incode_plane_is_blurred(&n.sphere))
         incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, g->scale);
     set_pencil(&n, &n.sphere);
+    n.flat.known = false;
     enum incode_near r = contest_all(&n);
+    bool doubtful = r == INCODE_NEAR_SEARCH && is_doubtful(&n);
+    if (doubtful) {
+        r = contest_flat(&n, s);
+        if (r == INCODE_NEAR_SEARCH)
+            return r;
+    }
     *apex = n.best;
     if (r != INCODE_NEAR_SEARCH) {
         incode_count_candidates(t, g->near);

@@ -22,6 +22,7 @@ struct incode_make {
     struct incode_sphere sphere;
     bool regular; /* the face is neither thin nor out of the range of floats */
     struct incode_pencil pencil; /* of a regular face */
+    struct incode_flat flat;
 };
 
 /* Whether the closed cap, beyond the face, of the sphere at t of the pencil

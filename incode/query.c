@@ -46,12 +46,32 @@ void incode_query_face(struct incode_query *q)
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, NULL, q->scale);
 }
 
+/* Where the sphere says nothing, the points' half-space may. */
+static void bound_flat(struct incode_query *q)
+{
+    if (!q->flat.known || q->best == INCODE_NONE)
+        return;
+    const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
+    incode_flat_lessen(&q->flat, p, q->scale);
+    double reach = q->flat.reach / q->scale * (1 + 1e-9);
+    q->boxed = reach < 1e300;
+    for (int d = 0; d < 3 && q->boxed; d++) {
+        double slack = 1e-15 * (__builtin_fabs(q->pv[d]) + reach);
+        q->lo[d] = q->pv[d] - reach - slack;
+        q->hi[d] = q->pv[d] + reach + slack;
+    }
+}
+
 /* The box of the best's sphere, widened by 1e-6 of its size and by the rounding
  * of all that leads to it; none where the sphere is ill-conditioned. */
 static void bound_sphere(struct incode_query *q)
 {
     const struct incode_sphere *s = &q->sphere;
     q->boxed = q->round = false;
+    if (q->flat.known && incode_sphere_is_vast(s)) {
+        bound_flat(q);
+        return;
+    }
     if (!s->has_apex || !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
         !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
         return;
@@ -94,6 +114,9 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
                            uint32_t id, const double p[3])
 {
+    if (q->flat.known && q->best != INCODE_NONE && !q->round &&
+        incode_flat_outside(&q->flat, q->pv, p, q->scale))
+        return;
     if (incode_orient3d(tally, q->pv, q->pb, q->pc, p) <= 0)
         return;
     if (q->best != INCODE_NONE &&
@@ -208,6 +231,25 @@ INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
     return ~(square > incode_vd_all(q->limit));
 }
 
+/* May reach higher than the support so far. */
+INCODE_INLINE incode_vl may_rise(const struct incode_query *q,
+                                 const struct boxes *boxes, unsigned i)
+{
+    const struct incode_support *s = &q->support;
+    incode_vd top = incode_vd_all(INCODE_SPHERE_TINY), error = top;
+    for (int d = 0; d < 3; d++) {
+        incode_vd p = incode_vd_all(s->p[d]), scale = incode_vd_all(s->scale);
+        incode_vd lo = (incode_vd_load(boxes->lo[d] + i) - p) * scale;
+        incode_vd hi = (incode_vd_load(boxes->hi[d] + i) - p) * scale;
+        incode_vd n = incode_vd_all(s->n[d]);
+        incode_vd a = n * lo, b = n * hi;
+        top += incode_vd_max(a, b);
+        error += incode_vd_max(incode_vd_abs(a), incode_vd_abs(b));
+    }
+    return top + error * incode_vd_all(INCODE_SPHERE_EPS) >=
+           incode_vd_all(q->limit);
+}
+
 static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
                         unsigned count)
 {
@@ -225,6 +267,8 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
             in &= meets_ball(q, boxes, i);
         else if (q->question == INCODE_QUERY_APEX)
             in &= may_hold_apex(q, boxes, i);
+        else if (q->question == INCODE_QUERY_SUPPORT)
+            in &= may_rise(q, boxes, i);
         else if (q->question != INCODE_QUERY_BOX)
             in &= may_be_near(q, boxes, i);
         mask |= incode_vd_mask(in) << i;
@@ -475,6 +519,36 @@ static void consider_circle(struct incode_query *q, uint32_t id,
     memcpy(q->best_p, p, sizeof q->best_p);
 }
 
+void incode_query_support(struct incode_query *q, const double pv[3],
+                          const double n[3], double scale)
+{
+    memset(q, 0, sizeof *q);
+    q->question = INCODE_QUERY_SUPPORT;
+    q->v = q->b = q->c = q->best = INCODE_NONE;
+    q->support.scale = scale;
+    memcpy(q->support.n, n, sizeof q->support.n);
+    memcpy(q->support.p, pv, sizeof q->support.p);
+}
+
+static void consider_height(struct incode_query *q, const double p[3])
+{
+    struct incode_support *s = &q->support;
+    struct incode_dd top = {s->most[0], s->most[1]};
+    double r[3], error = 0;
+    for (int d = 0; d < 3; d++) {
+        r[d] = (p[d] - s->p[d]) * s->scale;
+        error += __builtin_fabs(r[d] * s->n[d]);
+    }
+    if (incode_dot(r, s->n) + error * INCODE_SPHERE_EPS < q->limit)
+        return;
+    struct incode_dd height = incode_support_height(s, p);
+    if (incode_dd_minus(height, top).hi > 0) {
+        s->most[0] = height.hi;
+        s->most[1] = height.lo;
+        q->limit = height.hi;
+    }
+}
+
 static bool is_done(const struct incode_query *q, const double p[3])
 {
     bool done = true;
@@ -510,6 +584,8 @@ static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
             continue;
         if (q->question == INCODE_QUERY_APEX)
             incode_query_consider(q, walker->tally, id, p);
+        else if (q->question == INCODE_QUERY_SUPPORT)
+            consider_height(q, p);
         else if (q->question == INCODE_QUERY_NEAREST)
             consider_near(q, id, p);
         else

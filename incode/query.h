@@ -17,11 +17,13 @@
 #include "pager.h"
 #include "predicates.h"
 #include "sphere.h"
+#include "support.h"
 
 enum incode_question {
     INCODE_QUERY_BOX,     /* leaves that meet a box */
     INCODE_QUERY_APEX,    /* the apex of a face: first in Delaunay distance */
     INCODE_QUERY_NEAREST, /* the nearest neighbour of v */
+    INCODE_QUERY_SUPPORT, /* the half-space of a normal that holds all points */
     INCODE_QUERY_CIRCLE   /* the smallest circle through v and b: a start for
                              the search of a first face, approximate */
 };
@@ -39,14 +41,16 @@ struct incode_query {
     bool done;           /* not what lies within [done_lo, done_hi] */
     double lo[3], hi[3]; /* absolute coordinates */
     double done_lo[3], done_hi[3];
-    uint32_t v, b, c;           /* vertex numbers */
-    double pv[3], pb[3], pc[3]; /* absolute coordinates */
-    double scale;               /* relative = (p - pv) * scale */
-    double rb[3], rc[3];        /* b and c, relative */
-    struct incode_sphere sphere;
-    double centre[3];   /* of the sphere: where its value peaks */
-    double square;      /* of its radius, widened */
-    double plane_slack; /* of n . p within the ball */
+    uint32_t v, b, c;            /* vertex numbers */
+    double pv[3], pb[3], pc[3];  /* absolute coordinates */
+    double scale;                /* relative = (p - pv) * scale */
+    double rb[3], rc[3];         /* b and c, relative */
+    struct incode_sphere sphere; /* SUPPORT: its plane's normal alone */
+    struct incode_flat flat; /* APEX: bounds the box of a best without a ball */
+    struct incode_support support; /* SUPPORT: what holds all points so far */
+    double centre[3];              /* of the sphere: where its value peaks */
+    double square;                 /* of its radius, widened */
+    double plane_slack;            /* of n . p within the ball */
     double t; /* where in a pencil the ball is, of the first candidate so far */
     double limit;  /* NEAREST, CIRCLE: squared, relative */
     uint32_t best; /* vertex number, or INCODE_NONE */
@@ -96,6 +100,10 @@ enum incode_walk incode_walk_brick(struct incode_walker *walker,
                                    struct incode_query *q, uint32_t brick,
                                    incode_visit *visit, void *context);
 
+/* Sets the direction of a SUPPORT query: that of a face at pv. */
+void incode_query_support(struct incode_query *q, const double pv[3],
+                          const double n[3], double scale);
+
 /* Sets the face (v, b, c) of an APEX query: plane and scale. */
 void incode_query_face(struct incode_query *q);
 
@@ -122,7 +130,7 @@ uint32_t incode_query_boxes(const struct incode_query *q,
 uint32_t incode_query_lanes(const struct incode_query *q,
                             const double *const axis[3]);
 
-/* Visits the points of the leaves for APEX, NEAREST and CIRCLE. */
+/* Visits the points of the leaves for all but BOX. */
 incode_visit incode_visit_points;
 
 /* Whether a point lies in the ball. */

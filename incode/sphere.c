@@ -1,8 +1,7 @@
 #include "sphere.h"
 
 #include <stddef.h>
-
-#include "double_double.h"
+#include <string.h>
 
 void incode_sphere_plane(struct incode_sphere *s, const double b[3],
                          const double c[3])
@@ -74,16 +73,13 @@ static double refined(double share, double value, double bound)
     return share * __builtin_fabs(value) + 1e-15 * bound;
 }
 
-void incode_sphere_refine(struct incode_sphere *s, const double v[3],
-                          const double b[3], const double c[3], const double *a,
-                          double scale)
+void incode_sphere_fine(struct incode_fine *f, const double v[3],
+                        const double b[3], const double c[3], const double *a,
+                        double scale)
 {
     struct vector rb = relative(b, v, scale), rc = relative(c, v, scale);
     struct vector n = cross(&rb, &rc);
-    for (int k = 0; k < 3; k++)
-        s->n[k] = n.d[k].hi;
-    for (int k = 0; k < 3; k++)
-        s->pn[k] = refined(0.23, s->n[k], 2 * s->lb * s->lc);
+    memcpy(f->n, n.d, sizeof f->n);
     if (a == NULL)
         return;
     struct vector ra = relative(a, v, scale);
@@ -92,10 +88,27 @@ void incode_sphere_refine(struct incode_sphere *s, const double v[3],
     for (int k = 0; k < 3; k++) {
         struct incode_dd m = incode_dd_plus(incode_dd_times(bb, ca.d[k]),
                                             incode_dd_times(cc, ab.d[k]));
-        m = incode_dd_plus(m, incode_dd_times(aa, n.d[k]));
-        s->m[k] = m.hi;
-        s->pm[k] = refined(0.23, m.hi, s->pm[k]);
+        f->m[k] = incode_dd_plus(m, incode_dd_times(aa, n.d[k]));
     }
-    s->det = dot(&ra, &n).hi;
+    f->det = dot(&ra, &n);
+}
+
+void incode_sphere_refine(struct incode_sphere *s, const double v[3],
+                          const double b[3], const double c[3], const double *a,
+                          double scale)
+{
+    struct incode_fine fine;
+    incode_sphere_fine(&fine, v, b, c, a, scale);
+    for (int k = 0; k < 3; k++) {
+        s->n[k] = fine.n[k].hi;
+        s->pn[k] = refined(0.23, s->n[k], 2 * s->lb * s->lc);
+    }
+    if (a == NULL)
+        return;
+    for (int k = 0; k < 3; k++) {
+        s->m[k] = fine.m[k].hi;
+        s->pm[k] = refined(0.23, s->m[k], s->pm[k]);
+    }
+    s->det = fine.det.hi;
     s->pdet = refined(0.28, s->det, s->pdet);
 }

@@ -17,6 +17,8 @@
 
 #include <stdbool.h>
 
+#include "double_double.h"
+
 struct incode_sphere {
     double n[3], pn[3]; /* plane; |error of n[d] x| <= EPS pn[d] |x| */
     double m[3], pm[3]; /* sphere; likewise */
@@ -101,6 +103,26 @@ static inline bool incode_sphere_is_blurred(const struct incode_sphere *s)
     return (s->pdet > 1024 * det || s->pm[0] > 1024 * m) &&
            det > INCODE_SPHERE_LEAST && m > INCODE_SPHERE_LEAST;
 }
+
+/* So ill-conditioned, or so much larger than its face, that it tells nothing of
+ * where points lie that are flat up to rounding. */
+static inline bool incode_sphere_is_vast(const struct incode_sphere *s)
+{
+    double size = s->lb > s->lc ? s->lb : s->lc;
+    return !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
+           !(s->det > INCODE_SPHERE_LEAST) ||
+           incode_max_norm(s->m) > 1e6 * size * s->det;
+}
+
+/* Plane and sphere in twice the precision, from absolute coordinates. */
+struct incode_fine {
+    struct incode_dd n[3], m[3], det;
+};
+
+/* a: NULL for the plane alone. */
+void incode_sphere_fine(struct incode_fine *f, const double v[3],
+                        const double b[3], const double c[3], const double *a,
+                        double scale);
 
 /* Computes them again from absolute coordinates in twice the precision, so that
  * only the evaluation's own rounding is left in the bounds.  a: NULL for the

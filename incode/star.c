@@ -367,6 +367,8 @@ static enum incode_outcome use_found(struct incode_triangulator *t,
             return r != INCODE_OK ? r : INCODE_AGAIN;
     }
     task->kind = INCODE_TASK_GATHER;
+    if (q->question == INCODE_QUERY_SUPPORT)
+        return INCODE_OK; /* the face is tried again with it */
     bool open = remove_face(star, q->b, q->c);
     if (!open && star->more) {
         /* It may be among those that did not fit at hand. */

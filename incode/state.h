@@ -21,6 +21,7 @@ enum {
     INCODE_SPILL_FACES = 1024,
     INCODE_SPILL_BUILT = 128, /* tetrahedra a step while faces are spilled */
     INCODE_HULL_PLANES = 8,
+    INCODE_SUPPORTS = 8,
     INCODE_HUBS = 32,
     INCODE_PATIENCE = 8 /* retries before a task runs alone */
 };
@@ -30,6 +31,7 @@ struct incode_search {
     struct incode_query query;
     double radius;
     bool final;
+    bool flat;       /* the face is of the hull's side up to rounding */
     uint64_t looked; /* candidates so far */
 };
 
@@ -125,6 +127,8 @@ struct incode_triangulator {
     struct incode_task tasks[INCODE_TASKS];
     struct incode_hull_plane planes[INCODE_HULL_PLANES];
     uint32_t plane_count, plane_next;
+    struct incode_support supports[INCODE_SUPPORTS];
+    uint32_t support_count, support_next;
     struct incode_star star;
     struct incode_vicinity vicinity;
     struct incode_gather gather;

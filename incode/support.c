@@ -1,0 +1,159 @@
+#include "support.h"
+
+#include <stddef.h>
+
+/* The bounds below hold in double precision with this much to spare. */
+#define SPARE 1e-9
+/* Twice the precision, relative to its terms. */
+#define FINE 1e-29
+
+struct vector {
+    struct incode_dd d[3];
+};
+
+static struct vector relative(const double p[3], const double v[3],
+                              double scale)
+{
+    struct vector r;
+    for (int k = 0; k < 3; k++)
+        r.d[k] = incode_dd_difference(p[k], v[k], scale);
+    return r;
+}
+
+static struct incode_dd dot(const struct incode_dd a[3],
+                            const struct incode_dd b[3])
+{
+    return incode_dd_plus(incode_dd_plus(incode_dd_times(a[0], b[0]),
+                                         incode_dd_times(a[1], b[1])),
+                          incode_dd_times(a[2], b[2]));
+}
+
+static double length_of(const double a[3])
+{
+    return __builtin_sqrt(incode_dot(a, a));
+}
+
+struct incode_dd incode_support_height(const struct incode_support *s,
+                                       const double x[3])
+{
+    struct vector r = relative(x, s->p, s->scale), n;
+    for (int k = 0; k < 3; k++)
+        n.d[k] = (struct incode_dd){s->n[k], 0};
+    return dot(n.d, r.d);
+}
+
+enum { SLOPES = 1000000 }; /* one in so many is a direction of its own */
+
+/* Sine of the angle between two directions; more than 1 if it is not acute. */
+static double sine(const double a[3], const double b[3])
+{
+    double c[3], lengths = length_of(a) * length_of(b);
+    incode_cross(c, a, b);
+    return incode_dot(a, b) > 0 && lengths > 0 ? length_of(c) / lengths : 2;
+}
+
+bool incode_support_faces(const struct incode_support *support,
+                          const double n[3])
+{
+    return sine(support->n, n) * SLOPES < 1;
+}
+
+/* |a x b| of a in twice the precision and b exact. */
+static double cross_length(const struct incode_dd a[3], const double b[3])
+{
+    double c[3];
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        struct incode_dd bi = {b[i], 0}, bj = {b[j], 0};
+        c[k] = incode_dd_cross(a[i], bj, a[j], bi).hi;
+    }
+    return length_of(c);
+}
+
+/* Of a vast sphere through v with its centre outside the support, radius R:
+ * what lies inside at distance r from v is at least r^2 / 2R towards the
+ * centre, and at most depth + slope r. */
+static double reach_under(const struct incode_support *support,
+                          const struct incode_fine *sphere, const double pv[3],
+                          double scale)
+{
+    double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
+    if (!incode_support_faces(support, m))
+        return __builtin_inf();
+    double across = length_of(m), length = length_of(support->n), far = 0;
+    double slope = cross_length(sphere->m, support->n) / (across * length);
+    double radius = across * 0.5 / sphere->det.hi * (1 + SPARE);
+    double ratio = scale / support->scale;
+    struct incode_dd height = incode_support_height(support, pv);
+    struct incode_dd top = {support->most[0], support->most[1]};
+    for (int k = 0; k < 3; k++)
+        far += __builtin_fabs((pv[k] - support->p[k]) * support->scale);
+    double depth =
+        incode_dd_minus(top, height).hi * ratio / length * (1 + SPARE) +
+        FINE * far * ratio;
+    depth = depth > 0 ? depth : 0;
+    double a = radius * (slope * (1 + SPARE) + FINE * 1e9);
+    return (a + __builtin_sqrt(a * a + 2 * radius * depth)) * (1 + SPARE);
+}
+
+static double reach_of(struct incode_flat *flat, const double *const p[4],
+                       double scale)
+{
+    double r[3], reach = __builtin_inf();
+    for (int k = 0; k < 3; k++)
+        r[k] = (p[3][k] - p[0][k]) * scale;
+    double far = length_of(r);
+    flat->spread = 0;
+    /* What comes before a place of zero or less in the pencil lies in the ball
+     * over the face's circle. */
+    if (flat->regular) {
+        double circle = length_of(flat->c0) * (1 + 1e-8);
+        double above = far * far - 2 * incode_dot(flat->c0, r) +
+                       1e-8 * far * (far + 2 * circle);
+        if (above <= 0)
+            return 2 * circle;
+    }
+    struct incode_fine *sphere = &flat->sphere;
+    incode_sphere_fine(sphere, p[0], p[1], p[2], p[3], scale);
+    double lengths = 1, longest = 1;
+    for (int i = 1; i < 4; i++) {
+        for (int k = 0; k < 3; k++)
+            r[k] = (p[i][k] - p[0][k]) * scale;
+        double length = length_of(r);
+        lengths *= length;
+        longest = length > longest ? length : longest;
+    }
+    flat->spread = FINE * 1e2 * lengths * longest;
+    /* What is left of det and m after cancellation must be right to SPARE. */
+    double far_off = FINE * 1e9 * lengths;
+    double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
+    if (!(sphere->det.hi > far_off) ||
+        !(sphere->det.hi > INCODE_SPHERE_LEAST) ||
+        !(incode_max_norm(m) > far_off * far))
+        return reach;
+    for (uint32_t i = 0; i < flat->count; i++) {
+        double here = reach_under(&flat->supports[i], sphere, p[0], scale);
+        reach = here < reach ? here : reach;
+    }
+    return reach;
+}
+
+void incode_flat_lessen(struct incode_flat *flat, const double *const p[4],
+                        double scale)
+{
+    double reach = reach_of(flat, p, scale);
+    flat->reach = reach < flat->reach ? reach : flat->reach;
+}
+
+bool incode_flat_outside(const struct incode_flat *flat, const double pv[3],
+                         const double p[3], double scale)
+{
+    if (flat->spread == 0)
+        return false;
+    struct vector r = relative(p, pv, scale);
+    struct incode_dd square = dot(r.d, r.d);
+    struct incode_dd value = incode_dd_minus(
+        dot(flat->sphere.m, r.d), incode_dd_times(flat->sphere.det, square));
+    double far = __builtin_sqrt(square.hi);
+    return value.hi < -flat->spread * (far + square.hi) - INCODE_SPHERE_TINY;
+}
