@@ -464,8 +464,8 @@ static bool reach_fits(struct incode_make *n)
     return fits;
 }
 
-static enum incode_near contest_flat(struct incode_make *n,
-                                     struct incode_search *s)
+/* Whether the points at hand decide on an apex. */
+static bool contest_flat(struct incode_make *n)
 {
     const struct incode_triangulator *t = n->t;
     const struct incode_gather *g = &t->gather;
@@ -480,13 +480,7 @@ static enum incode_near contest_flat(struct incode_make *n,
     if (n->best == INCODE_GATHER_NONE && n->regular)
         for (uint32_t i = 0; i < g->near; i++)
             consider(n, g->at[i]);
-    if (reach_fits(n))
-        return INCODE_NEAR_FOUND;
-    if (n->regular && !has_support(n))
-        incode_query_support(&s->query, n->pv, n->sphere.n, g->scale);
-    else
-        incode_search_from(n, s);
-    return INCODE_NEAR_SEARCH;
+    return reach_fits(n);
 }
 
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
@@ -515,11 +509,13 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     set_pencil(&n, &n.sphere);
     n.flat.known = false;
     enum incode_near r = contest_all(&n);
-    bool doubtful = r == INCODE_NEAR_SEARCH && is_doubtful(&n);
-    if (doubtful) {
-        r = contest_flat(&n, s);
-        if (r == INCODE_NEAR_SEARCH)
-            return r;
+    if (r == INCODE_NEAR_SEARCH && is_doubtful(&n)) {
+        if (contest_flat(&n)) {
+            r = INCODE_NEAR_FOUND;
+        } else if (n.regular && !has_support(&n)) {
+            incode_query_support(&s->query, n.pv, n.sphere.n, g->scale);
+            return INCODE_NEAR_SEARCH;
+        }
     }
     *apex = n.best;
     if (r != INCODE_NEAR_SEARCH) {

@@ -52,11 +52,15 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
         if (r == INCODE_WALK_DONE)
             incode_search_last(s);
     }
-    /* An ill-conditioned sphere has no ball: the list is of no use. */
-    if (r != INCODE_WALK_DONE || !q->round ||
+    /* An ill-conditioned sphere has no ball, but may have a box. */
+    bool whole =
+        q->boxed && !q->round && incode_vicinity_holds(list, q->lo, q->hi);
+    if (r != INCODE_WALK_DONE || (!q->round && !whole) ||
         incode_vicinity_visit(list, &t->walker, q, incode_visit_points, NULL) !=
             INCODE_WALK_DONE)
         return false;
+    if (whole)
+        return true;
     set_walls(wall, list, q->pv, q->scale);
     if (incode_sphere_fits(wall, &q->sphere))
         return true;
@@ -159,7 +163,7 @@ bool incode_apex_around(struct incode_make *n, struct incode_search *s)
     struct incode_triangulator *t = n->t;
     uint64_t before = t->stats.candidates;
     bool found = false;
-    if (t->vicinity.count > 0 && n->regular)
+    if (t->vicinity.count > 0 && n->regular && !n->flat.known)
         found = search_pencil(n, s);
     if (!found) {
         incode_search_from(n, s);

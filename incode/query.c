@@ -104,6 +104,7 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
 {
     double half = 0.5 / q->sphere.det;
     q->best = id;
+    q->flat.spread = 0;
     memcpy(q->best_p, p, sizeof q->best_p);
     for (int d = 0; d < 3; d++)
         q->centre[d] = q->sphere.m[d] * half;
@@ -111,11 +112,28 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
         bound_sphere(q);
 }
 
+enum { CONTESTS = 8 }; /* by the predicates, before twice the precision */
+
+/* Whether a point is certainly outside the best's sphere, looked at more
+ * closely where many points are in doubt. */
+static bool is_outside(struct incode_query *q, const double p[3])
+{
+    if (q->contests < CONTESTS) {
+        q->contests++;
+        if (!q->flat.known || q->round)
+            return false;
+    }
+    if (q->flat.spread == 0) {
+        const double *const f[4] = {q->pv, q->pb, q->pc, q->best_p};
+        incode_flat_sphere(&q->flat, f, q->scale);
+    }
+    return incode_flat_outside(&q->flat, q->pv, p, q->scale);
+}
+
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
                            uint32_t id, const double p[3])
 {
-    if (q->flat.known && q->best != INCODE_NONE && !q->round &&
-        incode_flat_outside(&q->flat, q->pv, p, q->scale))
+    if (q->best != INCODE_NONE && is_outside(q, p))
         return;
     if (incode_orient3d(tally, q->pv, q->pb, q->pc, p) <= 0)
         return;

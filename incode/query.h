@@ -52,8 +52,9 @@ struct incode_query {
     double square;                 /* of its radius, widened */
     double plane_slack;            /* of n . p within the ball */
     double t; /* where in a pencil the ball is, of the first candidate so far */
-    double limit;  /* NEAREST, CIRCLE: squared, relative */
-    uint32_t best; /* vertex number, or INCODE_NONE */
+    double limit;      /* NEAREST, CIRCLE: squared, relative */
+    uint32_t contests; /* APEX: points in doubt so far */
+    uint32_t best;     /* vertex number, or INCODE_NONE */
     double best_p[3];
     uint32_t pages, pages_max; /* needed so far; a walk stops at more than that,
                                   unless it is 0 */

@@ -96,6 +96,22 @@ static double reach_under(const struct incode_support *support,
     return (a + __builtin_sqrt(a * a + 2 * radius * depth)) * (1 + SPARE);
 }
 
+void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
+                        double scale)
+{
+    double lengths = 1, longest = 1, r[3];
+    incode_sphere_fine(&flat->sphere, p[0], p[1], p[2], p[3], scale);
+    for (int i = 1; i < 4; i++) {
+        for (int k = 0; k < 3; k++)
+            r[k] = (p[i][k] - p[0][k]) * scale;
+        double length = length_of(r);
+        lengths *= length;
+        longest = length > longest ? length : longest;
+    }
+    flat->lengths = lengths;
+    flat->spread = FINE * 1e2 * lengths * longest;
+}
+
 static double reach_of(struct incode_flat *flat, const double *const p[4],
                        double scale)
 {
@@ -113,19 +129,10 @@ static double reach_of(struct incode_flat *flat, const double *const p[4],
         if (above <= 0)
             return 2 * circle;
     }
-    struct incode_fine *sphere = &flat->sphere;
-    incode_sphere_fine(sphere, p[0], p[1], p[2], p[3], scale);
-    double lengths = 1, longest = 1;
-    for (int i = 1; i < 4; i++) {
-        for (int k = 0; k < 3; k++)
-            r[k] = (p[i][k] - p[0][k]) * scale;
-        double length = length_of(r);
-        lengths *= length;
-        longest = length > longest ? length : longest;
-    }
-    flat->spread = FINE * 1e2 * lengths * longest;
+    const struct incode_fine *sphere = &flat->sphere;
+    incode_flat_sphere(flat, p, scale);
     /* What is left of det and m after cancellation must be right to SPARE. */
-    double far_off = FINE * 1e9 * lengths;
+    double far_off = FINE * 1e9 * flat->lengths;
     double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
     if (!(sphere->det.hi > far_off) ||
         !(sphere->det.hi > INCODE_SPHERE_LEAST) ||

@@ -30,8 +30,9 @@ struct incode_flat {
     double c0[3]; /* centre of its circle, relative to v and scaled, right to
                      1e-9 */
     double reach; /* the least so far; infinite at first */
-    struct incode_fine sphere; /* through the last point asked, with its */
-    double spread;             /* error over that of |r| + |r|^2; 0: unset */
+    struct incode_fine sphere; /* through the last point asked */
+    double spread;  /* its error over that of |r| + |r|^2; 0: it is not set */
+    double lengths; /* product of those of its three edges at v */
     const struct incode_support *supports;
     uint32_t count;
 };
@@ -45,6 +46,10 @@ bool incode_support_faces(const struct incode_support *support,
  * p[2]).  Nothing changes where neither the face's circle nor a support tells,
  * and what holds for one point holds for all that come before it. */
 void incode_flat_lessen(struct incode_flat *flat, const double *const p[4],
+                        double scale);
+
+/* Sets the sphere alone. */
+void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
                         double scale);
 
 /* Whether a point is certainly outside the sphere of the last one asked: the
