@@ -426,14 +426,25 @@ static bool is_doubtful(const struct incode_make *n)
     return count == FLAT_POINTS;
 }
 
-/* Whether a support of the face's direction is known. */
-static bool has_support(const struct incode_make *n)
+/* What is known of a regular face's direction: no support; one far above, as
+ * within the set; or one that the face lies in.  A thin face has no direction,
+ * and is taken for one of the hull's side. */
+enum lie { UNSUPPORTED, DEEP, FLAT };
+
+static enum lie lie_of(const struct incode_make *n)
 {
     const struct incode_triangulator *t = n->t;
-    for (uint32_t i = 0; i < t->support_count; i++)
-        if (incode_support_faces(&t->supports[i], n->sphere.n))
-            return true;
-    return false;
+    const struct incode_sphere *sphere = &n->sphere;
+    enum lie lie = n->regular ? UNSUPPORTED : FLAT;
+    for (uint32_t i = 0; i < t->support_count && lie != FLAT; i++) {
+        const struct incode_support *s = &t->supports[i];
+        if (!incode_support_faces(s, sphere->n))
+            continue;
+        double most = s->most[0] - incode_support_height(s, n->pv).hi;
+        double size = incode_max_norm(s->n) * s->scale / t->gather.scale;
+        lie = most < 1e-6 * size * (sphere->lb + sphere->lc) ? FLAT : DEEP;
+    }
+    return lie;
 }
 
 /* Lets some points at hand say how far the apex may be: where one's sphere is
@@ -509,21 +520,22 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     set_pencil(&n, &n.sphere);
     n.flat.known = false;
     enum incode_near r = contest_all(&n);
-    if (r == INCODE_NEAR_SEARCH && is_doubtful(&n)) {
-        if (contest_flat(&n)) {
-            r = INCODE_NEAR_FOUND;
-        } else if (n.regular && !has_support(&n)) {
-            incode_query_support(&s->query, n.pv, n.sphere.n, g->scale);
-            return INCODE_NEAR_SEARCH;
-        }
-    }
+    bool doubtful = r == INCODE_NEAR_SEARCH && is_doubtful(&n);
+    enum lie lie = doubtful ? lie_of(&n) : DEEP;
+    bool vast = doubtful && n.best != INCODE_GATHER_NONE;
+    if ((vast || lie == FLAT) && contest_flat(&n))
+        r = INCODE_NEAR_FOUND;
     *apex = n.best;
     if (r != INCODE_NEAR_SEARCH) {
         incode_count_candidates(t, g->near);
         return r;
     }
-    if (!incode_apex_around(&n, s))
+    bool lost = lie == UNSUPPORTED && vast && n.flat.reach > 1e300;
+    if (lost || !incode_apex_around(&n, s)) {
+        if (lie == UNSUPPORTED)
+            incode_query_support(&s->query, n.pv, n.sphere.n, g->scale);
         return INCODE_NEAR_SEARCH;
+    }
     *apex = incode_gather_find(g, s->query.best);
     if (*apex == INCODE_GATHER_NONE)
         *apex = incode_gather_append(g, s->query.best, s->query.best_p);
