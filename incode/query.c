@@ -62,6 +62,10 @@ static void bound_flat(struct incode_query *q)
     }
 }
 
+/* Face sizes: the ball of a larger sphere is too coarse where its surface runs
+ * along that of the set. */
+#define LARGE 16
+
 /* The box of the best's sphere, widened by 1e-6 of its size and by the rounding
  * of all that leads to it; none where the sphere is ill-conditioned. */
 static void bound_sphere(struct incode_query *q)
@@ -89,6 +93,7 @@ static void bound_sphere(struct incode_query *q)
             return;
     }
     q->square = radius * radius;
+    q->large = radius > LARGE * (s->lb + s->lc);
     q->plane_slack = INCODE_SPHERE_TINY +
                      INCODE_SPHERE_EPS * 6 * radius * incode_max_norm(s->pn);
     q->boxed = q->round = true;
@@ -281,11 +286,12 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
         }
         if (q->done)
             in &= not_done(q, boxes, i);
-        if (q->question == INCODE_QUERY_APEX && q->round)
-            in &= meets_ball(q, boxes, i);
-        else if (q->question == INCODE_QUERY_APEX)
-            in &= may_hold_apex(q, boxes, i);
-        else if (q->question == INCODE_QUERY_SUPPORT)
+        if (q->question == INCODE_QUERY_APEX) {
+            if (q->round)
+                in &= meets_ball(q, boxes, i);
+            if (!q->round || q->large)
+                in &= may_hold_apex(q, boxes, i);
+        } else if (q->question == INCODE_QUERY_SUPPORT)
             in &= may_rise(q, boxes, i);
         else if (q->question != INCODE_QUERY_BOX)
             in &= may_be_near(q, boxes, i);
@@ -633,6 +639,7 @@ static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
         square += pencil->c0[d] * pencil->c0[d];
     }
     q->t = t;
+    q->large = false; /* its sphere is not set */
     q->square = square * (1 + 4e-6);
     q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 *
                                               q->sphere.pn[0] *

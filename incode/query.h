@@ -37,6 +37,7 @@ struct incode_query {
     bool ahead;          /* BOX: asks for missing bricks and passes them over */
     bool shrinking;      /* APEX: the box is that of the best's sphere */
     bool round;          /* APEX: shrinking, and the ball below holds it */
+    bool large;          /* round, and the sphere itself tells more */
     bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
     bool done;           /* not what lies within [done_lo, done_hi] */
     double lo[3], hi[3]; /* absolute coordinates */

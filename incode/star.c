@@ -206,7 +206,7 @@ static enum incode_outcome gather_leaf(struct incode_triangulator *t,
         if (r == INCODE_GATHER_READY || tries == GATHER_TRIES)
             return INCODE_OK;
         radius *= 0.75;
-        t->spread *= 0.99;
+        t->spread *= 0.9;
     }
 }
 
@@ -276,8 +276,10 @@ static enum incode_outcome star_gather(struct incode_triangulator *t,
         return INCODE_WAIT;
     const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
                          f->page.brick.z[slot]};
+    bool again = g->vertex == v; /* after a wait: nothing new to learn */
     incode_gather_centre(g, v, p, g->radius, t->setup.lo, t->setup.hi);
-    learn_spread(t, g->near);
+    if (!again)
+        learn_spread(t, g->near);
     return INCODE_OK;
 }
 

@@ -28,6 +28,8 @@ static bool copy_boxes(struct incode_walker *walker, struct incode_query *q,
             v->lo[d][v->count] = (float)(lo > -1e30 ? lo : -1e30);
             v->hi[d][v->count] = (float)(hi < 1e30 ? hi : 1e30);
         }
+        if (first + i == v->centre)
+            v->self = v->count;
         v->brick[v->count++] = first + i;
     }
     return true;
@@ -53,7 +55,8 @@ enum incode_listed incode_vicinity_make(struct incode_vicinity *v,
     q.question = INCODE_QUERY_BOX;
     q.boxed = q.boxes_only = true;
     set_empty(v);
-    v->centre = INCODE_NONE;
+    v->centre = brick;
+    v->self = 0;
     for (int d = 0; d < 3; d++) {
         double half = hi[d] * 0.5 - lo[d] * 0.5;
         v->origin[d] = lo[d] * 0.5 + hi[d] * 0.5;
@@ -64,9 +67,10 @@ enum incode_listed incode_vicinity_make(struct incode_vicinity *v,
     v->scale = incode_scale_for(extent);
     enum incode_walk r = incode_walk(walker, &q, copy_boxes, v);
     *missing = q.missing;
-    if (r == INCODE_WALK_WAIT)
+    if (r == INCODE_WALK_WAIT) {
+        v->centre = INCODE_NONE;
         return INCODE_LIST_WAIT;
-    v->centre = brick;
+    }
     if (r == INCODE_WALK_STOP) {
         set_empty(v);
         return INCODE_LIST_FULL;
@@ -153,28 +157,18 @@ static void in_ball(const struct incode_vicinity *v,
     }
 }
 
-/* Visits the leaves of the chosen bricks. */
-static enum incode_walk visit_chosen(const struct incode_vicinity *v,
-                                     struct incode_walker *walker,
-                                     struct incode_query *q,
-                                     const struct chosen *chosen,
-                                     incode_visit *visit, void *context)
+/* The next chosen brick from i on, taken out; count where there is none. */
+static uint32_t take(struct chosen *chosen, uint32_t i, uint32_t count)
 {
-    for (uint32_t i = 0; i < v->count; i += 64) {
-        uint64_t left = chosen->word[i / 64];
-        if (v->count - i < 64)
-            left &= (UINT64_C(1) << (v->count - i)) - 1;
-        for (; left != 0; left &= left - 1) {
-            uint32_t brick = v->brick[i + (uint32_t)__builtin_ctzll(left)];
-            if (q->pages_max != 0 && q->pages++ == q->pages_max)
-                return INCODE_WALK_STOP;
-            enum incode_walk r =
-                incode_walk_brick(walker, q, brick, visit, context);
-            if (r != INCODE_WALK_DONE)
-                return r;
+    for (; i < count; i = (i / 64 + 1) * 64) {
+        uint64_t left = chosen->word[i / 64] >> (i % 64);
+        if (left != 0) {
+            i += (uint32_t)__builtin_ctzll(left);
+            chosen->word[i / 64] &= ~(UINT64_C(1) << (i % 64));
+            break;
         }
     }
-    return INCODE_WALK_DONE;
+    return i < count ? i : count;
 }
 
 enum incode_walk incode_vicinity_visit(const struct incode_vicinity *v,
@@ -183,9 +177,30 @@ enum incode_walk incode_vicinity_visit(const struct incode_vicinity *v,
                                        incode_visit *visit, void *context)
 {
     struct chosen chosen;
-    if (q->round)
+    double square = q->square;
+    bool round = q->round;
+    if (round)
         in_ball(v, q, &chosen);
     else
         in_box(v, q, &chosen);
-    return visit_chosen(v, walker, q, &chosen, visit, context);
+    /* From the centre on, for near bricks first, and around. */
+    uint32_t i = v->self;
+    for (int turns = 0; turns < 2; turns++, i = 0) {
+        while ((i = take(&chosen, i, v->count)) < v->count) {
+            if (q->pages_max != 0 && q->pages++ == q->pages_max)
+                return INCODE_WALK_STOP;
+            enum incode_walk r =
+                incode_walk_brick(walker, q, v->brick[i], visit, context);
+            if (r != INCODE_WALK_DONE)
+                return r;
+            if (round && q->round && q->square < square) {
+                struct chosen left;
+                square = q->square;
+                in_ball(v, q, &left);
+                for (uint32_t k = 0; k < v->count; k += 64)
+                    chosen.word[k / 64] &= left.word[k / 64];
+            }
+        }
+    }
+    return INCODE_WALK_DONE;
 }

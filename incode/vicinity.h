@@ -25,6 +25,7 @@ struct incode_vicinity {
     uint32_t brick[INCODE_VICINITY_BRICKS];
     uint32_t count;
     uint32_t centre; /* brick, or INCODE_NONE */
+    uint32_t self;   /* its index, where it is in the list */
     double origin[3], scale;
     double box_lo[3], box_hi[3]; /* what meets this box is in the list */
 };
