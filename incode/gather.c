@@ -263,7 +263,7 @@ void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
     choose_units(g, p, radius);
     set_box(g, radius, domain_lo, domain_hi);
     while (!select_near(g)) {
-        if (radius * g->per_unit < UNITS_LEAST / 4) {
+        if (radius * g->per_unit < UNITS_LEAST * 0.25) {
             give_up_near(g);
             break;
         }

@@ -63,6 +63,15 @@ struct incode_query {
     uint32_t missing;          /* the page a suspended walk waits for */
 };
 
+/* Coordinates relative to the query's vertex, scaled. */
+static inline void incode_query_relative(double out[3],
+                                         const struct incode_query *q,
+                                         const double p[3])
+{
+    for (int d = 0; d < 3; d++)
+        out[d] = (p[d] - q->pv[d]) * q->scale;
+}
+
 /* Candidates for the apex of a regular face, by their place in its pencil. */
 struct incode_hit {
     uint32_t id;

@@ -21,9 +21,9 @@ static size_t round_up(size_t bytes)
     return (bytes + 63) & ~(size_t)63;
 }
 
-/* The active face list takes three sixteenths of what the control block leaves (a
- * front of a million points' region), the bricks a sixteenth, page frames the
- * rest. */
+/* The active face list takes three sixteenths of what the control block leaves
+ * (a front of a million points' region), the bricks a sixteenth, page frames
+ * the rest. */
 static bool fill_map(struct incode_map *map, size_t bytes)
 {
     memset(map, 0, sizeof *map);

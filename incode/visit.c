@@ -1,0 +1,296 @@
+#include <string.h>
+
+#include "query.h"
+#include "simd.h"
+
+/* What a walk does with the points of the leaves that it comes to: each
+ * question's candidates, eight at a time. */
+
+struct lane_points {
+    incode_vd r[3]; /* relative coordinates of one leaf's points */
+};
+
+INCODE_INLINE void load_leaf(struct lane_points *p,
+                             const struct incode_query *q,
+                             const struct incode_frame *frame, unsigned slot)
+{
+    incode_vd scale = incode_vd_all(q->scale);
+    p->r[0] =
+        (incode_vd_load(frame->page.brick.x + slot) - incode_vd_all(q->pv[0])) *
+        scale;
+    p->r[1] =
+        (incode_vd_load(frame->page.brick.y + slot) - incode_vd_all(q->pv[1])) *
+        scale;
+    p->r[2] =
+        (incode_vd_load(frame->page.brick.z + slot) - incode_vd_all(q->pv[2])) *
+        scale;
+}
+
+/* Points of a leaf that are not certainly beaten, one bit each. */
+INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
+                                  const struct lane_points *p)
+{
+    const struct incode_sphere *s = &q->sphere;
+    incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
+    incode_vd value = zero, value_error = zero, square = zero;
+    for (int d = 0; d < 3; d++) {
+        incode_vd r = p->r[d], far = incode_vd_abs(r);
+        plane += incode_vd_all(s->n[d]) * r;
+        plane_error += incode_vd_all(s->pn[d]) * far;
+        square += r * r;
+        if (s->has_apex) {
+            value += incode_vd_all(s->m[d]) * r;
+            value_error += incode_vd_all(s->pm[d]) * far;
+        }
+    }
+    incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
+    incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
+    incode_vd margin = plane_error * eps + tiny;
+    incode_vl out = q->timid ? ~(plane > margin) : plane + margin < zero;
+    if (s->has_apex) {
+        value -= incode_vd_all(s->det) * square;
+        value_error += incode_vd_all(s->pdet) * square;
+        out |= value + (value_error * eps + tiny) < zero;
+    }
+    return ~incode_vd_mask(out) & 0xff;
+}
+
+/* Points of a leaf that lie in the ball and not certainly on the known side of
+ * the plane: a coarser test, and a cheaper one. */
+INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
+                                  const struct lane_points *p)
+{
+    incode_vd plane = incode_vd_all(q->plane_slack), square = incode_vd_all(0);
+    for (int d = 0; d < 3; d++) {
+        incode_vd gap = p->r[d] - incode_vd_all(q->centre[d]);
+        square += gap * gap;
+        plane += incode_vd_all(q->sphere.n[d]) * p->r[d];
+    }
+    return incode_vd_mask((square <= incode_vd_all(q->square)) &
+                          (plane >= incode_vd_all(0)));
+}
+
+uint32_t incode_query_lanes(const struct incode_query *q,
+                            const double *const axis[3])
+{
+    struct lane_points points;
+    for (int d = 0; d < 3; d++)
+        points.r[d] = (incode_vd_load(axis[d]) - incode_vd_all(q->pv[d])) *
+                      incode_vd_all(q->scale);
+    return apex_lanes(q, &points);
+}
+
+static void point_of(double p[3], const struct incode_frame *frame,
+                     unsigned slot)
+{
+    p[0] = frame->page.brick.x[slot];
+    p[1] = frame->page.brick.y[slot];
+    p[2] = frame->page.brick.z[slot];
+}
+
+static void consider_near(struct incode_query *q, uint32_t id,
+                          const double p[3])
+{
+    double r[3];
+    incode_query_relative(r, q, p);
+    double square = incode_dot(r, r);
+    if (square > q->limit ||
+        (q->best != INCODE_NONE &&
+         incode_compare_distance(q->pv, p, q->best_p) >= 0))
+        return;
+    q->best = id;
+    memcpy(q->best_p, p, sizeof q->best_p);
+    q->limit = square * (1 + 1e-9) + INCODE_SPHERE_TINY;
+}
+
+static void consider_circle(struct incode_query *q, uint32_t id,
+                            const double p[3])
+{
+    double r[3], n[3], e[3];
+    incode_query_relative(r, q, p);
+    incode_cross(n, q->rb, r);
+    for (int d = 0; d < 3; d++)
+        e[d] = r[d] - q->rb[d];
+    double area = 4 * incode_dot(n, n);
+    double product = incode_dot(q->rb, q->rb) * incode_dot(r, r);
+    double square = product * incode_dot(e, e) / area;
+    if (!(area > 0) || !(square < q->limit / 4)) {
+        if (q->best != INCODE_NONE || incode_collinear(q->pv, q->pb, p))
+            return;
+    } else {
+        q->limit = 4 * square * (1 + 1e-6);
+    }
+    q->best = id;
+    memcpy(q->best_p, p, sizeof q->best_p);
+}
+
+void incode_query_support(struct incode_query *q, const double pv[3],
+                          const double n[3], double scale)
+{
+    memset(q, 0, sizeof *q);
+    q->question = INCODE_QUERY_SUPPORT;
+    q->v = q->b = q->c = q->best = INCODE_NONE;
+    q->support.scale = scale;
+    memcpy(q->support.n, n, sizeof q->support.n);
+    memcpy(q->support.p, pv, sizeof q->support.p);
+}
+
+static void consider_height(struct incode_query *q, const double p[3])
+{
+    struct incode_support *s = &q->support;
+    struct incode_dd top = {s->most[0], s->most[1]};
+    double r[3], error = 0;
+    for (int d = 0; d < 3; d++) {
+        r[d] = (p[d] - s->p[d]) * s->scale;
+        error += __builtin_fabs(r[d] * s->n[d]);
+    }
+    if (incode_dot(r, s->n) + error * INCODE_SPHERE_EPS < q->limit)
+        return;
+    struct incode_dd height = incode_support_height(s, p);
+    if (incode_dd_minus(height, top).hi > 0) {
+        s->most[0] = height.hi;
+        s->most[1] = height.lo;
+        q->limit = height.hi;
+    }
+}
+
+static bool is_done(const struct incode_query *q, const double p[3])
+{
+    bool done = true;
+    for (int d = 0; d < 3; d++)
+        done = done && p[d] >= q->done_lo[d] && p[d] <= q->done_hi[d];
+    return done;
+}
+
+static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
+                       const struct incode_frame *frame, uint32_t brick,
+                       unsigned leaf)
+{
+    unsigned first = leaf * INCODE_LEAF_POINTS;
+    unsigned count = frame->count - first;
+    uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
+    *walker->candidates += (unsigned)__builtin_popcount(lanes);
+    if (q->question == INCODE_QUERY_APEX) {
+        struct lane_points points;
+        load_leaf(&points, q, frame, first);
+        if (q->round)
+            lanes &= ball_lanes(q, &points);
+        if (lanes != 0)
+            lanes &= apex_lanes(q, &points);
+    }
+    for (; lanes != 0; lanes &= lanes - 1) {
+        unsigned slot = first + (unsigned)__builtin_ctz(lanes);
+        uint32_t id = brick * INCODE_BRICK_POINTS + slot;
+        if (id == q->v || id == q->b || id == q->c || id == q->best)
+            continue;
+        double p[3];
+        point_of(p, frame, slot);
+        if (q->done && is_done(q, p))
+            continue;
+        if (q->question == INCODE_QUERY_APEX)
+            incode_query_consider(q, walker->tally, id, p);
+        else if (q->question == INCODE_QUERY_SUPPORT)
+            consider_height(q, p);
+        else if (q->question == INCODE_QUERY_NEAREST)
+            consider_near(q, id, p);
+        else
+            consider_circle(q, id, p);
+    }
+}
+
+bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
+                         const struct incode_frame *frame, uint32_t brick,
+                         uint32_t leaves, void *context)
+{
+    (void)context;
+    for (; leaves != 0; leaves &= leaves - 1)
+        visit_leaf(walker, q, frame, brick, (unsigned)__builtin_ctz(leaves));
+    return true;
+}
+
+/* ---- along a pencil ---- */
+
+/* The ball of the pencil's sphere at t, widened by 1e-6 of its size. */
+static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
+                    double t)
+{
+    double square = 0.25 * t * t;
+    for (int d = 0; d < 3; d++) {
+        q->centre[d] = pencil->c0[d] + 0.5 * t * pencil->n[d];
+        square += pencil->c0[d] * pencil->c0[d];
+    }
+    q->t = t;
+    q->large = false; /* its sphere is not set */
+    q->square = square * (1 + 4e-6);
+    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 *
+                                              q->sphere.pn[0] *
+                                              __builtin_sqrt(q->square);
+    q->round = true;
+}
+
+bool incode_query_holds(const struct incode_query *q, const double p[3])
+{
+    double r[3], square = 0;
+    incode_query_relative(r, q, p);
+    for (int d = 0; d < 3; d++)
+        square += (r[d] - q->centre[d]) * (r[d] - q->centre[d]);
+    return square <= q->square;
+}
+
+/* Drops what has fallen out of the ball. */
+static void thin_out(const struct incode_query *q, struct incode_hits *hits)
+{
+    double last = incode_pencil_later(hits->pencil, q->t);
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < hits->count; i++)
+        if (hits->hit[i].placed ? hits->hit[i].t <= last
+                                : incode_query_holds(q, hits->hit[i].p))
+            hits->hit[kept++] = hits->hit[i];
+    hits->count = kept;
+}
+
+void incode_hit_add(struct incode_query *q, struct incode_hits *hits,
+                    uint32_t id, const double p[3])
+{
+    const struct incode_pencil *pencil = hits->pencil;
+    if (hits->count == INCODE_HITS)
+        thin_out(q, hits);
+    if (hits->count == INCODE_HITS) {
+        hits->full = true;
+        return;
+    }
+    struct incode_hit *hit = &hits->hit[hits->count++];
+    double r[3];
+    incode_query_relative(r, q, p);
+    hit->id = id;
+    memcpy(hit->p, p, sizeof hit->p);
+    hit->placed = incode_pencil_place(pencil, r, &hit->t);
+    if (hit->placed && hit->t < q->t)
+        draw_in(q, pencil, hit->t);
+}
+
+bool incode_visit_pencil(struct incode_walker *walker, struct incode_query *q,
+                         const struct incode_frame *frame, uint32_t brick,
+                         uint32_t leaves, void *context)
+{
+    struct incode_hits *hits = context;
+    struct lane_points points;
+    for (; leaves != 0; leaves &= leaves - 1) {
+        unsigned first = (unsigned)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
+        unsigned count = frame->count - first;
+        uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
+        *walker->candidates += (unsigned)__builtin_popcount(lanes);
+        load_leaf(&points, q, frame, first);
+        lanes &= q->round ? ball_lanes(q, &points) : apex_lanes(q, &points);
+        for (; lanes != 0; lanes &= lanes - 1) {
+            unsigned slot = first + (unsigned)__builtin_ctz(lanes);
+            uint32_t id = brick * INCODE_BRICK_POINTS + slot;
+            double p[3];
+            point_of(p, frame, slot);
+            if (id != q->v && id != q->b && id != q->c && id != q->best &&
+                !(q->done && is_done(q, p)))
+                incode_hit_add(q, hits, id, p);
+        }
+    }
+    return true;
+}

@@ -1,0 +1,253 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <string.h>
+
+#include "../../incode/gather.h"
+#include "../../incode/predicates.h"
+#include "../../incode/support.h"
+
+/* The shortcuts of the search against the predicates: what they rule out must
+ * be ruled out exactly. */
+
+static uint64_t state;
+
+static double draw(void)
+{
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return (double)(state >> 11) * 0x1p-53;
+}
+
+static size_t below(size_t n)
+{
+    return (size_t)(draw() * (double)n);
+}
+
+/* A lattice of side x side points in a plane that no axis is parallel to: each
+ * coordinate is rounded, so the plane is rough in the last place. */
+static size_t lattice(double (*p)[3], size_t side, double size)
+{
+    static const double u[3] = {20, 20, -10}, v[3] = {-4, 22, 20};
+    size_t n = 0;
+    for (size_t i = 0; i < side; i++) {
+        for (size_t j = 0; j < side; j++, n++) {
+            for (int d = 0; d < 3; d++) {
+                p[n][d] = (u[d] * (double)i + v[d] * (double)j) / 30 * size;
+            }
+        }
+    }
+    return n;
+}
+
+/* A random face of four points near each other, the last beyond it. */
+static bool draw_face(const double *f[4], double (*p)[3], size_t n, size_t near,
+                      struct incode_tally *tally)
+{
+    size_t at = below(n - near);
+    for (int i = 0; i < 4; i++) {
+        f[i] = p[at + below(near)];
+    }
+    return f[0] != f[1] && f[0] != f[2] && f[1] != f[2] &&
+           incode_orient3d(tally, f[0], f[1], f[2], f[3]) > 0;
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+static struct incode_support support_of(const double *const f[4],
+                                        double (*p)[3], size_t n, double scale)
+{
+    struct incode_support s = {.scale = scale};
+    double b[3], c[3];
+    for (int d = 0; d < 3; d++) {
+        s.p[d] = f[0][d];
+        b[d] = (f[1][d] - f[0][d]) * scale;
+        c[d] = (f[2][d] - f[0][d]) * scale;
+    }
+    incode_cross(s.n, b, c);
+    for (size_t i = 0; i < n; i++) {
+        struct incode_dd top = {s.most[0], s.most[1]};
+        struct incode_dd height = incode_support_height(&s, p[i]);
+        if (incode_dd_minus(height, top).hi > 0) {
+            s.most[0] = height.hi;
+            s.most[1] = height.lo;
+        }
+    }
+    return s;
+}
+
+static void reach_on_a_rough_plane(void **unused)
+{
+    enum { SIDE = 24, POINTS = SIDE * SIDE };
+    static double p[POINTS][3];
+    struct incode_tally tally = {0};
+    size_t reaches = 0, outside = 0, short_ones = 0;
+    (void)unused;
+    for (int k = 0; k < 400; k++) {
+        double size = ldexp(1, (int)below(80) - 40), scale = 0.5 / size;
+        size_t n = lattice(p, SIDE, size);
+        const double *f[4];
+        if (!draw_face(f, p, n, 3 * SIDE, &tally)) {
+            continue;
+        }
+        struct incode_support support =
+            support_of((const double **)f, p, n, scale);
+        struct incode_flat flat = {
+            .known = true, .reach = INFINITY, .supports = &support, .count = 1};
+        incode_flat_lessen(&flat, f, scale);
+        reaches += flat.reach < INFINITY;
+        short_ones += flat.reach < 12;
+        for (size_t i = 0; i < n; i++) {
+            if (p[i] == f[0] || p[i] == f[1] || p[i] == f[2] || p[i] == f[3]) {
+                continue;
+            }
+            bool first =
+                incode_orient3d(&tally, f[0], f[1], f[2], p[i]) > 0 &&
+                incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p[i]) > 0;
+            if (first) {
+                assert_true(distance(f[0], p[i]) * scale <= flat.reach);
+            }
+            if (incode_flat_outside(&flat, f[0], p[i], scale)) {
+                outside++;
+                assert_true(
+                    incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p[i]) < 0);
+            }
+        }
+    }
+    /* It must tell something, too. */
+    assert_true(reaches > 50 && short_ones > 10 && outside > 10000);
+}
+
+/* The places of points in a pencil against the predicates. */
+static void places_in_a_pencil(void **unused)
+{
+    struct incode_tally tally = {0};
+    size_t compared = 0;
+    (void)unused;
+    for (int k = 0; k < 200000; k++) {
+        double p[5][3], b[3], c[3], r[2][3], t[2];
+        struct incode_pencil pencil = {{0}, {0}, 1};
+        for (int i = 0; i < 5; i++) {
+            for (int d = 0; d < 3; d++) {
+                p[i][d] = draw() * (k % 2 == 0 ? 1 : 1 + 1e-3 * (double)d);
+            }
+        }
+        for (int d = 0; d < 3; d++) {
+            b[d] = p[1][d] - p[0][d];
+            c[d] = p[2][d] - p[0][d];
+            r[0][d] = p[3][d] - p[0][d];
+            r[1][d] = p[4][d] - p[0][d];
+        }
+        double n[3], cn[3], nb[3];
+        incode_cross(n, b, c);
+        double nn = incode_dot(n, n);
+        double product = incode_max_norm(b) * incode_max_norm(c);
+        if (!(nn > 1e-4 * product * product)) {
+            continue;
+        }
+        incode_cross(cn, c, n);
+        incode_cross(nb, n, b);
+        for (int d = 0; d < 3; d++) {
+            pencil.n[d] = n[d] / sqrt(nn);
+            pencil.c0[d] =
+                (incode_dot(b, b) * cn[d] + incode_dot(c, c) * nb[d]) /
+                (2 * nn);
+        }
+        pencil.size = fmax(fmax(incode_max_norm(b), incode_max_norm(c)),
+                           incode_max_norm(pencil.c0));
+        if (!incode_pencil_place(&pencil, r[0], &t[0]) ||
+            !incode_pencil_place(&pencil, r[1], &t[1])) {
+            continue;
+        }
+        assert_int_equal(incode_orient3d(&tally, p[0], p[1], p[2], p[3]), 1);
+        if (incode_pencil_later(&pencil, t[0]) < t[1]) {
+            assert_true(incode_in_sphere(&tally, p[0], p[1], p[2], p[3], p[4]) <
+                        0);
+            compared++;
+        }
+    }
+    assert_true(compared > 10000);
+}
+
+/* The first of the gathered points, in float: none that is left out may come
+ * before the bound. */
+static void first_of_the_gathered(void **unused)
+{
+    static struct incode_gather g;
+    static const double lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1};
+    uint16_t out[INCODE_NEAR_ALL];
+    size_t found = 0;
+    (void)unused;
+    for (int k = 0; k < 2000; k++) {
+        double far = ldexp(1, (int)below(40));
+        incode_gather_reset(&g);
+        g.around = 300;
+        for (uint32_t i = 0; i < g.around; i++) {
+            g.id[i] = i;
+            for (int d = 0; d < 3; d++) {
+                g.p[d][i] = far + draw();
+            }
+        }
+        for (int d = 0; d < 3; d++) {
+            g.around_lo[d] = far;
+            g.around_hi[d] = far + 1;
+        }
+        g.per_unit = 0;
+        double p[3] = {g.p[0][7], g.p[1][7], g.p[2][7]};
+        incode_gather_centre(&g, 7, p, 0.35, lo, hi);
+        assert_true(g.near > 4 && g.self == 7);
+        struct incode_pencil pencil;
+        double b[3], c[3], n[3], cn[3], nb[3], t;
+        incode_gather_relative(&g, g.at[below(g.near)], b);
+        incode_gather_relative(&g, g.at[below(g.near)], c);
+        incode_cross(n, b, c);
+        double nn = incode_dot(n, n);
+        double product = incode_max_norm(b) * incode_max_norm(c);
+        if (!(nn > 1e-2 * product * product) || !(product > 0)) {
+            continue;
+        }
+        incode_cross(cn, c, n);
+        incode_cross(nb, n, b);
+        for (int d = 0; d < 3; d++) {
+            pencil.n[d] = n[d] / sqrt(nn);
+            pencil.c0[d] =
+                (incode_dot(b, b) * cn[d] + incode_dot(c, c) * nb[d]) /
+                (2 * nn);
+        }
+        pencil.size = fmax(incode_max_norm(b), incode_max_norm(c));
+        uint32_t count = incode_gather_first(&g, &pencil, &t, out);
+        found += count > 0;
+        for (uint32_t i = 0; i < g.near && count > 0; i++) {
+            double r[3], place;
+            bool listed = false;
+            for (uint32_t m = 0; m < count; m++) {
+                listed = listed || out[m] == g.at[i];
+            }
+            incode_gather_relative(&g, g.at[i], r);
+            if (!listed && incode_pencil_place(&pencil, r, &place)) {
+                assert_true(incode_pencil_later(&pencil, place) > t);
+            }
+        }
+    }
+    assert_true(found > 500);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(reach_on_a_rough_plane),
+        cmocka_unit_test(places_in_a_pencil),
+        cmocka_unit_test(first_of_the_gathered),
+    };
+    state = 88172645463325252u;
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
