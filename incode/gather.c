@@ -88,8 +88,8 @@ incode_gather_around(struct incode_gather *g, struct incode_walker *walker,
 /* The points around the leaf in whole units, up to about 2^30 of them to each
  * side of the origin; what lies beyond is moved to the border. */
 #define UNITS_HALF 0x1p29
-#define UNITS_MOST 0x1.8p30
-#define UNITS_LEAST 4096 /* a radius */
+#define UNITS_MOST 1610612736.0 /* 1.5 times 2^30 */
+#define UNITS_LEAST 4096        /* a radius */
 
 INCODE_INLINE incode_vd in_units(incode_vd p, double origin, double per_unit)
 {
