@@ -240,6 +240,22 @@ INCODE_INLINE incode_vf incode_vf_fma(incode_vf a, incode_vf b, incode_vf c)
 #endif
 }
 
+/* a b and, in *error, what its rounding lost: exact where nothing overflows or
+ * underflows (Dekker, Numerische Mathematik 18, 1971). */
+INCODE_INLINE incode_vd incode_vd_two_product(incode_vd a, incode_vd b,
+                                              incode_vd *error)
+{
+    incode_vd p = a * b;
+#ifdef __AVX512DQ__
+    *error = (incode_vd)_mm512_fmsub_pd((__m512d)a, (__m512d)b, (__m512d)p);
+#else
+    incode_vd split = incode_vd_all(0x1p27 + 1), c = split * a, d = split * b;
+    incode_vd ah = c - (c - a), bh = d - (d - b), al = a - ah, bl = b - bh;
+    *error = ((ah * bh - p) + ah * bl + al * bh) + al * bl;
+#endif
+    return p;
+}
+
 /* Lanes of eight whose bit is set, packed together; the rest is undefined. */
 INCODE_INLINE void incode_vd_pack(double *out, uint32_t mask, incode_vd a)
 {
