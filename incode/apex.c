@@ -519,6 +519,7 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
         incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, g->scale);
     set_pencil(&n, &n.sphere);
     n.flat.known = false;
+    n.flat.spread = 0;
     enum incode_near r = contest_all(&n);
     bool doubtful = r == INCODE_NEAR_SEARCH && is_doubtful(&n);
     enum lie lie = doubtful ? lie_of(&n) : DEEP;

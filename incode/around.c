@@ -31,6 +31,8 @@ static enum incode_walk find_first(struct incode_triangulator *t,
         if (!q->boxed || !incode_vicinity_holds(&t->vicinity, q->lo, q->hi))
             return INCODE_WALK_STOP;
         r = incode_vicinity_visit(&t->vicinity, &t->walker, q, visit, context);
+        if (r != INCODE_WALK_DONE)
+            break;
         q->done = true;
         memcpy(q->done_lo, q->lo, sizeof q->lo);
         memcpy(q->done_hi, q->hi, sizeof q->hi);

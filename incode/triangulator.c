@@ -21,7 +21,7 @@ static size_t round_up(size_t bytes)
     return (bytes + 63) & ~(size_t)63;
 }
 
-/* The active face list takes three sixteenths of what the control block leaves
+/* The active face list takes five sixteenths of what the control block leaves
  * (a front of a million points' region), the bricks a sixteenth, page frames
  * the rest. */
 static bool fill_map(struct incode_map *map, size_t bytes)
@@ -35,7 +35,7 @@ static bool fill_map(struct incode_map *map, size_t bytes)
     size_t rest = bytes - map->control;
     size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
     size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
-    map->afl_faces = rest * 3 / 16 / face;
+    map->afl_faces = rest * 5 / 16 / face;
     map->brick_entries = rest / 16 / brick;
     if (map->afl_faces < FACES_MIN)
         map->afl_faces = FACES_MIN;
