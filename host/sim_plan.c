@@ -134,8 +134,7 @@ static void draw_death(struct host_sim_plan *p)
         return;
     }
     bool node = one_in(&state, 2);
-    p->wanted[HOST_SIM_DEAD_WIRE] =
-        !node || (p->nodes >= 8 && one_in(&state, 4));
+    p->wanted[HOST_SIM_DEAD_WIRE] = !node || one_in(&state, 4);
     p->wanted[HOST_SIM_DEAD_NODE] = node;
     p->patience_us = draw(&state, 9000000, 15000000);
     for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_CRASH; k++) {

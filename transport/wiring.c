@@ -246,10 +246,11 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
 
 /* --- a new generation ---------------------------------------------------- */
 
+/* The gate lives while its host's wire does. */
 static bool all_links_dead(const struct cube_wiring *wiring, unsigned node,
                            unsigned dimension)
 {
-    bool all = dimension > 0;
+    bool all = dimension > 0 && node != wiring->gate;
     for (unsigned d = 0; d < dimension; d++) {
         all &= wiring_is_dead(wiring, wiring->dead_count, node, d, dimension);
     }
