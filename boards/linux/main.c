@@ -109,6 +109,9 @@ static bool wires_fit(const struct straps *straps)
                      (straps->node == 0 || straps->host_wire != 0 ? 1 : 0);
     if (straps->node == UNNAMED) {
         links = straps->links_count + straps->wires_count;
+        if (links == 0) {
+            return false; /* nobody could say who it is */
+        }
     }
     if (straps->wires_count == 0) {
         return straps->links_count == links;
