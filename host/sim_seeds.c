@@ -65,12 +65,17 @@ struct totals {
 static void print_struck(const uint64_t *struck)
 {
     const char *comma = " ";
+    bool any = false;
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
         if (struck[k] > 0) {
             printf("%s%s %llu", comma, host_sim_fault_names[k],
                    (unsigned long long)struck[k]);
             comma = ", ";
+            any = true;
         }
+    }
+    if (!any) {
+        printf(" no fault");
     }
 }
 
