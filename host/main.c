@@ -111,14 +111,17 @@ static int command_gen(int argc, char **argv, struct host_error *error)
     static const struct argp_option options[] = {
         {"seed", 's', "S", 0, "Another seed makes other points. Default: 1", 0},
         {"output", 'o', "FILE", 0,
-         "Write to FILE, by its extension; - is .xyz on standard output", 0},
+         "Write to FILE, by its extension; -, the default, is .xyz on standard "
+         "output",
+         0},
         {0}};
     struct host_points points = {0};
     struct simple s = {.seed = 1, .output = "-"};
     uint64_t n;
     parse(argc, argv, options, "KIND N",
           "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
-          "grid, or hub (one point amid N-1 on a sphere).",
+          "grid, rotated (a grid turned out of its axes), or hub (one point "
+          "amid N-1 on a sphere).",
           2, &s);
     if (host_parse_number(s.argument[1], 4, UINT32_MAX - 1, &n) != 0) {
         return host_fail(error, HOST_USAGE,
@@ -296,11 +299,13 @@ int main(int argc, char **argv)
         "Commands:\n"
         "  run POINTS -o OUT    triangulate on a cube of nodes\n"
         "  gen KIND N -o FILE   make points: uniform, bubbles, bluntfin, "
-        "sphere, grid, hub\n"
+        "sphere, grid,\n"
+        "                       rotated, hub\n"
         "  verify POINTS TETS   check a triangulation exactly\n"
         "  digest TETS          print what tells triangulations apart\n"
         "  convert IN OUT       from one file format to another\n"
-        "  cube FILE            check a cube file, print its nodes' straps\n"
+        "  cube FILE            check a cube file, print what starts its "
+        "nodes\n"
         "  bench paper|links    the paper's tables on this machine; its links\n"
         "  sim --seeds A..B     whole cubes in virtual time, with faults\n\n"
         "incode COMMAND --help says more of each.",
