@@ -540,8 +540,10 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
     *apex = incode_gather_find(g, s->query.best);
     if (*apex == INCODE_GATHER_NONE)
         *apex = incode_gather_append(g, s->query.best, s->query.best_p);
-    if (*apex == INCODE_GATHER_NONE)
-        return INCODE_NEAR_SEARCH; /* the search will find it again */
+    if (*apex == INCODE_GATHER_NONE) { /* no room: found again by itself */
+        incode_search_from(&n, s);
+        return INCODE_NEAR_SEARCH;
+    }
     incode_count_candidates(t, s->looked);
     return INCODE_NEAR_FOUND;
 }

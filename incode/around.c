@@ -1,3 +1,4 @@
+#include <float.h>
 #include <string.h>
 
 #include "apex.h"
@@ -7,13 +8,21 @@
  * keeps all that lie in the ball of the first so far, and the predicates
  * compare only what is still in the last ball. */
 
+/* wall - p, infinite only where the wall is. */
+static double gap(double wall, double p)
+{
+    double difference = wall - p;
+    return wall < __builtin_inf() && difference > DBL_MAX ? DBL_MAX
+                                                          : difference;
+}
+
 /* The box of the list as walls around the vertex. */
 static void set_walls(double wall[8], const struct incode_vicinity *list,
                       const double pv[3], double scale)
 {
     for (int d = 0; d < 3; d++) {
-        wall[d] = (list->box_hi[d] - pv[d]) * scale;
-        wall[4 + d] = (pv[d] - list->box_lo[d]) * scale;
+        wall[d] = gap(list->box_hi[d], pv[d]) * scale;
+        wall[4 + d] = gap(-list->box_lo[d], -pv[d]) * scale;
     }
     wall[3] = wall[7] = __builtin_inf();
 }

@@ -1,5 +1,6 @@
 #include "gather.h"
 
+#include <float.h>
 #include <string.h>
 
 #include "check.h"
@@ -161,9 +162,12 @@ static void set_near(struct incode_gather *g, uint32_t n)
     incode_vf all = incode_vf_all(FLOAT_SHARE);
     for (uint32_t i = 0; i < n + INCODE_VF_LANES; i += INCODE_VF_LANES) {
         incode_vi in = lane < incode_vi_all((int32_t)(n - i));
-        incode_vf x = incode_vf_from(incode_vi_load(g->x + i) - origin[0]),
-                  y = incode_vf_from(incode_vi_load(g->y + i) - origin[1]),
-                  z = incode_vf_from(incode_vi_load(g->z + i) - origin[2]);
+        incode_vf x = incode_vf_from(
+                      incode_vi_minus(incode_vi_load(g->x + i), origin[0])),
+                  y = incode_vf_from(
+                      incode_vi_minus(incode_vi_load(g->y + i), origin[1])),
+                  z = incode_vf_from(
+                      incode_vi_minus(incode_vi_load(g->z + i), origin[2]));
         x = incode_vf_select(in, x * factor, zero);
         y = incode_vf_select(in, y * factor, zero);
         z = incode_vf_select(in, z * factor, zero);
@@ -183,14 +187,17 @@ static void set_near(struct incode_gather *g, uint32_t n)
 static bool select_near(struct incode_gather *g)
 {
     incode_vi lo[3], span[3];
+    bool whole = true;
     incode_vi at = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     for (int d = 0; d < 3; d++) {
         int32_t a = unit_of(g, d, g->lo[d]), b = unit_of(g, d, g->hi[d]);
         lo[d] = incode_vi_all(a);
-        span[d] = incode_vi_all(b - a);
+        span[d] =
+            incode_vi_all(b >= a ? (int32_t)((uint32_t)b - (uint32_t)a) : 0);
+        whole = whole && b >= a;
     }
     uint32_t n = 0;
-    for (uint32_t i = 0; i < g->around; i += INCODE_VF_LANES) {
+    for (uint32_t i = 0; i < g->around && whole; i += INCODE_VF_LANES) {
         incode_vi x = incode_vi_load(g->unit[0] + i),
                   y = incode_vi_load(g->unit[1] + i),
                   z = incode_vi_load(g->unit[2] + i);
@@ -218,7 +225,10 @@ static double side(const struct incode_gather *g, int d, double wall,
                    double end, double sign)
 {
     bool beyond = sign > 0 ? wall >= end : wall <= end;
-    return beyond ? sign * __builtin_inf() : (wall - g->p0[d]) * g->scale;
+    double gap = wall - g->p0[d]; /* not infinite by overflow */
+    gap = gap < DBL_MAX ? gap : DBL_MAX;
+    gap = gap > -DBL_MAX ? gap : -DBL_MAX;
+    return beyond ? sign * __builtin_inf() : gap * g->scale;
 }
 
 static void set_box(struct incode_gather *g, double radius,

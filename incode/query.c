@@ -229,7 +229,10 @@ INCODE_INLINE incode_vl meets_ball(const struct incode_query *q,
         incode_vd gap = incode_vd_max(incode_vd_max(lo - c, c - hi), zero);
         square += gap * gap;
     }
-    return (plane >= zero) & (square <= incode_vd_all(q->square));
+    /* A difference that overflows tells nothing. */
+    incode_vl far = (square > incode_vd_all(q->square)) &
+                    (square < incode_vd_all(__builtin_inf()));
+    return ~((plane < zero) | far);
 }
 
 INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,

@@ -135,6 +135,12 @@ INCODE_INLINE incode_vm incode_vi_within(incode_vi a, incode_vi lo,
 #endif
 }
 
+/* a - b modulo 2^32. */
+INCODE_INLINE incode_vi incode_vi_minus(incode_vi a, incode_vi b)
+{
+    return (incode_vi)((incode_vu)a - (incode_vu)b);
+}
+
 /* Whole numbers as floats. */
 INCODE_INLINE incode_vf incode_vf_from(incode_vi a)
 {

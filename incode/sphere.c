@@ -3,6 +3,9 @@
 #include <stddef.h>
 #include <string.h>
 
+/* What underflows in a determinant is lost to all points, however far. */
+#define LOST 1e-290
+
 void incode_sphere_plane(struct incode_sphere *s, const double b[3],
                          const double c[3])
 {
@@ -11,7 +14,7 @@ void incode_sphere_plane(struct incode_sphere *s, const double b[3],
     s->lc = incode_max_norm(c);
     s->bb = incode_dot(b, b);
     s->cc = incode_dot(c, c);
-    s->pn[0] = s->pn[1] = s->pn[2] = 2 * s->lb * s->lc;
+    s->pn[0] = s->pn[1] = s->pn[2] = 2 * s->lb * s->lc + LOST;
     s->has_apex = false;
 }
 
@@ -28,8 +31,9 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
     /* Each of the two products of a cross product is at most that of the
      * maximum norms; the determinant has three such pairs. */
     s->pm[0] = s->pm[1] = s->pm[2] =
-        2 * (s->bb * s->lc * la + s->cc * la * s->lb + aa * s->lb * s->lc);
-    s->pdet = 6 * la * s->lb * s->lc;
+        2 * (s->bb * s->lc * la + s->cc * la * s->lb + aa * s->lb * s->lc) +
+        LOST * (1 + s->bb + s->cc + aa);
+    s->pdet = 6 * la * s->lb * s->lc + LOST * (1 + la);
     s->has_apex = true;
 }
 
@@ -65,12 +69,12 @@ static struct incode_dd dot(const struct vector *a, const struct vector *b)
                           incode_dd_times(a->d[2], b->d[2]));
 }
 
-/* What is left: a share of EPS for the roundings of the evaluation, at most 7
- * units on a term with m or n, 8 on that with det; and 2^-100 of the old
- * bounds. */
-static double refined(double share, double value, double bound)
+/* What is left: the roundings of the evaluation, at most 7 units on a term with
+ * m or n, 8 on that with det, and 2^-100 of the old bounds.  As large as the
+ * value itself, so that a bound overflows where a product does. */
+static double refined(double value, double bound)
 {
-    return share * __builtin_fabs(value) + 1e-15 * bound;
+    return __builtin_fabs(value) + 1e-15 * bound;
 }
 
 void incode_sphere_fine(struct incode_fine *f, const double v[3],
@@ -101,14 +105,14 @@ void incode_sphere_refine(struct incode_sphere *s, const double v[3],
     incode_sphere_fine(&fine, v, b, c, a, scale);
     for (int k = 0; k < 3; k++) {
         s->n[k] = fine.n[k].hi;
-        s->pn[k] = refined(0.23, s->n[k], 2 * s->lb * s->lc);
+        s->pn[k] = refined(s->n[k], 2 * s->lb * s->lc);
     }
     if (a == NULL)
         return;
     for (int k = 0; k < 3; k++) {
         s->m[k] = fine.m[k].hi;
-        s->pm[k] = refined(0.23, s->m[k], s->pm[k]);
+        s->pm[k] = refined(s->m[k], s->pm[k]);
     }
     s->det = fine.det.hi;
-    s->pdet = refined(0.28, s->det, s->pdet);
+    s->pdet = refined(s->det, s->pdet);
 }

@@ -23,6 +23,9 @@ static bool copy_boxes(struct incode_walker *walker, struct incode_query *q,
         for (int d = 0; d < 3; d++) {
             double lo = (frame->page.boxes.lo[d][i] - v->origin[d]) * v->scale;
             double hi = (frame->page.boxes.hi[d][i] - v->origin[d]) * v->scale;
+            bool over = !(hi - lo < __builtin_inf()); /* tells nothing */
+            lo = over ? -1e30 : lo;
+            hi = over ? 1e30 : hi;
             lo -= OUTWARD * (1 + __builtin_fabs(lo));
             hi += OUTWARD * (1 + __builtin_fabs(hi));
             v->lo[d][v->count] = (float)(lo > -1e30 ? lo : -1e30);

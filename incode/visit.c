@@ -66,8 +66,10 @@ INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
         square += gap * gap;
         plane += incode_vd_all(q->sphere.n[d]) * p->r[d];
     }
-    return incode_vd_mask((square <= incode_vd_all(q->square)) &
-                          (plane >= incode_vd_all(0)));
+    /* A difference that overflows tells nothing. */
+    incode_vl far = (square > incode_vd_all(q->square)) &
+                    (square < incode_vd_all(__builtin_inf()));
+    return 0xff & ~incode_vd_mask(far | (plane < incode_vd_all(0)));
 }
 
 /* ---- eight points in twice the precision ---- */
@@ -308,7 +310,7 @@ bool incode_query_holds(const struct incode_query *q, const double p[3])
     incode_query_relative(r, q, p);
     for (int d = 0; d < 3; d++)
         square += (r[d] - q->centre[d]) * (r[d] - q->centre[d]);
-    return square <= q->square;
+    return !(square > q->square) || !(square < __builtin_inf());
 }
 
 /* Drops what has fallen out of the ball. */
