@@ -153,6 +153,57 @@ static void both_ends(void **unused)
     }
 }
 
+static double draw(uint64_t *seed)
+{
+    *seed = *seed * UINT64_C(6364136223846793005) + 1442695040888963;
+    return (double)(*seed >> 11) * 0x1p-53;
+}
+
+/* Clusters of sizes that have nothing to do with each other, and points so far
+ * away that differences overflow and products underflow, at every index's
+ * expense but kd's. */
+static void mixed_scales(void **unused)
+{
+    (void)unused;
+    uint64_t seed = 11;
+    for (int round = 0; round < 60; round++) {
+        struct host_points points = {0};
+        struct host_error error = {0};
+        struct host_digest digest;
+        unsigned clusters = 1 + (unsigned)(3 * draw(&seed));
+        for (unsigned c = 0; c < clusters; c++) {
+            int size =
+                (int)(round % 3 == 0 ? -530 * draw(&seed) : -60 * draw(&seed));
+            bool flat = draw(&seed) < 0.5;
+            for (int i = 0; i < 30; i++) {
+                double p[3];
+                for (int d = 0; d < 3; d++) {
+                    p[d] = ldexp(draw(&seed), size);
+                }
+                p[2] = flat ? p[0] + p[1] : p[2];
+                (void)host_points_append(&points, p, 1, &error);
+            }
+        }
+        for (int i = 0; i < 1 + round % 5; i++) {
+            double p[3], far = round % 2 == 0 ? 1.7e308 : 1e80;
+            for (int d = 0; d < 3; d++) {
+                double x = draw(&seed);
+                p[d] = x < 0.3 ? far : x < 0.6 ? -far : x;
+            }
+            (void)host_points_append(&points, p, 1, &error);
+        }
+        reference_digest(&points, &digest);
+        for (uint32_t k = 0; k < 4; k++) {
+            struct solo s = {.index = INCODE_KD,
+                             .regions = k & 1 ? 2 : 1,
+                             .chance = k + 1,
+                             .pressure = k & 2 ? 500 : 0};
+            expect(&s, &points, digest.text, "mixed scales");
+        }
+        host_points_free(&points);
+    }
+}
+
 static void made(const char *kind, uint64_t n, struct host_points *points)
 {
     struct host_error error = {0};
@@ -356,15 +407,11 @@ static void refusals(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(degenerate_sets),
-        cmocka_unit_test(scaled_sets),
-        cmocka_unit_test(both_ends),
-        cmocka_unit_test(made_sets),
-        cmocka_unit_test(hub),
-        cmocka_unit_test(real_sets),
-        cmocka_unit_test(smallest_memory),
-        cmocka_unit_test(too_little_memory),
-        cmocka_unit_test(refusals),
+        cmocka_unit_test(degenerate_sets),   cmocka_unit_test(scaled_sets),
+        cmocka_unit_test(both_ends),         cmocka_unit_test(mixed_scales),
+        cmocka_unit_test(made_sets),         cmocka_unit_test(hub),
+        cmocka_unit_test(real_sets),         cmocka_unit_test(smallest_memory),
+        cmocka_unit_test(too_little_memory), cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
