@@ -140,7 +140,7 @@ bool cube_read(struct cube *cube, struct cube_message *message);
 void cube_release(struct cube *cube);
 
 /* The same from link d alone; and instead of cube_release, to leave it unread
- * for now. */
+ * so far. */
 bool cube_read_from(struct cube *cube, unsigned d,
                     struct cube_message *message);
 void cube_put_back(struct cube *cube);

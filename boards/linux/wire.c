@@ -47,7 +47,7 @@ static const char *open_net(struct linux_wire *wire, const char *address,
     return NULL;
 }
 
-/* A port that is not there, or vanished, is looked for now and then. */
+/* A port that is not there, or vanished, is looked for from time to time. */
 static void recover(void *context)
 {
     struct linux_wire *wire = context;

@@ -268,7 +268,7 @@ static int look(struct serial_port *port)
     return 0;
 }
 
-/* The pipe is closed: the port is let go, and looked for now and then. */
+/* The pipe is closed: the port is let go, and looked for from time to time. */
 static void recover(void *context)
 {
     struct serial_port *port = context;
