@@ -146,11 +146,6 @@ static bool any_event_wanted(const struct host_sim_plan *plan)
     return any;
 }
 
-static bool breaks(const struct host_sim_plan *plan)
-{
-    return plan->wanted[HOST_SIM_DEAD_WIRE] || plan->wanted[HOST_SIM_DEAD_NODE];
-}
-
 static void break_for_good(struct run *r)
 {
     struct host_world *w = &r->world;
@@ -180,8 +175,7 @@ static void strike(void *context)
         weather(r, false);
         return;
     }
-    /* What is missing before all nodes have come is named, not survived. */
-    if (w->now_us >= r->event_us && !r->broken && r->open) {
+    if (w->now_us >= r->event_us && !r->broken) {
         break_for_good(r);
     }
     if (w->now_us >= r->event_us) {
@@ -193,9 +187,8 @@ static void strike(void *context)
         }
         r->events -= more;
         r->event_us =
-            !more && (r->broken || !breaks(r->plan))
-                ? UINT64_MAX
-                : w->now_us + draw(r, 1, 2 * (uint64_t)r->plan->gap_us);
+            !more ? UINT64_MAX
+                  : w->now_us + draw(r, 1, 2 * (uint64_t)r->plan->gap_us);
     }
     w->strike_us = r->calm_us < r->event_us ? r->calm_us : r->event_us;
     for (unsigned i = 0; i < r->lasting_count; i++) {

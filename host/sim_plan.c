@@ -137,8 +137,6 @@ static void draw_death(struct host_sim_plan *p)
     p->wanted[HOST_SIM_DEAD_WIRE] = !node || one_in(&state, 4);
     p->wanted[HOST_SIM_DEAD_NODE] = node;
     p->patience_us = draw(&state, 9000000, 15000000);
-    /* A host that is slow itself needs more of it to hear everyone. */
-    p->patience_us += p->wanted[HOST_SIM_SLOW_HOST] ? 45000000 : 0;
     for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_CRASH; k++) {
         p->wanted[k] = false;
     }
