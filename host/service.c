@@ -11,7 +11,6 @@
 enum {
     WINDOW_DEFAULT = 32,
     IDLE_US_MAX = 20000,
-    PATIENCE_US = 60000000,
     FRUITLESS_MAX = 64,
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
@@ -468,7 +467,7 @@ int host_service_start(struct host_service *service, struct host_error *error)
 {
     struct host_service *s = service;
     s->spill.file = -1;
-    s->patience_us = s->patience_us == 0 ? PATIENCE_US : s->patience_us;
+    s->patience_us = s->patience_us == 0 ? HOST_PATIENCE_US : s->patience_us;
     s->node = calloc(s->machine->nodes, sizeof *s->node);
     s->report = calloc(s->machine->nodes, sizeof *s->report);
     if (s->node == NULL || s->report == NULL) {

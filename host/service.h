@@ -25,7 +25,11 @@
 #include "spill.h"
 #include "tetrahedra.h"
 
-enum { HOST_PAGES_QUEUED_MAX = 256, HOST_UNSPILLS_MAX = 64 };
+enum {
+    HOST_PAGES_QUEUED_MAX = 256,
+    HOST_UNSPILLS_MAX = 64,
+    HOST_PATIENCE_US = 60000000 /* unless the caller says otherwise */
+};
 
 /* What the host knows of one node while it runs. */
 struct host_node {
@@ -75,7 +79,7 @@ struct host_service {
     struct host_tetrahedra *tets; /* takes rows of vertex numbers */
     struct node_setup_message setup;
     unsigned window;      /* frames; 0: a large one */
-    uint64_t patience_us; /* for a node that does not answer */
+    uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     bool show_progress;
     /* Nodes that compute, one region of the order each; others hold pages. */
     unsigned workers;

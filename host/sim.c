@@ -301,9 +301,7 @@ static void begin(struct run *r)
     r->event_us = w->now_us + draw(r, 1, r->plan->gap_us);
     r->events = r->plan->events_max;
     sum_strikes(w, r->before);
-    if (!r->plan->early) {
-        weather(r, true);
-    }
+    weather(r, true);
     w->strike_us = r->event_us;
 }
 
@@ -369,7 +367,11 @@ static int serve(struct run *r, struct host_machine *machine,
     s->setup.setup.index = (uint8_t)p->index;
     s->setup.setup.face_rule = (uint8_t)p->face_rule;
     s->setup.setup.shuffle_seed = p->shuffle_seed;
-    r->calm_us = r->event_us = UINT64_MAX;
+    /* Early weather ends too, while there is patience left to come up. */
+    uint64_t patience = p->patience_us != 0 ? p->patience_us : HOST_PATIENCE_US;
+    r->calm_us = p->calm_us < patience / 2 ? p->calm_us : patience / 2;
+    r->event_us = UINT64_MAX;
+    r->world.strike_us = r->calm_us;
     weather(r, p->early);
     watch_frames(r);
     int status = host_service_start(s, error);
