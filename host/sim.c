@@ -341,7 +341,9 @@ static int check_queues(const struct run *r, struct host_error *error)
     for (unsigned i = 0; i < r->plan->nodes && !s->over; i++) {
         const struct host_world_node *node = &r->world.node[i];
         left += s->node[i].pages_count + s->node[i].unspills_count;
-        left += node->state == HOST_WORLD_UP ? node_held(node->node) : 0;
+        /* A node that was cut off for good keeps what it has. */
+        bool counts = node->state == HOST_WORLD_UP && !s->node[i].lost;
+        left += counts ? node_held(node->node) : 0;
     }
     if (s->ledger.committed != s->ledger.bricks || left > 0) {
         return host_fail(error, HOST_BROKEN,
