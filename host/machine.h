@@ -32,6 +32,9 @@ struct host_machine {
     /* Instead of it, wires to nodes 0 .. host_wires - 1; see cube.h. */
     uint8_t host_wires;
     struct link_pipe wires[CUBE_HOST_WIRES_MAX]; /* [0] is `pipe` */
+    /* A wire that is missing from the start is gone round, and later one that
+     * was not up for so many seconds; 0: the machine has made its wires. */
+    uint8_t absent_s;
     /* Microseconds since any fixed time, never going back. */
     uint64_t (*now_us)(void *context);
     /* Sleeps until bytes have come, or room for them where there was none, but

@@ -197,6 +197,16 @@ static void machine_stop(void *context)
     host_remote_stop(context);
 }
 
+/* A node that starts again may need a moment to find its neighbours. */
+static uint8_t absent_s(const struct host_cube_file *file)
+{
+    unsigned s = file->dead_s;
+    return (uint8_t)(s == 0                  ? 0
+                     : s < HOST_ABSENT_MIN_S ? HOST_ABSENT_MIN_S
+                     : s > UINT8_MAX         ? UINT8_MAX
+                                             : s);
+}
+
 struct host_machine host_remote_machine(struct host_remote *remote)
 {
     const struct host_cube_wire *second = host_cube_host_wire(remote->file, 1);
@@ -206,6 +216,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     machine.nodes = remote->file->nodes;
     machine.dimension = remote->file->dimension;
     machine.lines = remote->file->lines;
+    machine.absent_s = absent_s(remote->file);
     while (machine.epoch == 0) {
         (void)!getrandom(&machine.epoch, sizeof machine.epoch, 0);
     }

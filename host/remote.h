@@ -21,7 +21,10 @@
 #include "cube_file.h"
 #include "port.h"
 
-enum { HOST_REMOTE_DEATHS_MAX = 20 }; /* of one node, then the run ends */
+enum {
+    HOST_REMOTE_DEATHS_MAX = 20, /* of one node, then the run ends */
+    HOST_ABSENT_MIN_S = 3
+};
 
 struct host_remote {
     const struct host_cube_file *file;

@@ -340,11 +340,10 @@ static bool speaks(const struct host_service *s, const struct cube_wiring *w,
     return on && !wiring_is_dead(w, w->dead_count, gate, dimension, dimension);
 }
 
-/* The node by which the host speaks from now on: as before, or the other one
- * that has a wire to the host. */
-static uint16_t choose_gate(const struct host_service *s,
-                            const struct cube_wiring *next)
+uint16_t host_service_gate(const struct host_service *service,
+                           const struct cube_wiring *next)
 {
+    const struct host_service *s = service;
     uint16_t other = next->gate != 0 ? 0 : s->machine->spare_node;
     return !speaks(s, next, next->gate) && speaks(s, next, other) ? other
                                                                   : next->gate;
@@ -416,6 +415,11 @@ static int renew(struct host_service *s, uint64_t now_us,
         return error->code;
     }
     next.generation++;
+    if (s->searching) {
+        next.dead_count = next.settled; /* that a wire is absent shows later */
+    } else {
+        next.absent_s = s->started ? s->machine->absent_s : next.absent_s;
+    }
     if (s->wire_lost) {
         struct cube_dead dead = {next.gate, (uint8_t)dimension};
         (void)wiring_add_dead(&next, dead, dimension);
@@ -428,7 +432,7 @@ static int renew(struct host_service *s, uint64_t now_us,
             (void)wiring_add_dead(&next, dead, dimension);
         }
     }
-    next.gate = choose_gate(s, &next);
+    next.gate = host_service_gate(s, &next);
     cube_renew(s->cube, &next);
     s->generations++;
     return begin_again(s, now_us, error);
@@ -479,7 +483,7 @@ int host_service_start(struct host_service *service, struct host_error *error)
     s->generations = 1;
     s->check_us = s->wire_down_us = now_of(s);
     host_watch_begin(s, s->check_us);
-    while (s->here < s->living) {
+    while (s->here < s->living || s->searching) {
         if (round_trip(s, error) != 0) {
             return error->code;
         }

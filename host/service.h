@@ -105,7 +105,11 @@ struct host_service {
     /* Losses in a row without a brick between them that was committed. */
     unsigned fruitless;
     uint32_t committed_before;
-    bool wire_lost;      /* the one in use is dead */
+    bool wire_lost; /* the one in use is dead */
+    /* Wires that never came up are looked for: missing.h. */
+    bool searching;
+    uint64_t search_us;  /* since when, */
+    uint64_t news_us;    /* and when a node answered for the first time last */
     bool probe, probing; /* nodes are called one by one: in the next generation;
                             now, until all have answered */
     unsigned living;     /* nodes that are not lost */
@@ -123,6 +127,11 @@ int host_service_start(struct host_service *service, struct host_error *error);
 /* Hands out the setup and the jobs, and returns when every brick is committed
  * and every node has told its statistics. */
 int host_service_run(struct host_service *service, struct host_error *error);
+
+/* For missing.h: the node by which the host speaks from now on: as before, or
+ * the other one that has a wire to the host. */
+uint16_t host_service_gate(const struct host_service *service,
+                           const struct cube_wiring *next);
 
 /* Tells the nodes to stop, ends those that do not, and frees all. */
 void host_service_end(struct host_service *service);

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "missing.h"
+
 enum {
     CHECK_EVERY_US = 20000,
     ELAPSED_US_MAX = 100000,   /* a host that was stopped blames nobody */
@@ -65,8 +67,8 @@ void host_watch_begin(struct host_service *service, uint64_t now_us)
     s->probing = s->probe;
     s->probe = false;
     s->living = s->here = s->ready = 0;
-    s->began_us = now_us;
-    s->call_us = now_us;
+    s->began_us = s->searching ? s->began_us : now_us;
+    s->news_us = s->call_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
         node->lost = node->given_up || !cube_reaches(s->cube, (uint16_t)i);
@@ -133,6 +135,7 @@ int host_watch_answer(struct host_service *service,
          * to a link's end that was just about to start again. */
         report->here = true;
         s->here++;
+        s->news_us = s->check_us;
         node->missed = here.called - here.received;
         node->call_again_us = CALL_AGAIN_US;
         if (node->start != 0 && node->start != here.start) {
@@ -260,14 +263,18 @@ static int check_wire(struct host_service *s, uint64_t now_us,
     return 0;
 }
 
-/* Nodes that have not answered since the generation began: as long as the
- * machine would need to start them. */
+/* For nodes to come: as long as the machine would need to start them. */
+static uint64_t patience_of(const struct host_service *s)
+{
+    return s->machine->restarts != NULL ? BRING_UP_US_MAX : s->patience_us;
+}
+
+/* Nodes that have not answered since the generation began. */
 static int check_bring_up(const struct host_service *s, uint64_t now_us,
                           struct host_error *error)
 {
-    uint64_t most =
-        s->machine->restarts != NULL ? BRING_UP_US_MAX : s->patience_us;
-    if (s->started || s->here == s->living || now_us - s->began_us <= most) {
+    if (s->started || s->here == s->living ||
+        now_us - s->began_us <= patience_of(s)) {
         return 0;
     }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -304,7 +311,9 @@ int host_watch_check(struct host_service *service, uint64_t now_us,
         s->restarts = s->machine->restarts(s->machine->context);
         s->loss = true;
     }
-    s->loss = s->loss || wiring->dead_count > wiring->settled;
+    if (!host_missing_check(s, now_us, patience_of(s))) {
+        s->loss = s->loss || wiring->dead_count > wiring->settled;
+    }
     call_in_turn(s, now_us);
     listen(s, now_us, elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX);
     if (check_wire(s, now_us, error) != 0) {

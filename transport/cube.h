@@ -63,6 +63,8 @@ struct cube_wiring {
     uint16_t settled;    /* dead[0 .. settled) were so when it began: routes
                             avoid them; the others were found since */
     uint16_t dead_count, wrong_count;
+    uint8_t absent_s; /* seconds after which a link that never came up is dead
+                         too; 0: it is waited for */
     struct cube_dead dead[CUBE_DEAD_MAX];
     struct cube_wrong wrong[CUBE_WRONG_MAX];
 };

@@ -25,7 +25,7 @@ struct cube_neighbour {
     uint64_t told_us;  /* when it was last told our wiring */
     bool agreed;       /* it has said what we would say */
     uint64_t frames;   /* received, as of the last look */
-    uint32_t quiet_us; /* time that the link, once up, is down or silent */
+    uint32_t quiet_us; /* time that the link is down or silent */
 };
 
 struct cube {

@@ -4,6 +4,10 @@
 #include "check.h"
 #include "cube_internal.h"
 
+/* Time without a first sign of the peer, as far as it is counted, and at most
+ * between two looks. */
+enum { ABSENT_US_MAX = 255000000, ABSENT_STEP_US = 500000 };
+
 static bool is_host(const struct cube *cube)
 {
     return cube->config.self == CUBE_HOST;
@@ -121,23 +125,30 @@ static struct cube_dead name_of(const struct cube *cube, unsigned d)
     return name;
 }
 
-/* A peer that was up once and is not heard of any more. */
-static bool look_for_dead(struct cube *cube, unsigned d, uint32_t passed_us)
+/* A peer that was up once and is not heard of any more; or, where the host asks
+ * for those too, one that never was.  Time in which this end itself stood still
+ * counts little: others are not dead because it slept. */
+static bool look_for_dead(struct cube *cube, unsigned d, uint64_t passed_us)
 {
     struct cube_neighbour *n = &cube->neighbours[d];
     enum link_state state = link_state(cube->links[d]);
     uint64_t frames = link_statistics(cube->links[d])->frames_received;
     bool spoke = frames != n->frames && state == LINK_SILENT;
+    bool absent = n->comings == 0;
+    uint32_t limit_us =
+        absent ? cube->wiring.absent_s * 1000000u : cube->config.dead_us;
+    uint32_t count_us = absent ? ABSENT_US_MAX : limit_us;
+    uint32_t most_us = absent ? ABSENT_STEP_US : limit_us / 4;
     n->frames = frames;
     if (spoke || state == LINK_UP || state == LINK_CLOSING ||
-        state == LINK_CLOSED || n->comings == 0 || cube->config.dead_us == 0) {
+        state == LINK_CLOSED) {
         n->quiet_us = 0;
         return false;
     }
-    if (n->quiet_us < cube->config.dead_us) {
-        n->quiet_us += passed_us;
+    if (n->quiet_us < count_us) {
+        n->quiet_us += passed_us < most_us ? (uint32_t)passed_us : most_us;
     }
-    return n->quiet_us >= cube->config.dead_us &&
+    return limit_us != 0 && n->quiet_us >= limit_us &&
            wiring_add_dead(&cube->wiring, name_of(cube, d),
                            cube->config.dimension);
 }
@@ -150,20 +161,16 @@ static bool look_for_wrong(struct cube *cube, unsigned d)
     return peer->refusal != LINK_FITS && wiring_add_wrong(&cube->wiring, wrong);
 }
 
-/* Time in which this end itself stood still counts little: others are not dead
- * because it slept. */
 static void look(struct cube *cube, uint64_t now_us)
 {
     uint64_t passed_us = now_us - cube->looked_us;
-    uint32_t most_us = cube->config.dead_us / 4;
     bool news = false;
     if (passed_us < CUBE_GOSSIP_US) {
         return;
     }
     cube->looked_us = now_us;
-    passed_us = passed_us < most_us ? passed_us : most_us;
     for (unsigned d = 0; d < cube->count; d++) {
-        news |= look_for_dead(cube, d, (uint32_t)passed_us);
+        news |= look_for_dead(cube, d, passed_us);
         news |= look_for_wrong(cube, d);
     }
     if (news) {

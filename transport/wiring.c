@@ -32,7 +32,7 @@ size_t wiring_pack(const struct cube_wiring *wiring, uint8_t *bytes)
     put(&at, wiring->settled, 1);
     put(&at, wiring->dead_count, 1);
     put(&at, wiring->wrong_count, 1);
-    put(&at, 0, 1);
+    put(&at, wiring->absent_s, 1);
     for (unsigned i = 0; i < wiring->dead_count; i++) {
         put(&at, wiring->dead[i].node, 2);
         put(&at, wiring->dead[i].dimension, 1);
@@ -221,7 +221,7 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
     wiring->settled = (uint16_t)get(&at, 1);
     wiring->dead_count = (uint16_t)get(&at, 1);
     wiring->wrong_count = (uint16_t)get(&at, 1);
-    (void)get(&at, 1);
+    wiring->absent_s = (uint8_t)get(&at, 1);
     if (wiring->dead_count > CUBE_DEAD_MAX ||
         wiring->settled > wiring->dead_count ||
         wiring->wrong_count > CUBE_WRONG_MAX ||

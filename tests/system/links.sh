@@ -182,6 +182,30 @@ kill -KILL $nodes 2> /dev/null
 # shellcheck disable=SC2086
 wait $nodes 2> /dev/null
 
+# A wire that was never put in: where its end calls, nobody listens.
+cat > "$scratch/missing.cube" <<-END
+	dimension = 2;
+	start = [0, 1, 2];
+	links = (
+	    { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 60))"; },
+	    { node = 0; to = 1; tcp = "127.0.0.1:$((base + 61))";
+	      via = "127.0.0.1:$((base + 70))"; },
+	    { node = 0; to = 2; tcp = "127.0.0.1:$((base + 62))"; },
+	    { node = 1; to = 3; tcp = "127.0.0.1:$((base + 63))"; },
+	    { node = 2; to = 3; tcp = "127.0.0.1:$((base + 64))"; }
+	);
+END
+read -r straps < <("$INCODE" cube "$scratch/missing.cube" | grep -e '--node 3 ')
+# shellcheck disable=SC2086
+"$BUILD/"$straps 2> "$scratch/said" &
+node=$!
+same 'a wire that is missing' --cube "$scratch/missing.cube" --patience 5
+check 'links/a wire that is missing is named' "$(last "$scratch/errors")" \
+    grep -q '^incode: node 0 link 0: the wire to node 1 .*; ' "$scratch/errors"
+
+kill $node
+wait $node 2> /dev/null
+
 # Nodes that nobody has told who they are, the host's neighbour last.
 cat > "$scratch/nameless.cube" <<-END
 	dimension = 1;

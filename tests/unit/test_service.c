@@ -57,6 +57,7 @@ static struct {
     struct node *node[NODES];
     bool stopped[NODES], ended[NODES];
     uint16_t spare;
+    uint8_t absent_s;
     uint32_t dead_us, epoch;
     struct event events[EVENTS];
     double host_fails; /* when; 0: never */
@@ -271,6 +272,7 @@ static struct host_machine make_machine(void)
     machine.epoch = ++world.epoch;
     machine.pipe = pipe_of(&world.host[0]);
     machine.spare_node = world.spare;
+    machine.absent_s = world.absent_s;
     machine.spare = pipe_of(&world.host[1]);
     machine.now_us = now_us;
     machine.idle = machine_idle;
@@ -509,6 +511,85 @@ static void test_cut(void **unused)
     assert_true(lost >= 4); /* others have done with it */
 }
 
+/* In the cube's own dimension order, whichever is not needed is not missed. */
+static void lacks(unsigned node, unsigned link)
+{
+    wire_of(node, link)->cut = true;
+}
+
+static void survives_as(enum host_strategy strategy)
+{
+    struct host_digest digest;
+    struct host_error error;
+    if (run(strategy, &digest, &error) != 0) {
+        fail_msg("%s", error.text);
+    }
+    assert_string_equal(digest.text, expected.text);
+}
+
+/* Wires that were never there are gone round as well, once all else is. */
+static void test_missing_wire(void **unused)
+{
+    unsigned missed = 0;
+    (void)unused;
+    for (unsigned i = 0; i < NODES; i++) {
+        for (unsigned d = 0; d < DIMENSION; d++) {
+            if ((i >> d & 1) == 0) {
+                prepare();
+                world.absent_s = 3;
+                start_world();
+                lacks(i, d);
+                survives_as(d == 0 ? HOST_SEQUENTIAL : HOST_SPATIAL);
+                missed += result.generations > 1;
+            }
+        }
+    }
+    assert_int_equal(missed, 11); /* those of a way from or to node 0 */
+    prepare();
+    world.absent_s = 3;
+    start_world();
+    lacks(0, 0);
+    lacks(3, 0);
+    lacks(6, 1);
+    survives_as(HOST_SPATIAL);
+    assert_int_equal(result.generations, 2);
+}
+
+/* The host's own wire to node 0, where it has another. */
+static void test_missing_host_wire(void **unused)
+{
+    (void)unused;
+    prepare();
+    world.absent_s = 3;
+    world.spare = 5;
+    start_world();
+    lacks(0, DIMENSION);
+    survives_as(HOST_SPATIAL);
+    assert_int_equal(result.generations, 2);
+}
+
+/* A node that is late is waited for, and all of its wires are used. */
+static void test_late_node(void **unused)
+{
+    (void)unused;
+    for (unsigned i = 0; i < NODES; i++) {
+        prepare();
+        world.absent_s = 3;
+        start_world();
+        world.stopped[i] = true;
+        world.events[0] =
+            (struct event){CONTINUE, 7.6e6 / (double)undisturbed_us, i, 0};
+        survives_as(HOST_SPATIAL);
+        assert_true(world.now_us > 7600000);
+        assert_int_equal(result.generations, 1);
+    }
+    prepare();
+    world.absent_s = 3;
+    start_world();
+    world.stopped[6] = true;
+    fails_with("node 6 link 2: no answer");
+}
+
 static void swap(unsigned node, unsigned link, unsigned other,
                  unsigned other_link)
 {
@@ -530,11 +611,18 @@ static void test_wrong_wire(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_restarts),   cmocka_unit_test(test_mixtures),
-        cmocka_unit_test(test_stopped),    cmocka_unit_test(test_gone),
-        cmocka_unit_test(test_gate),       cmocka_unit_test(test_for_ever),
-        cmocka_unit_test(test_next_host),  cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_restarts),
+        cmocka_unit_test(test_mixtures),
+        cmocka_unit_test(test_stopped),
+        cmocka_unit_test(test_gone),
+        cmocka_unit_test(test_gate),
+        cmocka_unit_test(test_for_ever),
+        cmocka_unit_test(test_next_host),
+        cmocka_unit_test(test_cut),
         cmocka_unit_test(test_wrong_wire),
+        cmocka_unit_test(test_missing_wire),
+        cmocka_unit_test(test_late_node),
+        cmocka_unit_test(test_missing_host_wire),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
