@@ -48,6 +48,9 @@ struct host_machine {
     /* Ends a node that does not answer, for `check` to start it again; false,
      * as where it is NULL: the node is not this machine's to start. */
     bool (*kill)(void *context, unsigned node);
+    /* Leaves the host's wires alone for a time, as another host has them; NULL:
+     * there is no other. */
+    void (*rest)(void *context, uint64_t rest_us);
     /* Whether every node has ended: true as well where nothing tells.  Called
      * at the end, when no node is to be started again. */
     bool (*ended)(void *context);

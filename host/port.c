@@ -103,6 +103,13 @@ void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
     (void)ppoll(fds, used, &wait, NULL);
 }
 
+void host_port_rest(struct host_port *port, uint64_t rest_us)
+{
+    if (port->kind == HOST_PORT_NET) {
+        tcp_wire_rest(&port->net, rest_us);
+    }
+}
+
 void host_port_close(struct host_port *port)
 {
     if (port->kind == HOST_PORT_SERIAL) {

@@ -52,6 +52,10 @@ struct link_pipe host_port_pipe(struct host_port *port);
 enum { HOST_PORTS_MAX = 2 };
 void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us);
 
+/* Where the other end is in use: leaves it alone for a time, if it can be
+ * called again then. */
+void host_port_rest(struct host_port *port, uint64_t rest_us);
+
 void host_port_close(struct host_port *port);
 
 #endif

@@ -185,6 +185,14 @@ static bool machine_kill(void *context, unsigned node)
     return pid > 0 && kill(pid, SIGKILL) == 0;
 }
 
+static void machine_rest(void *context, uint64_t rest_us)
+{
+    struct host_remote *r = context;
+    for (unsigned i = 0; i < r->ports; i++) {
+        host_port_rest(&r->port[i], rest_us);
+    }
+}
+
 /* Nothing tells of nodes elsewhere, and those here begin anew. */
 static bool machine_ended(void *context)
 {
@@ -235,6 +243,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     }
     machine.restarts = all_here ? machine_restarts : NULL;
     machine.kill = machine_kill;
+    machine.rest = machine_rest;
     machine.ended = machine_ended;
     machine.stop = machine_stop;
     return machine;

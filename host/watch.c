@@ -13,7 +13,9 @@ enum {
     CALL_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
     PROBE_US = 3000000,
     WIRE_DOWN_US_MAX = 8000000,
-    BRING_UP_US_MAX = 9000000
+    BRING_UP_US_MAX = 9000000,
+    IN_USE_US_MAX = 5000000, /* longer than a link keeps to a silent host */
+    IN_USE_REST_US = 1000000
 };
 
 static unsigned wire_of(const struct host_service *s)
@@ -235,12 +237,38 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
     }
 }
 
+/* Whether another host has the nodes; it may have died just before. */
+static bool in_use(struct host_service *s, uint64_t now_us)
+{
+    const struct link_peer *peer = cube_link_peer(s->cube, wire_of(s));
+    if (peer->refusal != LINK_IN_USE) {
+        s->in_use_us = 0;
+        return false;
+    }
+    if (s->in_use_us == 0) {
+        s->in_use_us = now_us;
+    }
+    if (s->machine->rest != NULL && s->in_use != peer->in_use) {
+        s->machine->rest(s->machine->context, IN_USE_REST_US);
+    }
+    s->in_use = peer->in_use;
+    return true;
+}
+
 static int check_wire(struct host_service *s, uint64_t now_us,
                       struct host_error *error)
 {
     unsigned wire = wire_of(s);
     enum link_state state = cube_link_state(s->cube, wire);
     uint16_t gate = cube_wiring(s->cube)->gate;
+    if (in_use(s, now_us)) {
+        return now_us - s->in_use_us <= IN_USE_US_MAX
+                   ? 0
+                   : host_fail(error, HOST_CUBE,
+                               "node %u link %u: the cube is in use by another "
+                               "host; wait until its run is over, or end it",
+                               gate, s->machine->dimension);
+    }
     if (state == LINK_REFUSED) {
         return host_fail(error, HOST_CUBE,
                          "node %u link %u: the host's wire leads to node %u "

@@ -119,6 +119,7 @@ static struct link_config link_config_of(const struct cube_config *config,
     c.peer_port = (uint8_t)(host      ? config->dimension
                             : to_host ? many ? config->self : config->self != 0
                                       : d);
+    c.keeps_peer = to_host;
     c.greeting = (uint8_t)(config->dimension + 1);
     c.window = (host || to_host) && config->host_window != 0
                    ? config->host_window

@@ -158,7 +158,8 @@ static bool look_for_wrong(struct cube *cube, unsigned d)
     const struct link_peer *peer = link_peer(cube->links[d]);
     struct cube_wrong wrong = {cube->config.self, peer->node, (uint8_t)d,
                                peer->port, (uint8_t)peer->refusal};
-    return peer->refusal != LINK_FITS && wiring_add_wrong(&cube->wiring, wrong);
+    return peer->refusal != LINK_FITS && peer->refusal != LINK_IN_USE &&
+           wiring_add_wrong(&cube->wiring, wrong);
 }
 
 static void look(struct cube *cube, uint64_t now_us)

@@ -57,7 +57,9 @@ enum link_refusal {
     LINK_WRONG_VERSION,
     LINK_WRONG_WIRE,     /* another node, or another of its ports */
     LINK_WRONG_GREETING, /* the level above differs */
-    LINK_WRONG_SIZES     /* its window does not hold a message, or ours its */
+    LINK_WRONG_SIZES,    /* its window does not hold a message, or ours its */
+    LINK_IN_USE          /* it keeps to another start of this end, or to another
+                            that is in its place; it may come round */
 };
 
 /* Who is at the other end, by its own account. */
@@ -68,6 +70,7 @@ struct link_peer {
     uint8_t version, greeting;
     uint16_t window, frame_payload, message_max;
     enum link_refusal refusal;
+    uint32_t in_use; /* times that it said so */
 };
 
 struct link_statistics {
@@ -107,9 +110,11 @@ struct link_config {
     uint8_t port;
     uint8_t peer_port; /* and who must be at the other */
     uint16_t peer_node;
-    uint8_t greeting;        /* of the level above: the peer's must be the same,
-                                unless one of them is 0 */
-    uint16_t window;         /* frames a direction, 1 .. LINK_WINDOW_MAX */
+    uint8_t greeting; /* of the level above: the peer's must be the same,
+                         unless one of them is 0 */
+    bool keeps_peer;  /* until it was not heard for silence_us: another epoch is
+                         told that the link is in use */
+    uint16_t window;  /* frames a direction, 1 .. LINK_WINDOW_MAX */
     uint16_t message_max;    /* bytes; default LINK_MESSAGE_MAX */
     uint16_t frame_payload;  /* bytes; default: a message a frame */
     uint16_t staging;        /* frames; default half a window, 4 to 8 */

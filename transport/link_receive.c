@@ -212,7 +212,7 @@ static enum frame_result take_frame(struct link *link, const uint8_t *in,
         link_greet(link);
         return FRAME_GOOD;
     }
-    link->heard_us = link->now_us;
+    link->heard_us = link->kept_us = link->now_us;
     if (header.kind == LINK_DATA) {
         return link->up ? take_data(link, &reader, &header) : FRAME_GOOD;
     }

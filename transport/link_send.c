@@ -302,6 +302,7 @@ static void stage_hello(struct link *link)
     stage(link, LINK_HELLO, 0, link->send.first, hello, sizeof hello);
     link->hello_us = link->now_us;
     link->hello_now = false;
+    link->intruder = 0;
     link->statistics.hellos_sent++;
     if (c->epoch != 0 && c->hellos_left-- == 0) {
         c->epoch = 0;

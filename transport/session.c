@@ -1,16 +1,5 @@
 #include "link_internal.h"
 
-/* The name of frames that go from one start of a node to one of another. */
-uint32_t link_session(uint32_t from, uint32_t to)
-{
-    uint8_t bytes[8];
-    for (int i = 0; i < 4; i++) {
-        bytes[i] = (uint8_t)(from >> 8 * i);
-        bytes[4 + i] = (uint8_t)(to >> 8 * i);
-    }
-    return frame_crc32c(0, bytes, sizeof bytes);
-}
-
 bool link_refuses(const struct link *link)
 {
     return link->peer.refusal != LINK_FITS;
@@ -49,11 +38,14 @@ void link_pack_hello(const struct link *link, uint8_t *hello)
     hello[6] = c->peer_port;
     hello[7] = c->greeting;
     put32(hello + 8, c->epoch);
-    put32(hello + 12, candidate ? link->candidate.epoch : link->peer_epoch);
+    put32(hello + 12, link->intruder != 0 ? link->intruder
+                      : candidate         ? link->candidate.epoch
+                                          : link->peer_epoch);
     put16(hello + 16, c->window);
     put16(hello + 18, c->frame_payload);
     put16(hello + 20, c->message_max);
-    put16(hello + 22, 0);
+    hello[22] = link->intruder != 0;
+    hello[23] = 0;
 }
 
 /* The name of frames that go from one start of a node to one of another. */
@@ -102,9 +94,13 @@ static enum link_refusal fits(const struct link *link, const uint8_t *hello)
     return LINK_FITS;
 }
 
+/* That a link is in use stays so until its end speaks of this one's epoch
+ * again. */
 static void note_peer(struct link *link, const uint8_t *hello)
 {
     struct link_peer *peer = &link->peer;
+    bool to_us = get32(hello + 12) == link->config.epoch;
+    bool in_use = to_us ? hello[22] != 0 : peer->refusal == LINK_IN_USE;
     peer->version = hello[0];
     peer->port = hello[1];
     peer->greeting = hello[7];
@@ -113,7 +109,19 @@ static void note_peer(struct link *link, const uint8_t *hello)
     peer->window = get16(hello + 16);
     peer->frame_payload = get16(hello + 18);
     peer->message_max = get16(hello + 20);
+    peer->in_use += to_us && hello[22] != 0;
     peer->refusal = fits(link, hello);
+    if (peer->refusal == LINK_FITS && in_use) {
+        peer->refusal = LINK_IN_USE;
+    }
+}
+
+/* Whether another epoch greets while the present peer is alive. */
+static bool intrudes(const struct link *link, uint32_t epoch)
+{
+    return link->config.keeps_peer && link->peer_epoch != 0 &&
+           epoch != link->peer_epoch && !link->closed &&
+           link->now_us - link->kept_us <= link->config.silence_us;
 }
 
 static void come_up(struct link *link)
@@ -142,6 +150,7 @@ static void start_session(struct link *link)
     }
     link_receive_reset(link, (uint16_t)c->epoch);
     link->candidate.epoch = 0;
+    link->kept_us = link->now_us;
     link->closed = false;
     link->bye_due = false;
     come_up(link);
@@ -181,7 +190,15 @@ void link_on_hello(struct link *link, const struct frame_header *header,
     if (epoch == 0 || link->closing) {
         return;
     }
+    if (intrudes(link, epoch)) {
+        link->intruder = epoch;
+        link->hello_now = true;
+        return;
+    }
     link->heard_us = link->now_us;
+    if (epoch == link->peer_epoch) {
+        link->kept_us = link->now_us;
+    }
     note_peer(link, hello);
     if (link_refuses(link)) {
         link->up = false;

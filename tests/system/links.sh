@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# The same bytes over every kind of wire, also where the wire suffers.
-# 70 seconds.
+# The same bytes over every kind of wire, also where the wire suffers.  What
+# waits more than it works goes on beside the rest.  40 seconds.
 . tests/system/lib.sh
 
 points=$scratch/points.npy
 "$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null
 "$INCODE" run "$points" -q --strategy sequential --nodes 1 \
     -o "$scratch/first.npy" 2> "$scratch/errors"
-check 'links/one node' "$(last "$scratch/errors")" \
-    test -f "$scratch/first.npy"
+first=$scratch/first.npy
+check 'links/one node' "$(last "$scratch/errors")" test -f "$first"
 
 # same NAME OPTION...: these options change no byte of the output.
 same() {
@@ -18,7 +18,7 @@ same() {
     timeout 60 "$INCODE" run "$points" -q --strategy spatial \
         -o "$scratch/out.npy" "$@" 2> "$scratch/errors"
     check "links/$name" "exit $?: $(last "$scratch/errors")" \
-        cmp -s "$scratch/first.npy" "$scratch/out.npy"
+        cmp -s "$first" "$scratch/out.npy"
 }
 same '8 nodes on sockets' --nodes 8 --link tcp
 same '8 nodes on pseudo-terminals' --nodes 8 --link serial
@@ -27,10 +27,169 @@ same '8 small nodes on pseudo-terminals' --nodes 8 --link serial \
 same "the host's end closed and reopened" --nodes 8 --link serial \
     --host-unplug 150
 
+# --- beside the rest ----------------------------------------------------------
+
+base=$((10000 + RANDOM % 20000))
+
+# beside NAME: the function of that name, in a scratch of its own; `gather` says
+# what it has said.
+sides=
+beside() {
+    mkdir "$scratch/$1"
+    openssl rand -hex 32 > "$scratch/$1/cube.key"
+    (scratch=$scratch/$1; "$1") > "$scratch/$1.said" 2> /dev/null &
+    sides="$sides $1:$!"
+}
+gather() {
+    local side
+    for side in $sides; do
+        wait "${side#*:}"
+        cat "$scratch/${side%:*}.said"
+    done
+}
+# start_nodes CUBE [PATTERN]: those that the user starts; $nodes.
+start_nodes() {
+    local straps
+    nodes=
+    while read -r straps; do
+        # shellcheck disable=SC2086
+        "$BUILD/"$straps 2> /dev/null < /dev/null &
+        nodes="$nodes $!"
+    done < <("$INCODE" cube "$1" | grep -e "${2:-^incode-node }")
+}
+end_nodes() {
+    # shellcheck disable=SC2086
+    kill -KILL $nodes 2> /dev/null
+    # shellcheck disable=SC2086
+    wait $nodes 2> /dev/null
+}
+
+# A node that knows another key, and one without any.
+wrong_keys() {
+    cat > "$scratch/one.cube" <<-END
+	dimension = 0;
+	key = "cube.key";
+	links = ( { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 50))"; } );
+END
+    "$INCODE" cube "$scratch/one.cube" > "$scratch/straps"
+    openssl rand -hex 32 > "$scratch/other.key"
+    refused() { # NAME SED
+        local began=$SECONDS
+        # shellcheck disable=SC2046
+        "$BUILD/"$(sed "$2" "$scratch/straps") 2> "$scratch/said" &
+        node=$!
+        timeout 60 "$INCODE" run "$points" -q -o "$scratch/out.npy" \
+            --patience 2 --cube "$scratch/one.cube" 2> "$scratch/errors"
+        status=$?
+        kill $node
+        wait $node 2> /dev/null
+        check "links/$1" "exit $status: $(last "$scratch/errors")" \
+            test $status = 4 -a $((SECONDS - began)) -lt 10
+        check "links/$1: it is named" "$(last "$scratch/errors")" \
+            grep -q '^incode: node 0 link 0: ' "$scratch/errors"
+    }
+    rm -f "$scratch/out.npy"
+    refused 'another key: exit 4' 's/cube.key/other.key/'
+    refused 'no key: exit 4' 's/--key [^ ]*//'
+    check 'links/no output without a key' 'it left one' \
+        test ! -e "$scratch/out.npy"
+    sed -i 's/--key [^ ]*//; s/127.0.0.1/0.0.0.0/' "$scratch/straps"
+    # shellcheck disable=SC2046
+    "$BUILD/"$(cat "$scratch/straps") 2> "$scratch/said" &
+    node=$!
+    sleep 0.3
+    kill $node
+    wait $node 2> /dev/null
+    check 'links/without a key on loopback only' "$(cat "$scratch/said")" \
+        grep -q 'no --key: listens for this machine' "$scratch/said"
+}
+
+# A wire that was never put in: where its end calls, nobody listens.
+missing_wire() {
+    cat > "$scratch/missing.cube" <<-END
+	dimension = 2;
+	start = [0, 1, 2];
+	links = (
+	    { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 60))"; },
+	    { node = 0; to = 1; tcp = "127.0.0.1:$((base + 61))";
+	      via = "127.0.0.1:$((base + 70))"; },
+	    { node = 0; to = 2; tcp = "127.0.0.1:$((base + 62))"; },
+	    { node = 1; to = 3; tcp = "127.0.0.1:$((base + 63))"; },
+	    { node = 2; to = 3; tcp = "127.0.0.1:$((base + 64))"; }
+	);
+END
+    start_nodes "$scratch/missing.cube" '--node 3 '
+    same 'a wire that is missing' --cube "$scratch/missing.cube" --patience 5
+    check 'links/a wire that is missing is named' "$(last "$scratch/errors")" \
+        grep -q '^incode: node 0 link 0: the wire to node 1 .*; ' \
+        "$scratch/errors"
+    end_nodes
+}
+
+# A second host is sent away and does no harm; one that comes after a host was
+# killed gets its nodes.
+two_hosts() {
+    cat > "$scratch/two.cube" <<-END
+	dimension = 1;
+	key = "cube.key";
+	links = ( { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 80))"; },
+	          { node = 1; to = 0; tcp = "127.0.0.1:$((base + 81))"; } );
+END
+    start_nodes "$scratch/two.cube"
+    local began status slow='--host-rate 200000 --host-rate-time 10'
+    # shellcheck disable=SC2086
+    timeout 60 "$INCODE" run "$points" -q --cube "$scratch/two.cube" $slow \
+        -o "$scratch/one.npy" 2> "$scratch/one.errors" &
+    host=$!
+    sleep 1
+    began=$SECONDS
+    timeout 60 "$INCODE" run "$points" -q --cube "$scratch/two.cube" \
+        -o "$scratch/other.npy" 2> "$scratch/errors"
+    status=$?
+    check 'links/a second host: exit 4' "exit $status" \
+        test $status = 4 -a $((SECONDS - began)) -lt 10
+    check 'links/a second host: it is told' "$(last "$scratch/errors")" \
+        grep -q '^incode: node 0 link 1: the cube is in use .*; ' \
+        "$scratch/errors"
+    check 'links/a second host comes while the first is at work' 'it is not' \
+        kill -0 $host
+    wait $host
+    status=$?
+    check 'links/the first host goes on' \
+        "exit $status: $(last "$scratch/one.errors")" \
+        cmp -s "$first" "$scratch/one.npy"
+    # shellcheck disable=SC2086
+    "$INCODE" run "$points" -q --cube "$scratch/two.cube" $slow 2> /dev/null &
+    host=$!
+    sleep 1
+    kill -KILL $host
+    wait $host 2> /dev/null
+    began=$SECONDS
+    same 'a host after one that was killed' --cube "$scratch/two.cube"
+    check 'links/a host after one that was killed: soon' \
+        "$((SECONDS - began)) s" test $((SECONDS - began)) -lt 8
+    end_nodes
+}
+
+bench_links() {
+    timeout 60 "$INCODE" bench links > "$scratch/bench" 2> "$scratch/errors"
+    status=$?
+    check 'links/bench links' "exit $status: $(last "$scratch/errors")" \
+        test $status = 0
+    for driver in 'tcp, loopback' 'tcp, with a key' 'serial, pseudo-terminal' \
+        'serial, paced to 115200 baud'; do
+        check "links/bench links: $driver" "$(cat "$scratch/bench")" \
+            grep -qE "^$driver +[0-9.]+ +(-|[0-9.]+ %) +[0-9]+ +[0-9]+ " \
+            "$scratch/bench"
+    done
+}
+for part in wrong_keys missing_wire two_hosts bench_links; do
+    beside $part
+done
+
 # --- a cube file, and a bad network -----------------------------------------
 
 RELAY=${RELAY:-$BUILD/tests/relay}
-base=$((10000 + RANDOM % 20000))
 openssl rand -hex 32 > "$scratch/cube.key"
 
 # make_cube FILE [KEY]: 8 nodes on TCP, started by the host, each wire through
@@ -96,43 +255,6 @@ same 'strangers on every wire' --cube "$scratch/closed.cube"
 kill $relay $strangers
 wait $relay $strangers 2> /dev/null
 
-# A node that knows another key, and one without any.
-cat > "$scratch/one.cube" <<-END
-	dimension = 0;
-	key = "cube.key";
-	links = ( { node = 0; to = "host"; tcp = "127.0.0.1:$base"; } );
-END
-"$INCODE" cube "$scratch/one.cube" > "$scratch/straps"
-openssl rand -hex 32 > "$scratch/other.key"
-refused() { # NAME SED
-    local began=$SECONDS
-    # shellcheck disable=SC2046
-    "$BUILD/"$(sed "$2" "$scratch/straps") 2> "$scratch/said" &
-    node=$!
-    timeout 60 "$INCODE" run "$points" -q -o "$scratch/out.npy" --patience 2 \
-        --cube "$scratch/one.cube" 2> "$scratch/errors"
-    status=$?
-    kill $node
-    wait $node 2> /dev/null
-    check "links/$1" "exit $status: $(last "$scratch/errors")" \
-        test $status = 4 -a $((SECONDS - began)) -lt 10
-    check "links/$1: it is named" "$(last "$scratch/errors")" \
-        grep -q '^incode: node 0 link 0: ' "$scratch/errors"
-}
-rm -f "$scratch/out.npy"
-refused 'another key: exit 4' 's/cube.key/other.key/'
-refused 'no key: exit 4' 's/--key [^ ]*//'
-check 'links/no output without a key' 'it left one' test ! -e "$scratch/out.npy"
-sed -i 's/--key [^ ]*//; s/127.0.0.1/0.0.0.0/' "$scratch/straps"
-# shellcheck disable=SC2046
-"$BUILD/"$(cat "$scratch/straps") 2> "$scratch/said" &
-node=$!
-sleep 0.3
-kill $node
-wait $node 2> /dev/null
-check 'links/without a key on loopback only' "$(cat "$scratch/said")" \
-    grep -q 'no --key: listens for this machine' "$scratch/said"
-
 # Nodes that a user starts; node 0 is lost for good, and the host has a second
 # wire.
 cat > "$scratch/second.cube" <<-END
@@ -148,13 +270,7 @@ cat > "$scratch/second.cube" <<-END
 	    { node = 2; to = 3; tcp = "[::1]:$((base + 5))"; }
 	);
 END
-"$INCODE" cube "$scratch/second.cube" > "$scratch/straps"
-nodes=
-while read -r straps; do
-    # shellcheck disable=SC2086
-    "$BUILD/"$straps 2> /dev/null < /dev/null &
-    nodes="$nodes $!"
-done < "$scratch/straps"
+start_nodes "$scratch/second.cube"
 same 'nodes that a user started' --cube "$scratch/second.cube"
 same 'the same nodes again' --cube "$scratch/second.cube"
 rm -f "$scratch/out.npy"
@@ -174,37 +290,10 @@ wait $host
 status=$?
 check 'links/node 0 lost, by the second wire' \
     "exit $status: $(last "$scratch/errors")" \
-    cmp -s "$scratch/first.npy" "$scratch/out.npy"
+    cmp -s "$first" "$scratch/out.npy"
 check 'links/node 0 lost in mid-run' 'no generation was begun for it' \
     test "$(stat_of "$scratch/stats.json" generations)" -gt 1
-# shellcheck disable=SC2086
-kill -KILL $nodes 2> /dev/null
-# shellcheck disable=SC2086
-wait $nodes 2> /dev/null
-
-# A wire that was never put in: where its end calls, nobody listens.
-cat > "$scratch/missing.cube" <<-END
-	dimension = 2;
-	start = [0, 1, 2];
-	links = (
-	    { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 60))"; },
-	    { node = 0; to = 1; tcp = "127.0.0.1:$((base + 61))";
-	      via = "127.0.0.1:$((base + 70))"; },
-	    { node = 0; to = 2; tcp = "127.0.0.1:$((base + 62))"; },
-	    { node = 1; to = 3; tcp = "127.0.0.1:$((base + 63))"; },
-	    { node = 2; to = 3; tcp = "127.0.0.1:$((base + 64))"; }
-	);
-END
-read -r straps < <("$INCODE" cube "$scratch/missing.cube" | grep -e '--node 3 ')
-# shellcheck disable=SC2086
-"$BUILD/"$straps 2> "$scratch/said" &
-node=$!
-same 'a wire that is missing' --cube "$scratch/missing.cube" --patience 5
-check 'links/a wire that is missing is named' "$(last "$scratch/errors")" \
-    grep -q '^incode: node 0 link 0: the wire to node 1 .*; ' "$scratch/errors"
-
-kill $node
-wait $node 2> /dev/null
+end_nodes
 
 # Nodes that nobody has told who they are, the host's neighbour last.
 cat > "$scratch/nameless.cube" <<-END
@@ -234,14 +323,4 @@ check 'links/a bad cube file' "exit $status: $(last "$scratch/errors")" \
     test $status = 3
 check 'links/a bad cube file: its line' "$(last "$scratch/errors")" \
     grep -qE "^incode: $scratch/bad.cube:[0-9]+: .*; " "$scratch/errors"
-
-timeout 60 "$INCODE" bench links > "$scratch/bench" 2> "$scratch/errors"
-status=$?
-check 'links/bench links' "exit $status: $(last "$scratch/errors")" \
-    test $status = 0
-for driver in 'tcp, loopback' 'tcp, with a key' 'serial, pseudo-terminal' \
-    'serial, paced to 115200 baud'; do
-    check "links/bench links: $driver" "$(cat "$scratch/bench")" \
-        grep -qE "^$driver +[0-9.]+ +(-|[0-9.]+ %) +[0-9]+ +[0-9]+ " \
-        "$scratch/bench"
-done
+gather

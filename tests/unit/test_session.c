@@ -120,6 +120,53 @@ static void greet_only(struct pair *p)
     }
 }
 
+/* Three ends: a third one in the place of the second. */
+static void an_end_may_keep_to_its_peer(void **unused)
+{
+    (void)unused;
+    struct link_config loyal = small;
+    loyal.keeps_peer = true;
+    struct pair *p = new_pair(&small, &perfect, 3);
+    p->ends[0].config = loyal;
+    start(p, 0, 77);
+    run(p, 50, 100, 1000000000);
+    struct end other = p->ends[1];
+    p->ends[1].memory = NULL;
+    /* Another start of that end: it is told, again and again, and the session
+     * is not touched. */
+    start(p, 1, 99);
+    for (unsigned i = 0; i < 25000; i++) {
+        p->now_us += 100;
+        for (unsigned who = 0; who < 2; who++) {
+            link_poll(p->ends[who].link, p->now_us);
+        }
+    }
+    assert_int_equal(link_peer(p->ends[1].link)->refusal, LINK_IN_USE);
+    assert_int_equal(link_state(p->ends[1].link), LINK_REFUSED);
+    assert_int_equal(link_statistics(p->ends[0].link)->sessions, 1);
+    assert_int_equal(link_peer(p->ends[0].link)->epoch, other.config.epoch);
+    assert_true(link_statistics(p->ends[0].link)->hellos_sent < 100);
+    struct end third = p->ends[1];
+    p->ends[1] = other;
+    p->ends[1].link = other.link;
+    run(p, 80, 100, 1000000000);
+    assert_int_equal(link_statistics(p->ends[0].link)->sessions, 1);
+    /* The first is gone for good: after a time the other has the link. */
+    p->ends[1] = third;
+    for (unsigned i = 0; i < 35000; i++) {
+        p->now_us += 100;
+        for (unsigned who = 0; who < 2; who++) {
+            link_poll(p->ends[who].link, p->now_us);
+        }
+        bool up = link_state(p->ends[1].link) == LINK_UP;
+        assert_true(!up || i > 29000);
+    }
+    assert_int_equal(link_state(p->ends[1].link), LINK_UP);
+    assert_int_equal(link_statistics(p->ends[0].link)->sessions, 2);
+    free(other.memory);
+    free_pair(p);
+}
+
 static void a_wrong_wire_is_named(void **unused)
 {
     (void)unused;
@@ -409,6 +456,7 @@ int main(void)
         cmocka_unit_test(a_cut_wire_goes_on_where_it_was),
         cmocka_unit_test(a_peer_that_stops_for_long_is_called_silent),
         cmocka_unit_test(a_restarted_peer_is_noticed),
+        cmocka_unit_test(an_end_may_keep_to_its_peer),
         cmocka_unit_test(a_wrong_wire_is_named),
         cmocka_unit_test(sizes_that_do_not_fit_are_refused),
         cmocka_unit_test(a_wire_to_itself_is_refused),

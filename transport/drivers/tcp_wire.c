@@ -341,6 +341,13 @@ void tcp_wire_close(struct tcp_wire *wire)
     }
 }
 
+void tcp_wire_rest(struct tcp_wire *wire, uint64_t rest_us)
+{
+    drop(&wire->candidate[0]);
+    (void)broken(wire);
+    wire->call_us = clock_us() + rest_us;
+}
+
 unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
 {
     unsigned used = 0;

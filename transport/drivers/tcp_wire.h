@@ -86,6 +86,10 @@ struct tcp_wire {
 int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config);
 void tcp_wire_close(struct tcp_wire *wire);
 
+/* At the end that calls: leaves the connection, and calls again after rest_us,
+ * as whoever has the other end needs it for another. */
+void tcp_wire_rest(struct tcp_wire *wire, uint64_t rest_us);
+
 struct link_pipe tcp_wire_pipe(struct tcp_wire *wire);
 
 /* What to wait for with poll(2): fills fds[TCP_WIRE_FDS_MAX], returns how
