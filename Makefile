@@ -109,6 +109,9 @@ $(BUILD)/commit: FORCE
 	@mkdir -p $(@D)
 	@echo '$(COMMIT)' | cmp -s - $@ || echo '$(COMMIT)' > $@
 
+# Vectors are written out where they pay; those that the compiler makes of loops
+# over three coordinates do not.
+$(core_objects): private BASE += -fno-tree-vectorize
 $(obj)/incode/%.o: incode/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<

@@ -10,41 +10,31 @@ _Static_assert((-1 >> 1) == -1, "shifts of negative numbers keep the sign");
 
 /* ---- from doubles to integers ---- */
 
-/* n = v * 2^k; 1 where that is no integer, else 0. */
-static inline int scaled(int64_t *n, double v, const struct incode_scale *s)
+/* Four coordinates, of which the fourth is 0: a register, or two. */
+typedef double four_d __attribute__((vector_size(32)));
+typedef int64_t four_i __attribute__((vector_size(32)));
+
+static inline four_d all4(double a)
 {
-    *n = (int64_t)(v * s->up1 * s->up2);
-    return (double)*n * s->down1 * s->down2 != v;
+    return (four_d){a, a, a, a};
 }
 
-/* Inlined for each count, so that the loops are straight code. */
-static inline __attribute__((always_inline)) bool
-differences(int64_t d[][3], const double *const p[], int count,
-            const double origin[3], const struct incode_scale *s)
+static inline four_d load3(const double p[3])
 {
-    double tail[4][3];
-    int bad = 0, inexact = 0;
-    for (int i = 0; i < count; i++) {
-        for (int k = 0; k < 3; k++) {
-            /* Knuth's two-sum: a - b = x + y without error. */
-            double a = p[i][k], b = origin[k];
-            double x = a - b, bv = a - x, av = x + bv;
-            double y = (a - av) + (bv - b);
-            bad |= scaled(&d[i][k], x, s);
-            inexact |= y != 0;
-            tail[i][k] = y;
-        }
-    }
-    if (bad != 0 || inexact == 0)
-        return bad == 0;
-    for (int i = 0; i < count; i++) {
-        for (int k = 0; k < 3; k++) {
-            int64_t n;
-            bad |= scaled(&n, tail[i][k], s);
-            d[i][k] += n;
-        }
-    }
-    return bad == 0;
+    return (four_d){p[0], p[1], p[2], 0};
+}
+
+/* n = v * 2^k; lanes where that is no integer are not 0. */
+static inline four_i scaled(four_i *n, four_d v, const struct incode_scale *s)
+{
+    *n = __builtin_convertvector(v * all4(s->up1) * all4(s->up2), four_i);
+    four_d back = __builtin_convertvector(*n, four_d);
+    return back * all4(s->down1) * all4(s->down2) != v;
+}
+
+static inline bool any4(four_i a)
+{
+    return (a[0] | a[1] | a[2]) != 0;
 }
 
 bool incode_fixed_differences(int64_t d[][3], const double *const p[],
@@ -53,14 +43,25 @@ bool incode_fixed_differences(int64_t d[][3], const double *const p[],
     struct incode_scale s;
     if (!incode_scale_init(&s, most))
         return false; /* where the two-sum could fail, too */
-    switch (count) {
-    case 2:
-        return differences(d, p, 2, origin, &s);
-    case 3:
-        return differences(d, p, 3, origin, &s);
-    default:
-        return differences(d, p, 4, origin, &s);
+    four_d b = load3(origin), tail[4];
+    four_i n[4], bad = {0}, inexact = {0};
+    for (int i = 0; i < count; i++) {
+        /* Knuth's two-sum: a - b = x + y without error. */
+        four_d a = load3(p[i]), x = a - b, bv = a - x, av = x + bv;
+        tail[i] = (a - av) + (bv - b);
+        bad |= scaled(&n[i], x, &s);
+        inexact |= tail[i] != all4(0);
     }
+    bool again = any4(inexact);
+    for (int i = 0; i < count; i++) {
+        four_i rest = {0};
+        if (again)
+            bad |= scaled(&rest, tail[i], &s);
+        n[i] += rest;
+        for (int k = 0; k < 3; k++)
+            d[i][k] = n[i][k];
+    }
+    return !any4(bad);
 }
 
 /* For incode_tie: the four points and the origin in order. */
