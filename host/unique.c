@@ -9,7 +9,8 @@
 
 enum {
     AHEAD = 16, /* rows hashed ahead, so that their slots come from memory */
-    FORK_ROWS = 1 << 13,
+    FORK_ROWS = 1 << 13, /* fewer rows are not worth a thread: to search, */
+    COPY_ROWS = 1 << 17, /* to copy */
     PARTS_MAX = 16
 };
 
@@ -169,6 +170,7 @@ static void fill_part(void *context, unsigned part)
 static void fill_items(struct search *s, struct host_unique *unique)
 {
     s->items = unique->items;
+    s->parts = s->rows < COPY_ROWS ? 1 : s->parts;
     host_fork_all(s->parts, count_part, s);
     for (unsigned i = 0; i < s->parts; i++) {
         s->first[i + 1] += s->first[i];

@@ -40,8 +40,6 @@ void incode_afl_clear(struct incode_afl *afl)
 {
     for (uint32_t i = 0; i <= afl->mask; i++)
         afl->heads[i] = INCODE_AFL_NIL;
-    for (uint32_t i = 0; i < afl->capacity; i++)
-        afl->nodes[i].next = i + 1 < afl->capacity ? i + 1 : INCODE_AFL_NIL;
     for (uint32_t i = 0; i <= afl->touched_mask; i++)
         afl->touched_heads[i] = INCODE_AFL_NIL;
     for (uint32_t i = 0; i < afl->touched_capacity; i++) {
@@ -49,7 +47,8 @@ void incode_afl_clear(struct incode_afl *afl)
         afl->touched[i].next =
             i + 1 < afl->touched_capacity ? i + 1 : INCODE_AFL_NIL;
     }
-    afl->free = afl->touched_free = 0;
+    afl->free = INCODE_AFL_NIL;
+    afl->unused = afl->touched_free = 0;
     afl->count = afl->touched_count = 0;
     afl->crowded = INCODE_NONE;
 }
@@ -110,6 +109,17 @@ static uint32_t *head_of(const struct incode_afl *afl, uint32_t key)
     return &afl->heads[(key * UINT32_C(2654435761) >> 7) & afl->mask];
 }
 
+static uint32_t take_node(struct incode_afl *afl)
+{
+    uint32_t i = afl->free;
+    if (i == INCODE_AFL_NIL) {
+        INCODE_ASSERT(afl->unused < afl->capacity);
+        return afl->unused++;
+    }
+    afl->free = afl->nodes[i].next;
+    return i;
+}
+
 static void unlink_node(struct incode_afl *afl, uint32_t *link)
 {
     uint32_t i = *link;
@@ -144,10 +154,8 @@ void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
 {
     if (incode_afl_close_twin(afl, key, b, c))
         return;
-    uint32_t i = afl->free;
-    INCODE_ASSERT(i != INCODE_AFL_NIL);
+    uint32_t i = take_node(afl);
     struct incode_afl_node *node = &afl->nodes[i];
-    afl->free = node->next;
     uint32_t *head = head_of(afl, key);
     *node = (struct incode_afl_node){key, b, c, *head};
     *head = i;

@@ -358,8 +358,9 @@ int main(int argc, char **argv)
         return 4;
     }
     board.arena_bytes = (straps.memory - board.fixed_bytes) / PAGE * PAGE;
+    /* All of it at once: no page is to be found missing while others wait. */
     board.arena = mmap(NULL, board.arena_bytes, PROT_READ | PROT_WRITE,
-                       MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
     if (board.arena == MAP_FAILED) {
         complain("the kernel does not grant --memory; is it limited?");
         return 4;
