@@ -8,7 +8,8 @@ enum {
     CHECK_EVERY_US = 20000,
     ELAPSED_US_MAX = 100000,   /* a host that was stopped blames nobody */
     CALLS_EVERY_US = 250000,   /* all nodes once, */
-    CALL_EVERY_US = 5000,      /* but no more than one node in this time */
+    CALL_EVERY_US = 5000,      /* but no more than one node in this time, */
+    CALLS_DUE_MAX = 8,         /* and none while so many wait for the wire */
     CALL_AGAIN_US = 2000000,   /* a call may have been lost with a node; */
     CALL_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
     PROBE_US = 3000000,
@@ -151,13 +152,24 @@ int host_watch_answer(struct host_service *service,
         s->loss = true;
     }
     node->calling = false;
+    node->call_due = false; /* what would have been asked again, is answered */
     if (first && s->probing) {
         call_next(s);
     }
     return 0;
 }
 
-/* Has each node called once a period, one after the other. */
+static unsigned calls_due(const struct host_service *s)
+{
+    unsigned due = 0;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        due += s->node[i].call_due;
+    }
+    return due;
+}
+
+/* Has each node called once a period, one after the other; less often where
+ * the wire is too slow for that and for the work. */
 static void call_in_turn(struct host_service *s, uint64_t now_us)
 {
     if (s->probing) {
@@ -165,10 +177,16 @@ static void call_in_turn(struct host_service *s, uint64_t now_us)
     }
     uint64_t every = CALLS_EVERY_US / s->machine->nodes;
     every = every < CALL_EVERY_US ? CALL_EVERY_US : every;
-    for (unsigned i = 0; i < s->machine->nodes && now_us - s->call_us >= every;
+    if (now_us - s->call_us < every) {
+        return;
+    }
+    unsigned due = calls_due(s);
+    for (unsigned i = 0; i < s->machine->nodes && due < CALLS_DUE_MAX &&
+                         now_us - s->call_us >= every;
          i++) {
         struct host_node *node = &s->node[s->call_turn];
         if (!node->lost && !node->calling) {
+            due += !node->call_due;
             node->call_due = true;
             node->called_us = now_us;
         }
