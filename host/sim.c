@@ -12,6 +12,7 @@ enum {
     LASTING_MAX = 32, /* faults that are to be taken back */
     TRIES_MAX = 50,   /* for a kind of fault that is wanted and possible */
     REBOOT_US = 3000,
+    HOST_US_CALM = 200,       /* for a look at the clock, at most, in the end */
     TIME_US_MAX = 1800000000, /* half an hour in virtual time, */
     STEPS_MAX = 60000000      /* or so many steps: it hangs */
 };
@@ -173,6 +174,9 @@ static void strike(void *context)
     if (w->now_us >= r->calm_us) {
         mend(r, true);
         weather(r, false);
+        if (w->options.host_us > HOST_US_CALM) {
+            w->options.host_us = HOST_US_CALM;
+        }
         return;
     }
     if (w->now_us >= r->event_us && !r->broken) {

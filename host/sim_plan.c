@@ -8,7 +8,10 @@ const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
     "slow-host", "tiny",    "dead-wire", "dead-node"};
 
 /* A slow wire does not wake its node for every byte. */
-enum { FIFO_BYTES = 64 };
+enum {
+    FIFO_BYTES = 64,
+    SPHERE_MAX = 150 /* points of that kind on a large cube */
+};
 
 /* Numbers of nodes, by weight. */
 static const struct {
@@ -54,6 +57,10 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
                     : p->index == INCODE_GRID ? 1000
                                               : 300;
     p->points = host_world_draw_log(state, 30, most);
+    if (p->nodes > 64 && strcmp(p->kind, "sphere") == 0 &&
+        p->points > SPHERE_MAX) {
+        p->points = SPHERE_MAX; /* every node asks for nearly all */
+    }
     if (p->wanted[HOST_SIM_TINY] && p->nodes <= 8) {
         /* What the least memory does not hold. */
         p->index = INCODE_KD;
