@@ -31,7 +31,8 @@ enum {
     KEY_HOST_RATE_TIME,
     KEY_HOST_UNPLUG,
     KEY_SEED,
-    KEY_NODE_PROGRAM
+    KEY_NODE_PROGRAM,
+    KEY_END
 };
 
 static const struct argp_option options_of_run[] = {
@@ -109,6 +110,7 @@ static const struct argp_option options_of_run[] = {
 struct parse {
     struct host_run_options *options;
     struct host_error *error;
+    uint64_t given; /* bits of keys from KEY_STRATEGY on */
 };
 
 int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
@@ -347,6 +349,9 @@ static error_t parse_report(int key, char *value, struct argp_state *state,
 static error_t parse_option(int key, char *value, struct argp_state *state)
 {
     struct parse *p = state->input;
+    if (key >= KEY_STRATEGY && key < KEY_END) {
+        p->given |= UINT64_C(1) << (key - KEY_STRATEGY);
+    }
     if (parse_names(key, value, p) || parse_testing(key, value, p)) {
         return 0;
     }
@@ -379,6 +384,40 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     }
 }
 
+static bool given(const struct parse *p, int key)
+{
+    return (p->given >> (key - KEY_STRATEGY) & 1) != 0;
+}
+
+/* An option that would change nothing is a misunderstanding. */
+static int check_together(const struct parse *p)
+{
+    const struct host_run_options *o = p->options;
+    bool cube = o->cube != NULL, mpi = !cube && o->link == HOST_WIRE_MPI;
+    const struct {
+        int key;
+        bool vain;
+        const char *why;
+    } options[] = {
+        {KEY_MEMORY, cube, "--memory: the cube file of --cube says it"},
+        {KEY_LINK, cube, "--link: the cube file of --cube says it"},
+        {KEY_WINDOW, cube, "--window: the cube file of --cube says it"},
+        {KEY_HOST_UNPLUG, cube || o->link != HOST_WIRE_SERIAL,
+         "--host-unplug: goes with --link serial alone"},
+        {KEY_NODE_PROGRAM, mpi, "--node-program: not with --link mpi"},
+        {KEY_HOST_RATE_TIME, !given(p, KEY_HOST_RATE),
+         "--host-rate-time: goes with --host-rate alone"},
+        {KEY_SEED, !given(p, KEY_HOST_STALL),
+         "--seed: goes with --host-stall alone"}};
+    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
+        if (options[i].vain && given(p, options[i].key)) {
+            return host_fail(p->error, HOST_USAGE, "%s; leave it out",
+                             options[i].why);
+        }
+    }
+    return 0;
+}
+
 /* flags: of argp_parse. */
 static int parse_run(int argc, char **argv, unsigned flags,
                      struct host_run_options *options, struct host_error *error)
@@ -401,7 +440,7 @@ static int parse_run(int argc, char **argv, unsigned flags,
         NULL,
         NULL,
         NULL};
-    struct parse parse = {options, error};
+    struct parse parse = {options, error, 0};
     host_run_defaults(options);
     if (argp_parse(&argp, argc, argv, flags, NULL, &parse) != 0) {
         return host_fail(error, HOST_USAGE,
@@ -411,7 +450,7 @@ static int parse_run(int argc, char **argv, unsigned flags,
         options->hindrance.slow_us == 0) {
         options->hindrance.slow_us = 30000000;
     }
-    return error->code;
+    return error->code != 0 ? error->code : check_together(&parse);
 }
 
 int host_arguments_run(int argc, char **argv, struct host_run_options *options,

@@ -223,25 +223,27 @@ static void reap(struct host_process *process, int flags)
     }
 }
 
-static int describe(unsigned node, const struct host_process *process,
+static int describe(const struct host_cluster *cluster, unsigned node,
                     struct host_error *error)
 {
+    const struct host_process *process = &cluster->process[node];
     int status = process->status;
+    unsigned link = host_link_to(node, 0, cluster->dimension);
     if (WIFSIGNALED(status)) {
         int number = WTERMSIG(status);
         return host_fail(
             error, HOST_CUBE,
-            "node %u: ended %u times, the last by signal %d (%s)%s; "
+            "node %u link %u: ended %u times, the last by signal %d (%s)%s; "
             "run again, and look for what stopped it",
-            node, process->deaths, number, strsignal(number),
+            node, link, process->deaths, number, strsignal(number),
             number == SIGILL    ? ", an invariant failed"
             : number == SIGSEGV ? ", perhaps out of its memory"
                                 : "");
     }
     return host_fail(error, HOST_CUBE,
-                     "node %u: ended %u times, the last with status %d; see "
-                     "what it printed, and run again",
-                     node, process->deaths, WEXITSTATUS(status));
+                     "node %u link %u: ended %u times, the last with status "
+                     "%d; see what it printed, and run again",
+                     node, link, process->deaths, WEXITSTATUS(status));
 }
 
 /* Whether a node has died too often to be started again.  What kills from
@@ -271,7 +273,7 @@ int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
             continue;
         }
         if (hopeless(process)) {
-            return describe(i, process, error);
+            return describe(cluster, i, error);
         }
         if (start_node(cluster, i, error) != 0) {
             return error->code;

@@ -196,7 +196,7 @@ static int take_fault(const struct cube_message *message,
     text[size] = '\0';
     return host_fail(error, HOST_CUBE, "node %u: %s; %s", message->source, text,
                      strstr(text, "memory") != NULL
-                         ? "run with a larger --memory"
+                         ? "give the nodes more memory"
                          : "please report this with the points");
 }
 

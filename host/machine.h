@@ -58,4 +58,13 @@ struct host_machine {
     void (*stop)(void *context);
 };
 
+/* The link by which a node is reached from the gate, the last of e-cube's way;
+ * of the gate, the host's wire. */
+static inline unsigned host_link_to(unsigned node, unsigned gate,
+                                    unsigned dimension)
+{
+    unsigned away = node ^ gate;
+    return away == 0 ? dimension : 31u - (unsigned)__builtin_clz(away);
+}
+
 #endif

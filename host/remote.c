@@ -142,18 +142,19 @@ static void machine_idle(void *context, uint64_t wait_us)
 static int restart(struct host_remote *r, unsigned node, int status,
                    struct host_error *error)
 {
+    unsigned link = host_link_to(node, 0, r->file->dimension);
     r->process[node].pid = 0;
     if (WIFEXITED(status) && WEXITSTATUS(status) != 0) {
         return host_fail(error, HOST_CUBE,
-                         "node %u: ended with status %d; see what it printed, "
-                         "and run again",
-                         node, WEXITSTATUS(status));
+                         "node %u link %u: ended with status %d; see what it "
+                         "printed, and run again",
+                         node, link, WEXITSTATUS(status));
     }
     if (++r->process[node].deaths > HOST_REMOTE_DEATHS_MAX) {
         return host_fail(error, HOST_CUBE,
-                         "node %u: ended %u times; look for what ends it, and "
-                         "run again",
-                         node, r->process[node].deaths);
+                         "node %u link %u: ended %u times; look for what ends "
+                         "it, and run again",
+                         node, link, r->process[node].deaths);
     }
     r->restarts++;
     return start_node(r, node, error);
@@ -254,6 +255,16 @@ struct host_machine host_remote_machine(struct host_remote *remote)
 /* One run a program. */
 static struct host_cube_file the_file;
 
+/* Whether there are nodes that the host starts. */
+static bool starts_some(const struct host_cube_file *file)
+{
+    bool some = false;
+    for (unsigned i = 0; i < file->nodes; i++) {
+        some = some || file->local[i];
+    }
+    return some;
+}
+
 static int begin(const struct host_run_options *options,
                  struct host_run_result *result, struct host_machine *machine,
                  struct host_error *error)
@@ -261,12 +272,9 @@ static int begin(const struct host_run_options *options,
     static struct host_remote remote;
     static char program[4096];
     (void)result;
-    bool needed = false;
-    for (unsigned i = 0; i < the_file.nodes; i++) {
-        needed = needed || the_file.local[i];
-    }
-    if ((needed && host_cluster_program(options->node_program, program,
-                                        sizeof program, error) != 0) ||
+    if ((starts_some(&the_file) &&
+         host_cluster_program(options->node_program, program, sizeof program,
+                              error) != 0) ||
         host_remote_start(&remote, &the_file, program, error) != 0) {
         return error->code;
     }
@@ -290,6 +298,12 @@ int host_remote_prepare(struct host_run_options *options,
         return host_fail(error, HOST_USAGE,
                          "--table: compares with one node, and the cube of %s "
                          "has its own; leave it out",
+                         options->cube);
+    }
+    if (options->node_program != NULL && !starts_some(&the_file)) {
+        return host_fail(error, HOST_USAGE,
+                         "--node-program: the host starts none of the nodes of "
+                         "%s; leave it out",
                          options->cube);
     }
     options->nodes = the_file.nodes;

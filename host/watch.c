@@ -124,9 +124,10 @@ int host_watch_answer(struct host_service *service,
     struct node_here_message here;
     if (message->size != sizeof here) {
         return host_fail(error, HOST_CUBE,
-                         "node %u: is here in another language; are host and "
-                         "node of one version? run make",
-                         message->source);
+                         "node %u link %u: is here in another language; are "
+                         "host and node of one version? run make",
+                         message->source,
+                         host_watch_link(service, message->source));
     }
     memcpy(&here, message->data, sizeof here);
     if (node->start != 0 && node->start != here.start) {
@@ -202,9 +203,8 @@ static void call_in_turn(struct host_service *s, uint64_t now_us)
 
 unsigned host_watch_link(const struct host_service *service, unsigned node)
 {
-    unsigned away = node ^ cube_wiring(service->cube)->gate;
-    return away == 0 ? service->machine->dimension
-                     : 31u - (unsigned)__builtin_clz(away);
+    return host_link_to(node, cube_wiring(service->cube)->gate,
+                        service->machine->dimension);
 }
 
 static int fail_wrong(const struct host_service *s, struct host_error *error)

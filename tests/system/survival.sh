@@ -130,11 +130,13 @@ check 'survival/they were started again' 'not both' test \
 
 # --- it cannot go on ---------------------------------------------------------
 
-# hopeless NAME PROGRAM: exit 4 within 10 s, a node named, no output left.
+# hopeless NAME PROGRAM: exit 4 within 10 s, node and link named, no output
+# left.
 hopeless() {
     local began=$SECONDS
-    refuses "survival/$1" 4 '^incode: node [0-7]' "$INCODE" run "$points" -q \
-        --nodes 8 --node-program "$2" -o "$scratch/left/out.npy"
+    refuses "survival/$1" 4 '^incode: node [0-7] link [0-3]: ' \
+        "$INCODE" run "$points" -q --nodes 8 --node-program "$2" \
+        -o "$scratch/left/out.npy"
     check "survival/$1: within 10 s" "$((SECONDS - began)) s" \
         test $((SECONDS - began)) -le 10
 }
@@ -152,6 +154,6 @@ wait $host
 status=$?
 check 'survival/a node killed for ever: exit 4, named' \
     "exit $status: $(last "$scratch/errors")" \
-    test $status = 4 -a -n "$(grep '^incode: node 3: ' "$scratch/errors")"
+    test $status = 4 -a -n "$(grep '^incode: node 3 link 1: ' "$scratch/errors")"
 check 'survival/a node killed for ever: no output' 'it left one' \
     test ! -e "$scratch/out.npy"

@@ -160,12 +160,40 @@ static void test_refused(void **unused)
     }
 }
 
+/* What would change nothing is refused, and what goes with it is not. */
+static void test_in_vain(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *vain, *beside, *with;
+    } cases[] = {{"--memory=1M", "--cube=lab.cube", "--nodes=2"},
+                 {"--link=tcp", "--cube=lab.cube", "--nodes=2"},
+                 {"--link=mpi", "--cube=lab.cube", "--nodes=2"},
+                 {"--window=4", "--cube=lab.cube", "--nodes=2"},
+                 {"--host-unplug=99", "--link=tcp", "--link=serial"},
+                 {"--host-unplug=99", "--cube=lab.cube", "--link=serial"},
+                 {"--node-program=node", "--link=mpi", "--cube=lab.cube"},
+                 {"--host-rate-time=4", "--nodes=2", "--host-rate=9"},
+                 {"--seed=4", "--nodes=2", "--host-stall=9"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct host_run_options o;
+        struct host_error error;
+        const char *words[] = {"a.xyz", cases[i].vain, cases[i].beside, NULL};
+        size_t name = strcspn(cases[i].vain, "=");
+        assert_int_equal(parse(words, &o, &error), HOST_USAGE);
+        assert_memory_equal(error.text, cases[i].vain, name);
+        assert_non_null(strstr(error.text, "; leave it out"));
+        words[2] = cases[i].with;
+        assert_int_equal(parse(words, &o, &error), 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bytes),    cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_defaults), cmocka_unit_test(test_options),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_refused),  cmocka_unit_test(test_in_vain),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
