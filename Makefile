@@ -48,7 +48,7 @@ drivers      := $(filter-out %/mpi.c,$(wildcard transport/drivers/*.c))
 # Those that need what a static node has not.
 host_drivers := transport/drivers/serial_port.c
 node_drivers := $(filter-out $(host_drivers),$(drivers))
-board        := $(wildcard boards/linux/*.c)
+board        := $(wildcard boards/*.c boards/linux/*.c)
 host         := $(wildcard host/*.c)
 unit         := $(wildcard tests/unit/test_*.c)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
@@ -63,7 +63,8 @@ node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 mpi_host     := $(obj)/host/mpi/main.o $(obj)/host/mpi/ranks.o \
 	$(obj)/host/mpi/bench.o \
 	$(obj)/transport/drivers/mpi.o
-mpi_node     := $(obj)/boards/mpi/main.o $(obj)/transport/drivers/mpi.o
+mpi_node     := $(obj)/boards/mpi/main.o $(obj)/boards/process.o \
+	$(obj)/transport/drivers/mpi.o
 unit_tests   := $(unit:tests/unit/%.c=$(BUILD)/tests/%)
 fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 

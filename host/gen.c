@@ -205,7 +205,8 @@ int host_gen(const char *kind, uint64_t n, uint64_t seed,
     *points = (struct host_points){0};
     if (n < 4 || n >= UINT32_MAX) {
         return host_fail(error, HOST_USAGE,
-                         "gen: %llu points; ask for 4 to 4294967294",
+                         "gen: %llu points: too few or too many; ask for 4 to "
+                         "4294967294",
                          (unsigned long long)n);
     }
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
@@ -220,6 +221,6 @@ int host_gen(const char *kind, uint64_t n, uint64_t seed,
         }
     }
     return host_fail(error, HOST_USAGE,
-                     "gen: '%s' is no kind of point set; use one of %s", kind,
+                     "gen %s: no kind of point set; use one of %s", kind,
                      host_gen_kinds);
 }

@@ -125,9 +125,9 @@ static int command_gen(int argc, char **argv, struct host_error *error)
           2, &s);
     if (host_parse_number(s.argument[1], 4, UINT32_MAX - 1, &n) != 0) {
         return host_fail(error, HOST_USAGE,
-                         "gen: %s: not a number of points; give 4 to "
+                         "gen %s %s: not a number of points; give 4 to "
                          "4294967294",
-                         s.argument[1]);
+                         s.argument[0], s.argument[1]);
     }
     int status = host_gen(s.argument[0], n, s.seed, &points, error);
     if (status == 0) {

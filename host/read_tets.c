@@ -5,13 +5,19 @@
 #include "readers.h"
 #include "scan.h"
 
+/* The tetrahedron on the line that is being read. */
 static int append(struct host_mesh *mesh, const uint64_t number[4],
                   uint64_t base, const struct host_source *source,
-                  struct host_error *error)
+                  const struct host_scan *s, struct host_error *error)
 {
     uint64_t v[4];
     for (int k = 0; k < 4; k++) {
-        v[k] = number[k] < base ? UINT32_MAX : number[k] - base;
+        v[k] = number[k] - base;
+        if (number[k] < base || v[k] >= UINT32_MAX) {
+            return host_scan_fail(s, s->at, error,
+                                  "a vertex of this tetrahedron is no row of "
+                                  "points; correct it");
+        }
     }
     return mesh->tets == NULL
                ? 0
@@ -55,10 +61,10 @@ int host_read_ele(const struct host_source *source, struct host_mesh *mesh,
                 return error->code;
             }
         }
-        host_scan_next_line(&s); /* attributes */
-        if (append(mesh, v, base, source, error) != 0) {
+        if (append(mesh, v, base, source, &s, error) != 0) {
             return error->code;
         }
+        host_scan_next_line(&s); /* attributes */
     }
     return 0;
 }
@@ -141,7 +147,7 @@ static int msh_elements(const struct host_source *source, struct host_scan *s,
                 return error->code;
             }
         }
-        if (append(mesh, v, 1, source, error) != 0) {
+        if (append(mesh, v, 1, source, s, error) != 0) {
             return error->code;
         }
     }
@@ -215,7 +221,7 @@ static int medit_tetrahedra(const struct host_source *source,
                 return error->code;
             }
         }
-        if (append(mesh, v, 1, source, error) != 0) {
+        if (append(mesh, v, 1, source, s, error) != 0) {
             return error->code;
         }
     }

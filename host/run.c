@@ -181,10 +181,11 @@ static int check_memory(const struct host_run_options *options, unsigned nodes,
     return needed <= options->memory
                ? 0
                : host_fail(error, HOST_USAGE,
-                           "--memory %lluK: index %s on %u nodes needs at "
-                           "least %lluK; give that, or another --index",
+                           "--memory %lluK: index %s on %u node%s needs "
+                           "at least %lluK; give that, or another --index",
                            (unsigned long long)options->memory / 1024,
                            host_index_name(options->index), nodes,
+                           nodes == 1 ? "" : "s",
                            (unsigned long long)needed / 1024);
 }
 

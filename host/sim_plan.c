@@ -171,8 +171,9 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
 void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)
 {
     static const char *const indexes[] = {"naive", "grid", "kd"};
-    fprintf(file, "%llu points %s, %u nodes, %s, %s, %s, %s;",
+    fprintf(file, "%llu points %s, %u node%s, %s, %s, %s, %s;",
             (unsigned long long)plan->points, plan->kind, plan->nodes,
+            plan->nodes == 1 ? "" : "s",
             plan->sequential ? "sequential" : "spatial",
             plan->partition == HOST_UNIFORM ? "uniform" : "adaptive",
             indexes[plan->index],

@@ -117,10 +117,11 @@ static void run_seed(uint64_t seed, unsigned nodes, struct totals *totals,
 
 static void print_totals(const struct totals *t, double seconds)
 {
-    printf("%llu seeds, %llu failed; %llu restarts, %.0f s in virtual time, "
+    printf("%llu seed%s, %llu failed; %llu restart%s, %.0f s in virtual time, "
            "%.1f in ours, %.0f seeds an hour\n",
-           (unsigned long long)t->seeds, (unsigned long long)t->failed,
-           (unsigned long long)t->restarts, 1e-6 * (double)t->time_us, seconds,
+           (unsigned long long)t->seeds, t->seeds == 1 ? "" : "s",
+           (unsigned long long)t->failed, (unsigned long long)t->restarts,
+           t->restarts == 1 ? "" : "s", 1e-6 * (double)t->time_us, seconds,
            seconds > 0 ? 3600 * (double)t->seeds / seconds : 0);
     printf("%-12s %12s %8s  while work was open\n", "fault", "strikes",
            "seeds");

@@ -293,9 +293,10 @@ static void verdict(struct verify *v)
     if (v->error->code == 0 && r->faults > 0) {
         int length = (int)strcspn(r->text, "\n");
         host_fail(v->error, HOST_UNVERIFIED,
-                  "verify: %llu faults, the first: %.*s; this is not the "
+                  "verify: %llu fault%s, the first: %.*s; this is not the "
                   "Delaunay triangulation of these points, make it again",
-                  (unsigned long long)r->faults, length, r->text);
+                  (unsigned long long)r->faults, r->faults == 1 ? "" : "s",
+                  length, r->text);
     }
 }
 

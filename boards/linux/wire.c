@@ -1,5 +1,6 @@
 #include "wire.h"
 
+#include <errno.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,28 +24,36 @@ void linux_wire_inherit(struct linux_wire *wire, int fd)
 
 /* --- wires that the node opens itself ------------------------------------- */
 
-static const char *open_net(struct linux_wire *wire, const char *address,
-                            bool listens, const uint8_t *key, const char **told)
+static bool open_net(struct linux_wire *wire, const char *address, bool listens,
+                     const uint8_t *key, struct linux_fault *fault)
 {
     struct tcp_wire_config config = {.listens = listens, .key = key};
     if (tcp_address_parse(&config.address, address) != 0) {
-        return "--wire: not an address in numbers with a port, as in "
-               "10.0.0.7:7001 or [2001:db8::7]:7001";
+        fault->what = "not an address in numbers with a port";
+        fault->next = "write 10.0.0.7:7001 or [2001:db8::7]:7001";
+        return false;
     }
     config.suite = key == NULL ? NULL : &secure_sodium;
     if (key == NULL && !tcp_address_is_loopback(&config.address)) {
         if (!listens) {
-            return "--wire: calls another machine without a key; give --key";
+            fault->what = "calls another machine without a key";
+            fault->next = "give --key";
+            return false;
         }
-        *told = "no --key: listens for this machine's own programs only";
+        fault_print(&(struct linux_fault){
+            .where = "no --key",
+            .what = "listens for this machine's own programs only"});
         tcp_address_to_loopback(&config.address);
     }
     wire->kind = LINUX_NET;
     if (tcp_wire_open(wire->net, &config) != 0) {
-        return "--wire: cannot listen there; is the port taken, or the "
-               "address another machine's?";
+        fault->what = "cannot listen there";
+        fault->reason = errno;
+        fault->next = "end what has that port, or give an address of this "
+                      "machine";
+        return false;
     }
-    return NULL;
+    return true;
 }
 
 /* A port that is not there, or vanished, is looked for from time to time. */
@@ -62,6 +71,7 @@ static void recover(void *context)
     }
     wire->look_us = now_us;
     int fd = serial_open(wire->device, wire->baud, wire->rts_cts);
+    wire->reason = fd < 0 ? errno : 0;
     if (fd >= 0) {
         serial_pipe_init(&wire->line, fd, wire->baud);
         wire->line.recover = recover;
@@ -69,14 +79,17 @@ static void recover(void *context)
     }
 }
 
-static const char *open_line(struct linux_wire *wire, const char *text)
+static bool open_line(struct linux_wire *wire, const char *text,
+                      struct linux_fault *fault)
 {
     const char *baud = strchr(text, ':');
     const char *flow = baud == NULL ? NULL : strchr(baud + 1, ':');
     if (baud == NULL || (size_t)(baud - text) >= sizeof wire->device ||
         (flow != NULL && strcmp(flow, ":rtscts") != 0)) {
-        return "--wire: not as in serial:/dev/ttyS0:115200 or "
-               "serial:/dev/ttyS0:115200:rtscts";
+        fault->what = "not a device and its rate";
+        fault->next = "write serial:/dev/ttyS0:115200 or "
+                      "serial:/dev/ttyS0:115200:rtscts";
+        return false;
     }
     memcpy(wire->device, text, (size_t)(baud - text));
     wire->kind = LINUX_TERMINAL;
@@ -86,31 +99,33 @@ static const char *open_line(struct linux_wire *wire, const char *text)
     wire->line.recover = recover;
     wire->line.context = wire;
     recover(wire);
-    return wire->line.fd >= 0 || access(wire->device, F_OK) != 0
-               ? NULL
-               : "--wire: the port does not open so; is it in use, and the "
-                 "rate one that it knows?";
+    if (wire->line.fd < 0 && access(wire->device, F_OK) == 0) {
+        fault->what = "does not open so";
+        fault->reason = wire->reason;
+        fault->next = "end who uses it, or give a rate that it knows";
+        return false;
+    }
+    return true;
 }
 
-const char *linux_wire_open(struct linux_wire *wire, const char *text,
-                            const uint8_t *key, struct tcp_wire *net,
-                            const char **told)
+bool linux_wire_open(struct linux_wire *wire, const char *text,
+                     const uint8_t *key, struct tcp_wire *net,
+                     struct linux_fault *fault)
 {
     memset(wire, 0, sizeof *wire);
     wire->net = net;
     if (strncmp(text, "listen:", 7) == 0) {
-        return open_net(wire, text + 7, true, key, told);
+        return open_net(wire, text + 7, true, key, fault);
     }
     if (strncmp(text, "call:", 5) == 0) {
-        return open_net(wire, text + 5, false, key, told);
+        return open_net(wire, text + 5, false, key, fault);
     }
     if (strncmp(text, "serial:", 7) == 0) {
-        return open_line(wire, text + 7);
+        return open_line(wire, text + 7, fault);
     }
-    return "--wire: not one of listen:, call: and serial:";
+    fault->what = "not one of listen:, call: and serial:";
+    return false;
 }
-
-/* --- all kinds ------------------------------------------------------------ */
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire)
 {

@@ -4,7 +4,7 @@
  * tcp_wire, in memory that is given.  Work: as the drivers'.
  *
  *     linux_wire_inherit(&wire[0], fd);
- *     linux_wire_open(&wire[1], "call:10.0.0.7:7001", key, &tcp_wire);
+ *     linux_wire_open(&wire[1], "call:10.0.0.7:7001", key, &net, &fault);
  *     board.pipes[0] = linux_wire_pipe(&wire[0]);
  *     linux_wires_idle(wire, count, wait_us);
  */
@@ -14,6 +14,7 @@
 #include "../../transport/cube.h"
 #include "../../transport/drivers/serial.h"
 #include "../../transport/drivers/tcp_wire.h"
+#include "fault.h"
 
 enum linux_wire_kind { LINUX_SOCKET, LINUX_TERMINAL, LINUX_NET };
 
@@ -25,7 +26,8 @@ struct linux_wire {
     char device[64];         /* of a terminal that was opened here */
     uint32_t baud;
     bool rts_cts;
-    uint64_t look_us; /* when it was last looked for */
+    uint64_t look_us; /* when it was last looked for, */
+    int reason;       /* errno of that; 0: it was there */
 };
 
 /* An open file that the one who started the node gave it. */
@@ -33,11 +35,10 @@ void linux_wire_inherit(struct linux_wire *wire, int fd);
 
 /* "listen:ADDRESS:PORT", "call:ADDRESS:PORT" (addresses in numbers),
  * "serial:DEVICE:BAUD" or "serial:DEVICE:BAUD:rtscts".  key: of
- * the cube, or NULL.  NULL, or what is wrong.  *told: what the user should
- * know. */
-const char *linux_wire_open(struct linux_wire *wire, const char *text,
-                            const uint8_t *key, struct tcp_wire *net,
-                            const char **told);
+ * the cube, or NULL.  False: *fault says what is wrong, and not where. */
+bool linux_wire_open(struct linux_wire *wire, const char *text,
+                     const uint8_t *key, struct tcp_wire *net,
+                     struct linux_fault *fault);
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 

@@ -10,7 +10,6 @@
  *     mpirun -np 9 incode run --link mpi ...      becomes this in ranks 1 .. 8
  */
 #include <errno.h>
-#include <link.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,9 +21,9 @@
 
 #include "../../node/node.h"
 #include "../../transport/drivers/mpi.h"
+#include "../process.h"
 
 enum {
-    PAGE = 4096,
     STACK_BYTES = 65536, /* of a node's memory */
     STEPS_A_LOOK = 16,   /* between looks for orders */
     PART_US_MAX = 60000000,
@@ -56,39 +55,16 @@ static void stay_a_moment(int signal)
     _exit(143);
 }
 
-/* Adds the writable segments of the program itself, the first of the list. */
-static int add_segments(struct dl_phdr_info *info, size_t size, void *context)
-{
-    uint64_t *bytes = context;
-    (void)size;
-    for (unsigned i = 0; i < info->dlpi_phnum; i++) {
-        const ElfW(Phdr) *header = &info->dlpi_phdr[i];
-        if (header->p_type == PT_LOAD && (header->p_flags & PF_W) != 0) {
-            uint64_t from = header->p_vaddr / PAGE * PAGE;
-            uint64_t to = header->p_vaddr + header->p_memsz;
-            *bytes += (to - from + PAGE - 1) / PAGE * PAGE;
-        }
-    }
-    return 1;
-}
-
-static uint64_t clock_us(clockid_t clock)
-{
-    struct timespec now;
-    clock_gettime(clock, &now);
-    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
-}
-
 static uint64_t now_us(void *context)
 {
     (void)context;
-    return clock_us(CLOCK_MONOTONIC);
+    return process_clock_us(CLOCK_MONOTONIC);
 }
 
 static uint64_t busy_us(void *context)
 {
     const struct mpi_board *b = context;
-    return clock_us(CLOCK_PROCESS_CPUTIME_ID) - b->busy_us;
+    return process_clock_us(CLOCK_PROCESS_CPUTIME_ID) - b->busy_us;
 }
 
 static void idle(void *context, uint64_t wait_us)
@@ -132,22 +108,22 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
                   struct node_board *board)
 {
     unsigned self = (unsigned)b->place.rank - 1;
-    uint64_t fixed = STACK_BYTES;
+    size_t fixed = process_static_bytes() + STACK_BYTES;
     memset(board, 0, sizeof *board);
-    (void)dl_iterate_phdr(add_segments, &fixed);
-    if (order->dimension > CUBE_DIMENSION_MAX || order->memory < fixed + PAGE) {
+    if (order->dimension > CUBE_DIMENSION_MAX ||
+        order->memory < fixed + PROCESS_PAGE) {
         give_up(self, "the host's order is not sound; are all machines of one "
                       "version?");
     }
-    board->fixed_bytes = (size_t)fixed;
-    board->arena_bytes = (size_t)(order->memory - fixed) / PAGE * PAGE;
-    board->arena = mmap(NULL, board->arena_bytes, PROT_READ | PROT_WRITE,
-                        MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    board->fixed_bytes = fixed;
+    board->arena_bytes =
+        (size_t)(order->memory - fixed) / PROCESS_PAGE * PROCESS_PAGE;
+    board->arena = process_arena(board->arena_bytes);
     b->tag = order->tag;
     b->links =
         order->dimension + (self < order->host_wires || self == 0 ? 1u : 0u);
     b->pipes = calloc(CUBE_LINKS_MAX, sizeof *b->pipes);
-    if (board->arena == MAP_FAILED || b->pipes == NULL) {
+    if (board->arena == NULL || b->pipes == NULL) {
         give_up(self, "this machine does not grant a node's memory");
     }
     for (unsigned d = 0; d < b->links; d++) {
@@ -155,7 +131,7 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
         mpi_pipe_open(&b->pipes[d], &b->place, peer, (int)order->tag);
         board->pipes[d] = mpi_link_pipe(&b->pipes[d]);
     }
-    b->busy_us = clock_us(CLOCK_PROCESS_CPUTIME_ID);
+    b->busy_us = process_clock_us(CLOCK_PROCESS_CPUTIME_ID);
     board->context = b;
     board->identity.self = (uint16_t)self;
     board->identity.dimension = (uint8_t)order->dimension;

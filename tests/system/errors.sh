@@ -164,3 +164,33 @@ for arguments in --help --version 'run --help' 'gen --help' 'verify --help' \
     "$INCODE" $arguments > "$scratch/help" 2>&1
     check "$arguments" "exit $?" test $? = 0 -a -s "$scratch/help"
 done
+
+# --- a node's own arguments ---------------------------------------------------
+
+node() { # NAME PATTERN ARGUMENT...
+    local name=node/$1 pattern=$2 status
+    shift 2
+    timeout 5 "$BUILD/incode-node" "$@" > "$scratch/output" 2> "$scratch/errors"
+    status=$?
+    check "$name" "exit $status: $(last "$scratch/errors")" test $status = 2 \
+        -a -n "$(grep -E -e "^incode-node: $pattern.*; " "$scratch/errors")"
+}
+node 'unknown argument' '--frob: no such argument' --frob 3
+node 'argument without its value' '--node: wants' --node
+node 'no number' '--window x: not a number' --window x
+node 'no such node' '--node: .*no such node' --node 9 --dimension 3 --links 3,4,5
+node 'a wire too few' '--wire: not one for each link' --node 0 --dimension 1 \
+    --wire 0=call:127.0.0.1:5
+node 'a name for an address' '--wire 0=call:localhost:5: not an address' \
+    --node 0 --dimension 0 --wire 0=call:localhost:5
+node 'no key file' '--key .*absent: cannot be read: No such file' \
+    --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --key "$in/absent"
+node 'a bad key file' '--key .*: not a file of 64 hexadecimal' \
+    --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --key "$in/empty.xyz"
+printf '%064d\n' 0 > "$in/key"
+node 'an address of others' '--wire 0=listen:192.0.2.1:5: cannot listen .*: ' \
+    --node 0 --dimension 0 --wire 0=listen:192.0.2.1:5 --key "$in/key"
+node 'no such wire' '--wire 0=tape:a: not one of listen:' \
+    --node 0 --dimension 0 --wire 0=tape:a
+"$BUILD/incode-node" --help > "$scratch/output" 2> "$scratch/errors"
+check 'node/help' "exit $?" grep -q -e '--wire LINK=WIRE' "$scratch/output"

@@ -116,7 +116,7 @@ static void wrong_requests_are_refused(void **unused)
     struct host_points points;
     struct host_error error = {0};
     assert_int_equal(host_gen("cube", 100, 1, &points, &error), HOST_USAGE);
-    assert_non_null(strstr(error.text, "'cube' is no kind of point set; use"));
+    assert_non_null(strstr(error.text, "gen cube: no kind of point set; use"));
     error = (struct host_error){0};
     assert_int_equal(host_gen("grid", 3, 1, &points, &error), HOST_USAGE);
     error = (struct host_error){0};

@@ -412,8 +412,9 @@ static void faults_have_their_place(void **unused)
     refused("a.ele", "1 4 0\n0 0 1 2 x\n", "a.ele:2:9: a whole number is due");
     refused("a.ele", "1 4 0\n0 0 1 2 -3\n", "a.ele:2:9: a whole number");
     refused("a.ele", "1 10 0\n0 0 1 2 3\n", "other than 4 vertices");
-    refused("a.ele", "1 4 0\n1 0 1 2 3\n", "no row of points");
-    refused("a.ele", "1 4 0\n0 0 1 2 99999999999\n", "no row of points");
+    refused("a.ele", "1 4 0\n1 0 1 2 3\n", "a.ele:2:10: a vertex of this");
+    refused("a.ele", "1 4 0\n0 0 1 2 99999999999\n",
+            "a.ele:2:20: a vertex of this tetrahedron is no row of points");
     refused("a.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "version 2");
     refused("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "$Elements");
     refused("a.mesh", "MeshVersionFormatted 2\nDimension 3\n",

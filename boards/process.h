@@ -1,0 +1,28 @@
+/* What nodes that are processes of a system have in common, whatever brings
+ * their bytes.
+ *
+ * Memory: none.  Work: a system call, or a pass over the program's segments.
+ *
+ *     board.fixed_bytes = process_static_bytes() + stack;
+ *     now_us = process_clock_us(CLOCK_MONOTONIC);
+ */
+#ifndef BOARDS_PROCESS_H
+#define BOARDS_PROCESS_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <time.h>
+
+enum { PROCESS_PAGE = 4096 };
+
+/* Bytes of the program's own .data and .bss, in whole pages, as the kernel
+ * counts them. */
+size_t process_static_bytes(void);
+
+uint64_t process_clock_us(clockid_t clock);
+
+/* Memory for an arena, zeroed, all of it at once: no page is to be found
+ * missing while others wait.  NULL: the system does not grant it. */
+void *process_arena(size_t bytes);
+
+#endif
