@@ -68,17 +68,17 @@ if [ "$(stat_of "$scratch/stats.json" memory_limited)" != true ]; then
         'sanitizers need more memory than a node has'
 else
     start --memory 4M
-    for _ in 1 2 3; do
-        sleep 0.1
+    shared=
+    while kill -0 $host 2> /dev/null; do
         for node in $nodes; do
             bytes=$(awk '/^[0-9a-f]+-[0-9a-f]+ / { writes = $2 ~ /w/ }
                 /^Size:/ && writes { n += $2 * 1024 } END { print n + 0 }' \
                 "/proc/$node/smaps" 2> /dev/null)
             [ "${bytes:-0}" -gt $worst ] && worst=$bytes
         done
+        shared=$shared$(awk '/^[0-9a-f]+-/ && $2 ~ /w.s/' \
+            "/proc/$node/smaps" 2> /dev/null)
     done
-    shared=$(awk '/^[0-9a-f]+-/ && $2 ~ /w.s/' "/proc/$node/smaps" \
-        2> /dev/null)
     wait $host
     check 'cluster/writable memory of a node' "$worst bytes, not $limit" \
         test "$worst" -gt $((limit / 2)) -a "$worst" -le $limit
