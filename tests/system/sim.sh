@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # The simulation: as many seeds as fit its time, the same trace for the same
 # seed, faults of every kind, wrong usage, and the planted faults found.
-# SIM_SECONDS: of processor time, for the seeds.
+# SIM_SECONDS: of processor time, for the seeds; below 100 there are too few of
+# them for every fault to strike, and nothing else is tried.  SIM_FIRST: of them.
 . tests/system/lib.sh
 SECONDS_MAX=1100
-seconds=${SIM_SECONDS:-75}
+seconds=${SIM_SECONDS:-300}
 first=${SIM_FIRST:-1}
 said=$scratch/said
 
@@ -18,6 +19,7 @@ if [ $status = 0 ] && [ -n "$totals" ]; then
 else
     fail sim/seeds "exit $status: ${totals:-$(last "$said")}"
 fi
+[ "$seconds" -ge 100 ] || exit 0
 
 # struck KIND: in how many seeds.
 struck() { awk -v kind="$1" '$1 == kind { print $3 }' "$said" | tail -n 1; }
