@@ -2,11 +2,14 @@
 # Pairwise coverage of index, nodes, memory and the seed that shuffles which
 # page is ready when, for `sequential`; and of these, partition and face rule
 # for `spatial`.  That the rows cover every pair is checked too.
-# Sets past `naive_max` points are left out with `naive`, whose work is n^2.
+# Sets past `naive_max` points are left out with `naive`, whose work is n^2, and
+# past `grid_max` with `grid`; those past `kd_max` are for digests.sh, and for
+# `make test-full`.
 . tests/system/lib.sh
 need_data pairs
 naive_max=${NAIVE_MAX:-5000}
 grid_max=${GRID_MAX:-15000}
+kd_max=${KD_MAX:-100000}
 
 rows='
 sequential grid 1 512K 0
@@ -62,6 +65,10 @@ while read -r set file points _ tetrahedra digest; do
     [ "$tetrahedra" = 0 ] && continue
     if [ -n "$(no_set "$file" "$points")" ]; then
         skip "pairs/$set" "$(no_set "$file" "$points")"
+        continue
+    fi
+    if [ "$points" -gt "$kd_max" ]; then
+        skip "pairs/$set" "more than $kd_max points"
         continue
     fi
     while read -r strategy index nodes memory seed partition rule; do
