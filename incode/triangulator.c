@@ -112,6 +112,8 @@ incode_triangulator_init(void *arena, size_t bytes,
     t->lookahead = t->lookahead < 1               ? 1
                    : t->lookahead > LOOKAHEAD_MAX ? LOOKAHEAD_MAX
                                                   : t->lookahead;
+    if (t->tree.pages <= map.frame_count)
+        t->lookahead = setup->bricks; /* none pushes another out */
     t->room_faces = 2 * INCODE_STAR_FACES + 4 * INCODE_STAR_BUILT;
     t->room_bricks = (uint32_t)map.brick_entries / 4;
     t->finished = true;
