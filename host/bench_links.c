@@ -27,7 +27,9 @@ enum {
     MOST = 200000,
     TRIAL_US = 700000,
     PATIENCE_US = 20000000,
-    LINGER_US = 30000
+    LINGER_US = 30000,
+    FIFO_BYTES = 64,    /* of a port: so many are brought at once */
+    FAST_BAUD = 3000000 /* as which a pseudo-terminal counts */
 };
 
 /* What a message asks, in its first byte. */
@@ -225,11 +227,67 @@ int host_bench_end(struct host_bench_end *end, unsigned role,
 
 /* --- drivers -------------------------------------------------------------- */
 
+/* What a pseudo-terminal brings at once a line would bring byte by byte: it is
+ * held here until then. */
+struct slow_end {
+    struct link_pipe beneath;
+    uint64_t byte_ns; /* on the line; 0: no line */
+    uint64_t last_ns; /* when the last byte held is here */
+    uint64_t look_ns; /* of the last look, */
+    bool flows;       /* which found some */
+    size_t held;
+    uint8_t bytes[4096];
+};
+
 struct wire {
     struct tcp_pipe tcp;
     struct serial_pipe line;
+    struct slow_end slow;
     struct tcp_wire net;
 };
+
+static uint64_t now_ns(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000 + (uint64_t)now.tv_nsec;
+}
+
+static int slow_send(void *context, const uint8_t *bytes, size_t size)
+{
+    const struct slow_end *s = context;
+    return s->beneath.send(s->beneath.context, bytes, size);
+}
+
+static int slow_receive(void *context, uint8_t *bytes, size_t size)
+{
+    struct slow_end *s = context;
+    int got = s->beneath.receive(s->beneath.context, s->bytes + s->held,
+                                 sizeof s->bytes - s->held);
+    uint64_t now = now_ns();
+    if (got < 0) {
+        return got;
+    }
+    /* In a stream bytes came on while nobody looked. */
+    uint64_t since = s->flows ? s->look_ns : now;
+    s->look_ns = now;
+    s->flows = got > 0 || s->held > 0;
+    if (got > 0) {
+        since = s->last_ns > since ? s->last_ns : since;
+        s->last_ns = since + (unsigned)got * s->byte_ns;
+        s->held += (size_t)got;
+    }
+    size_t due = 0;
+    if (s->last_ns > now) {
+        due = (size_t)((s->last_ns - now + s->byte_ns - 1) / s->byte_ns);
+    }
+    size_t here = s->held > due ? s->held - due : 0;
+    here = here < size ? here : size;
+    memcpy(bytes, s->bytes, here);
+    s->held -= here;
+    memmove(s->bytes, s->bytes + here, s->held);
+    return (int)here;
+}
 
 static void sleep_on(struct pollfd *fds, nfds_t count, uint64_t wait_us)
 {
@@ -250,7 +308,13 @@ static void idle_line(void *context, uint64_t wait_us)
     struct wire *w = context;
     struct pollfd fd = {w->line.fd, serial_events(&w->line), 0};
     uint64_t line_us = serial_wait_us(&w->line);
-    sleep_on(&fd, 1, line_us < wait_us ? line_us : wait_us);
+    wait_us = line_us < wait_us ? line_us : wait_us;
+    if (w->slow.held > 0) {
+        size_t bytes = w->slow.held < FIFO_BYTES ? w->slow.held : FIFO_BYTES;
+        uint64_t here_us = bytes * w->slow.byte_ns / 1000 + 1;
+        wait_us = here_us < wait_us ? here_us : wait_us;
+    }
+    sleep_on(&fd, 1, wait_us);
 }
 
 static void idle_net(void *context, uint64_t wait_us)
@@ -285,14 +349,14 @@ static int open_line(struct wire *wire, struct host_bench_end *end, int fd,
 {
     (void)role;
     serial_pipe_init(&wire->line, fd, baud);
-    end->pipe = serial_link_pipe(&wire->line);
+    wire->slow.beneath = serial_link_pipe(&wire->line);
+    wire->slow.byte_ns = baud == 0 ? 0 : UINT64_C(10000000000) / baud;
+    end->pipe = baud == 0
+                    ? wire->slow.beneath
+                    : (struct link_pipe){&wire->slow, slow_send, slow_receive};
     end->idle = idle_line;
-    end->settings = (struct link_config){.window = 14,
-                                         .frame_payload = 408,
-                                         .message_max = 1608,
-                                         .staging = 2,
-                                         .timeout_min_us = 20000,
-                                         .ack_delay_us = 1000};
+    end->settings = (struct link_config){.window = 14, .message_max = 1608};
+    link_for_line(&end->settings, baud == 0 ? FAST_BAUD : baud);
     return 0;
 }
 

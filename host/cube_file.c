@@ -228,7 +228,9 @@ static int read_wire(struct host_cube_file *file, config_setting_t *group,
     }
     int status = serial ? read_line(file, group, wire, error)
                         : read_net(file, group, wire, error);
-    file->lines = file->lines || serial;
+    if (serial && (file->line_baud == 0 || wire->baud < file->line_baud)) {
+        file->line_baud = wire->baud;
+    }
     file->wires++;
     return status;
 }
@@ -470,7 +472,7 @@ unsigned host_cube_straps(const struct host_cube_file *file, unsigned node,
                    {"--memory", file->memory},
                    {"--window", file->window},
                    {"--dead", UINT64_C(1000000) * file->dead_s},
-                   {"--lines", file->lines ? 1 : 0},
+                   {"--lines", file->line_baud},
                    {"--host-wire", host != NULL ? 1 : 0}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         snprintf(straps[n++], HOST_STRAP_BYTES, "%s", numbers[i].name);

@@ -224,7 +224,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     machine.context = remote;
     machine.nodes = remote->file->nodes;
     machine.dimension = remote->file->dimension;
-    machine.lines = remote->file->lines;
+    machine.line_baud = remote->file->line_baud;
     machine.absent_s = absent_s(remote->file);
     while (machine.epoch == 0) {
         (void)!getrandom(&machine.epoch, sizeof machine.epoch, 0);
@@ -308,7 +308,7 @@ int host_remote_prepare(struct host_run_options *options,
     }
     options->nodes = the_file.nodes;
     options->memory = the_file.memory;
-    options->link = the_file.lines ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
+    options->link = the_file.line_baud != 0 ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
     options->begin = begin;
     return 0;
 }

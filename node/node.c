@@ -55,9 +55,7 @@ static struct cube_config configure(const struct node_identity *identity,
     config.host_wire = identity->host_wire;
     config.host_wires = identity->host_wires;
     config.dead_us = identity->dead_us;
-    if (identity->lines) {
-        cube_for_lines(&config);
-    }
+    cube_for_lines(&config, identity->line_baud);
     return config;
 }
 

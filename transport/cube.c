@@ -127,8 +127,9 @@ static struct link_config link_config_of(const struct cube_config *config,
     c.message_max = MESSAGE_MAX;
     c.frame_payload = config->frame_payload;
     c.staging = config->staging;
-    c.timeout_min_us = config->timeout_min_us;
-    c.ack_delay_us = config->ack_delay_us;
+    if (config->line_baud != 0) {
+        link_for_line(&c, config->line_baud);
+    }
     return c;
 }
 
@@ -166,13 +167,12 @@ static size_t up64(size_t bytes)
     return (bytes + 63) / 64 * 64;
 }
 
-void cube_for_lines(struct cube_config *config)
+void cube_for_lines(struct cube_config *config, uint32_t baud)
 {
-    config->frame_payload = 408;
-    config->window = config->window >= 8 ? 14 : 7;
-    config->staging = 2;
-    config->timeout_min_us = 20000;
-    config->ack_delay_us = 1000;
+    config->line_baud = baud;
+    if (baud != 0) {
+        config->window = config->window >= 8 ? 14 : 7;
+    }
 }
 
 size_t cube_arena_bytes(const struct cube_config *config)

@@ -93,7 +93,7 @@ struct cube_config {
     uint16_t frame_payload; /* bytes, a multiple of 8, the same on both ends of
                                a wire; a message a frame */
     uint16_t staging;       /* frames encoded ahead of the pipe; see link.h */
-    uint32_t timeout_min_us, ack_delay_us; /* see link.h */
+    uint32_t line_baud;     /* see cube_for_lines */
 };
 
 struct cube_message {
@@ -112,9 +112,10 @@ struct cube_statistics {
     uint64_t outdated;      /* dropped: of an older generation */
 };
 
-/* The settings of PROTOCOL.md for serial lines, and a window that fits them:
- * the same on all nodes and the host. */
-void cube_for_lines(struct cube_config *config);
+/* Settings for a cube with serial lines, of which the slowest has that baud
+ * rate, and a window that fits them: the same on all nodes and the host.  0:
+ * there are no lines, and nothing changes. */
+void cube_for_lines(struct cube_config *config, uint32_t baud);
 
 struct cube; /* opaque: lives at the start of its arena */
 

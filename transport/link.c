@@ -6,7 +6,12 @@
 
 /* --- memory -------------------------------------------------------------- */
 
-enum { STAGING_MOST = 8, TIMEOUT_FIRST_US = 200000 };
+enum {
+    STAGING_MOST = 8,
+    TIMEOUT_MIN_US = 100000,
+    TIMEOUT_FIRST_US = 200000,
+    TIMEOUT_MAX_US = 1000000
+};
 
 static uint32_t or_default(uint32_t value, uint32_t otherwise)
 {
@@ -22,13 +27,32 @@ static struct link_config complete(const struct link_config *config)
     c.message_max = (uint16_t)or_default(c.message_max, LINK_MESSAGE_MAX);
     c.frame_payload = (uint16_t)or_default(c.frame_payload, c.message_max);
     c.staging = (uint16_t)or_default(c.staging, staging);
-    c.timeout_min_us = or_default(c.timeout_min_us, 100000);
-    c.timeout_max_us = or_default(c.timeout_max_us, 1000000);
+    c.timeout_min_us = or_default(c.timeout_min_us, TIMEOUT_MIN_US);
+    c.timeout_max_us = or_default(c.timeout_max_us, TIMEOUT_MAX_US);
     c.ack_delay_us = or_default(c.ack_delay_us, 5000);
     c.hello_us = or_default(c.hello_us, 50000);
     c.keep_alive_us = or_default(c.keep_alive_us, 500000);
     c.silence_us = or_default(c.silence_us, 3000000);
     return c;
+}
+
+/* Bytes that may go over the line between a frame and its acknowledgement: what
+ * either driver has given to the line, and what the peer has encoded ahead. */
+enum { LINE_BYTES = 2400, LINE_BAUD_MIN = 300 };
+
+void link_for_line(struct link_config *config, uint32_t baud)
+{
+    uint32_t rate = baud < LINE_BAUD_MIN ? LINE_BAUD_MIN : baud;
+    uint32_t wait_us = (uint32_t)(UINT64_C(10000000) * LINE_BYTES / rate);
+    config->frame_payload = 408;
+    config->staging = 2;
+    config->timeout_min_us =
+        wait_us < TIMEOUT_MIN_US ? TIMEOUT_MIN_US : wait_us;
+    config->timeout_max_us = 4 * config->timeout_min_us;
+    if (config->timeout_max_us < TIMEOUT_MAX_US) {
+        config->timeout_max_us = TIMEOUT_MAX_US;
+    }
+    config->ack_delay_us = 1000;
 }
 
 static unsigned fragments(const struct link_config *c, size_t size)

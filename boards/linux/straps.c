@@ -15,7 +15,7 @@ static const char help[] =
     "  --memory BYTES     data memory in all, stack included (4194304)\n"
     "  --stack BYTES      of it (65536)\n"
     "  --window N         frames a link and direction, 1 to 64; by memory\n"
-    "  --lines 0|1        the cube has serial lines\n"
+    "  --lines BAUD       the cube has serial lines, the slowest so fast\n"
     "  --host-wire 0|1    besides node 0, this node has a wire to the host\n"
     "  --dead US          microseconds of silence after which a link is given "
     "up; 0: never\n"
@@ -97,7 +97,7 @@ static const char *read_one(const char *name, const char *text,
                  {"--stack", &straps->stack, UINT64_C(1) << 40},
                  {"--window", &straps->window, LINK_WINDOW_MAX},
                  {"--epoch", &straps->epoch, UINT32_MAX},
-                 {"--lines", &straps->lines, 1},
+                 {"--lines", &straps->lines, UINT32_MAX},
                  {"--host-wire", &straps->host_wire, 1},
                  {"--dead", &straps->dead, UINT32_MAX}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {

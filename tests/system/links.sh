@@ -182,6 +182,9 @@ bench_links() {
             grep -qE "^$driver +[0-9.]+ +(-|[0-9.]+ %) +[0-9]+ +[0-9]+ " \
             "$scratch/bench"
     done
+    check 'links/bench links: a clean line resends nothing' \
+        "$(cat "$scratch/bench")" \
+        grep -qE '^serial, paced to 115200 .* 0\.00 %$' "$scratch/bench"
 }
 for part in wrong_keys missing_wire two_hosts bench_links; do
     beside $part

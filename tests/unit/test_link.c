@@ -211,8 +211,8 @@ static double share(double baud, double bit_error, uint32_t step_us,
                              .latency_us = 1000,
                              .room = 512,
                              .bit_error = bit_error};
-    struct link_config c = {
-        .window = 14, .frame_payload = 408, .message_max = 1608, .staging = 2};
+    struct link_config c = {.window = 14, .message_max = 1608};
+    link_for_line(&c, (uint32_t)baud);
     struct pair *p = new_pair(&c, &q, 1);
     uint32_t messages = (65536 * 8 + 1607) / 1608;
     run(p, messages, step_us, UINT64_MAX / 2);

@@ -256,11 +256,8 @@ static void open_line(struct line *line, uint32_t baud, double error_rate)
                                 .node = (uint16_t)who,
                                 .peer_node = (uint16_t)(1 - who),
                                 .window = 14,
-                                .frame_payload = 408,
-                                .message_max = 1608,
-                                .staging = 2,
-                                .timeout_min_us = 20000,
-                                .ack_delay_us = 1000};
+                                .message_max = 1608};
+        link_for_line(&c, baud);
         serial_pipe_init(&end->pipe, line->fds[3 * who], baud);
         end->pipe.now_us = test_clock;
         end->pipe.ahead_us = now;
@@ -319,6 +316,62 @@ static void close_line(struct line *line)
     }
     free(line->ends[0].memory);
     free(line->ends[1].memory);
+}
+
+/* A message from end 0, and its echo. */
+static void echo(struct line *line, size_t size)
+{
+    static uint8_t bytes[MESSAGE];
+    struct link_message message;
+    bool back = false;
+    assert_int_equal(link_write(line->ends[0].link, bytes, size, NULL, 0), 0);
+    while (!back) {
+        now += STEP_US;
+        for (unsigned who = 0; who < 2; who++) {
+            struct link *link = line->ends[who].link;
+            link_poll_receive(link, now);
+            while (link_read(link, &message)) {
+                back = who == 0;
+                assert_true(back || link_write(link, message.data, message.size,
+                                               NULL, 0) == 0);
+                link_release(link);
+            }
+            link_poll_send(link, now);
+        }
+        carry(line, &line->lanes[0]);
+        carry(line, &line->lanes[1]);
+    }
+}
+
+/* Short messages, long ones and both directions at once, in turn: what waits
+ * behind others is not lost. */
+static void a_clean_line_resends_nothing(void **unused)
+{
+    static const uint32_t bauds[] = {19200, 57600, 115200, 921600, 3000000};
+    (void)unused;
+    for (size_t i = 0; i < sizeof bauds / sizeof bauds[0]; i++) {
+        struct line line;
+        open_line(&line, bauds[i], 0);
+        for (unsigned turn = 0; turn < 3; turn++) {
+            for (unsigned k = 0; k < 20; k++) {
+                echo(&line, 16);
+            }
+            echo(&line, MESSAGE);
+            echo(&line, 16);
+            line.ends[0].written = line.ends[0].read = 0;
+            line.ends[1].written = line.ends[1].read = 0;
+            (void)transfer(&line, bauds[i] < 100000 ? 1 : 2);
+        }
+        for (unsigned who = 0; who < 2; who++) {
+            const struct link_statistics *s =
+                link_statistics(line.ends[who].link);
+            if (s->retransmitted != 0 || s->timeouts != 0) {
+                fail_msg("%u baud: %u frames again, %u timeouts", bauds[i],
+                         (unsigned)s->retransmitted, (unsigned)s->timeouts);
+            }
+        }
+        close_line(&line);
+    }
 }
 
 static void a_link_fills_a_paced_line(void **unused)
@@ -380,6 +433,7 @@ int main(void)
         cmocka_unit_test(rates_and_modes),
         cmocka_unit_test(a_port_in_use_says_by_whom),
         cmocka_unit_test(ports_that_are_not_there),
+        cmocka_unit_test(a_clean_line_resends_nothing),
         cmocka_unit_test(a_link_fills_a_paced_line),
         cmocka_unit_test(little_is_written_ahead),
     };
