@@ -203,8 +203,11 @@ static const char *take_memory(struct node_board *board,
     board->arena = process_arena(bytes);
     board->arena_bytes = bytes - wires;
     board->fixed_bytes = fixed + wires;
+    if (board->arena == NULL) {
+        return "the kernel does not grant it";
+    }
     *net = (void *)((uint8_t *)board->arena + board->arena_bytes);
-    return board->arena == NULL ? "the kernel does not grant it" : NULL;
+    return NULL;
 }
 
 static int complain(struct linux_fault fault, int status)
