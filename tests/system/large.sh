@@ -4,14 +4,11 @@
 
 million=$scratch/million.npy
 "$INCODE" gen uniform 1000000 --seed 1 -o "$million" 2> /dev/null
-"$INCODE" run "$million" -q --strategy sequential --nodes 1 --memory 4M \
-    --stats "$scratch/one.json" 2> "$scratch/errors"
-check 'large/1,000,000 points on one node' "$(last "$scratch/errors")" \
-    test $? = 0
-"$INCODE" run "$million" -q --strategy spatial --nodes 8 --memory 4M --verify \
-    --stats "$scratch/eight.json" 2> "$scratch/errors"
-check 'large/1,000,000 points on 8 nodes, verified' \
-    "$(last "$scratch/errors")" test $? = 0
+succeeds 'large/1,000,000 points on one node' "$INCODE" run "$million" -q \
+    --strategy sequential --nodes 1 --memory 4M --stats "$scratch/one.json"
+succeeds 'large/1,000,000 points on 8 nodes, verified' "$INCODE" run \
+    "$million" -q --strategy spatial --nodes 8 --memory 4M --verify \
+    --stats "$scratch/eight.json"
 check 'large/the same digest' 'another digest' \
     test "$(stat_of "$scratch/one.json" digest)" = \
     "$(stat_of "$scratch/eight.json" digest)"
@@ -33,13 +30,11 @@ rm -f "$million"
 
 hub=$scratch/hub.npy
 "$INCODE" gen hub 200000 --seed 1 -o "$hub" 2> /dev/null
-"$INCODE" run "$hub" -q --strategy sequential --nodes 1 --memory 4M \
-    --stats "$scratch/one.json" 2> "$scratch/errors"
-check 'large/hub of 200,000 on one node' "$(last "$scratch/errors")" test $? = 0
-"$INCODE" run "$hub" -q --strategy spatial --nodes 8 --memory 4M --verify \
-    --stats "$scratch/eight.json" 2> "$scratch/errors"
-check 'large/hub of 200,000 on 8 nodes, verified' "$(last "$scratch/errors")" \
-    test $? = 0
+succeeds 'large/hub of 200,000 on one node' "$INCODE" run "$hub" -q \
+    --strategy sequential --nodes 1 --memory 4M --stats "$scratch/one.json"
+succeeds 'large/hub of 200,000 on 8 nodes, verified' "$INCODE" run "$hub" -q \
+    --strategy spatial --nodes 8 --memory 4M --verify \
+    --stats "$scratch/eight.json"
 check 'large/the same digest of hub' 'another digest' \
     test "$(stat_of "$scratch/one.json" digest)" = \
     "$(stat_of "$scratch/eight.json" digest)"

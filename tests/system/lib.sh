@@ -25,6 +25,17 @@ check() {
     if "$@"; then pass "$name"; else fail "$name" "$why"; fi
 }
 
+# succeeds NAME COMMAND...: passes where the command ends with 0.  What it says
+# on standard error goes to $scratch/errors.  (A status cannot be asked of $?
+# behind a $(...) in one command: it is that one's.)
+succeeds() {
+    local name=$1 status
+    shift
+    "$@" 2> "$scratch/errors"
+    status=$?
+    check "$name" "exit $status: $(last "$scratch/errors")" [ $status = 0 ]
+}
+
 # The last line of a file, for a failure's reason.
 last() { tail -n 1 "$1" 2>/dev/null | tr -d '\r' | cut -c 1-300; }
 

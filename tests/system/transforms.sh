@@ -53,8 +53,7 @@ shuffled() { # NAME FILE.xyz DIGEST SEED
 
 mirrored() { # NAME FILE.xyz
     "$TOOL" mirror < "$2" > "$scratch/mirrored.xyz"
-    runs "$scratch/mirrored.xyz" "$scratch/mirrored.npy" --verify
-    check "$1" "$(last "$scratch/errors")" test $? = 0
+    succeeds "$1" runs "$scratch/mirrored.xyz" "$scratch/mirrored.npy" --verify
 }
 
 while read -r set file points _ tetrahedra digest; do
@@ -96,9 +95,8 @@ for set in deg_cgal_grid5 deg_cgal_lp500; do
     fi
     { "$TOOL" scale 1000 < "$file"; "$TOOL" scale -1074 < "$file"; } \
         > "$scratch/mix.xyz"
-    runs "$scratch/mix.xyz" "$scratch/mix.npy" --verify
-    check "transforms/$set times 2^1000 and 2^-1074 mixed" \
-        "$(last "$scratch/errors")" test $? = 0
+    succeeds "transforms/$set times 2^1000 and 2^-1074 mixed" \
+        runs "$scratch/mix.xyz" "$scratch/mix.npy" --verify
     incode run "$scratch/mix.xyz" -q --strategy sequential --nodes 1 \
         -o "$scratch/mix1.npy" 2> "$scratch/errors"
     check "transforms/$set mixed, on one node" "$(last "$scratch/errors")" \

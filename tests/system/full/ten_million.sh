@@ -6,9 +6,8 @@
 run() { # N NAME [OPTION...]
     local points=$scratch/$1.npy name=$2
     shift 2
-    "$INCODE" run "$points" -q --memory 4M --stats "$scratch/$name.json" "$@" \
-        2> "$scratch/errors"
-    check "ten million/$name" "exit $?: $(last "$scratch/errors")" test $? = 0
+    succeeds "ten million/$name" "$INCODE" run "$points" -q --memory 4M \
+        --stats "$scratch/$name.json" "$@"
 }
 stat() { stat_of "$scratch/$1.json" "$2"; }
 
