@@ -7,13 +7,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/prctl.h>
 #include <sys/random.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
+#include "child.h"
 #include "progress.h"
 
 /* Sanitizers map memory by the terabyte: no limit then. */
@@ -52,19 +52,16 @@ int host_cluster_program(const char *given, char *path, size_t size,
     return 0;
 }
 
-static void set_limit(int resource, uint64_t bytes, int report)
+static bool set_limit(int resource, uint64_t bytes)
 {
     struct rlimit limit = {bytes, bytes};
-    if (setrlimit((__rlimit_resource_t)resource, &limit) != 0) {
-        int reason = errno;
-        (void)!write(report, &reason, sizeof reason);
-        _exit(127);
-    }
+    return setrlimit((__rlimit_resource_t)resource, &limit) == 0;
 }
 
-/* In the child: becomes the node.  A failure's errno goes to `report`. */
-static void become_node(const struct host_cluster *c, unsigned node, int report)
+/* In the child: becomes the node. */
+static void become_node(const void *context, unsigned node)
 {
+    const struct host_cluster *c = context;
     char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
     char *no_environment[] = {NULL};
     size_t at = 0;
@@ -75,9 +72,6 @@ static void become_node(const struct host_cluster *c, unsigned node, int report)
         at += (size_t)snprintf(links + at, sizeof links - at, "%s%d",
                                d == 0 ? "" : ",", fd);
     }
-    int null = open("/dev/null", O_RDWR);
-    dup2(null, STDIN_FILENO);
-    dup2(null, STDOUT_FILENO);
     snprintf(text[0], sizeof text[0], "%u", node);
     snprintf(text[1], sizeof text[1], "%u", c->dimension);
     snprintf(text[2], sizeof text[2], "%llu",
@@ -101,51 +95,24 @@ static void become_node(const struct host_cluster *c, unsigned node, int report)
                     (char[]){"--links"},
                     links,
                     NULL};
-    set_limit(RLIMIT_CORE, 0, report);
-    if (c->limited) {
-        set_limit(RLIMIT_STACK, HOST_STACK_BYTES, report);
-        set_limit(RLIMIT_DATA, c->options.memory - HOST_STACK_BYTES, report);
+    if (set_limit(RLIMIT_CORE, 0) &&
+        (!c->limited ||
+         (set_limit(RLIMIT_STACK, HOST_STACK_BYTES) &&
+          set_limit(RLIMIT_DATA, c->options.memory - HOST_STACK_BYTES)))) {
+        execve(c->path, argv, c->limited ? no_environment : environ);
     }
-    execve(c->path, argv, c->limited ? no_environment : environ);
-    int reason = errno;
-    (void)!write(report, &reason, sizeof reason);
-    _exit(127);
 }
 
 static int start_node(struct host_cluster *c, unsigned node,
                       struct host_error *error)
 {
-    int report[2], reason = 0;
-    if (pipe2(report, O_CLOEXEC) != 0) {
-        return host_fail(error, HOST_BROKEN, "node %u: %s; close some files",
-                         node, strerror(errno));
-    }
+    const struct host_child child = {
+        node, c->path, "ask for fewer with --nodes", become_node, c};
     c->epoch++;
-    pid_t host = getpid(), pid = fork();
-    if (pid == 0) {
-        prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (getppid() != host) {
-            _exit(127); /* the host ended before it could be watched */
-        }
-        become_node(c, node, report[1]);
-    }
-    close(report[1]);
-    if (pid < 0) {
-        close(report[0]);
-        return host_fail(error, HOST_CUBE,
-                         "node %u: %s; ask for fewer with --nodes", node,
-                         strerror(errno));
-    }
-    c->process[node].pid = pid;
-    c->process[node].ended = false;
-    ssize_t got = read(report[0], &reason, sizeof reason);
-    close(report[0]);
-    if (got == (ssize_t)sizeof reason) {
-        return host_fail(error, HOST_CUBE,
-                         "node %u: %s: %s; run make to build it anew", node,
-                         c->path, strerror(reason));
-    }
-    return 0;
+    c->process[node].pid = 0;
+    int status = host_child_start(&c->process[node].pid, &child, error);
+    c->process[node].ended = c->process[node].pid == 0;
+    return status;
 }
 
 /* The host's end of its wire.  A terminal is opened by its name as a real port

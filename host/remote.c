@@ -1,57 +1,41 @@
 #include "remote.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <signal.h>
 #include <sodium.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/prctl.h>
 #include <sys/random.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "../transport/drivers/secure_sodium.h"
+#include "child.h"
 #include "cluster.h"
 #include "progress.h"
 #include "run.h"
 
 /* In the child: becomes the node. */
-static void become_node(const struct host_remote *r, unsigned node)
+static void become_node(const void *context, unsigned node)
 {
     static char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES];
+    const struct host_remote *r = context;
     char *argv[HOST_STRAPS_MAX + 2] = {(char[]){"incode-node"}};
     char *no_environment[] = {NULL};
     unsigned count = host_cube_straps(r->file, node, straps);
     for (unsigned i = 0; i < count; i++) {
         argv[1 + i] = straps[i];
     }
-    int null = open("/dev/null", O_RDWR);
-    dup2(null, STDIN_FILENO);
-    dup2(null, STDOUT_FILENO);
     execve(r->program, argv, no_environment);
-    _exit(127);
 }
 
 static int start_node(struct host_remote *r, unsigned node,
                       struct host_error *error)
 {
-    pid_t host = getpid(), pid = fork();
-    if (pid == 0) {
-        prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (getppid() != host) {
-            _exit(127); /* the host ended before it could be watched */
-        }
-        become_node(r, node);
-    }
-    if (pid < 0) {
-        return host_fail(error, HOST_CUBE,
-                         "node %u: %s; start it yourself and take it from "
-                         "start",
-                         node, strerror(errno));
-    }
-    r->process[node].pid = pid;
-    return 0;
+    const struct host_child child = {node, r->program,
+                                     "start it yourself and take it from start",
+                                     become_node, r};
+    return host_child_start(&r->process[node].pid, &child, error);
 }
 
 static int open_port(struct host_remote *r, const struct host_cube_wire *wire,

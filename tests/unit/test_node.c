@@ -20,17 +20,9 @@
 #include "../../host/verify.h"
 #include "../../node/node.h"
 #include "../../node/result.h"
+#include "rings.h"
 
-enum { NODES = 8, LINKS = 4, RING = 4096, QUEUE = 256, FIXED = 73728 };
-
-struct ring {
-    uint8_t data[RING];
-    size_t first, used;
-};
-
-struct end {
-    struct ring *in, *out;
-};
+enum { NODES = 8, LINKS = 4, QUEUE = 256, FIXED = 73728 };
 
 struct waiting {
     uint32_t pages[QUEUE], first, count;
@@ -42,8 +34,8 @@ struct waiting {
 
 static struct {
     unsigned nodes, dimension, workers;
-    struct ring ring[NODES][LINKS][2];
-    struct end end[NODES][LINKS], host_end;
+    struct ring_wire wire[NODES][LINKS]; /* by the lower end */
+    struct ring_end end[NODES][LINKS], host_end;
     struct node_board board[NODES];
     struct node *node[NODES];
     bool stopped[NODES];
@@ -59,82 +51,29 @@ static struct {
     uint64_t now_us;
 } world;
 
-static uint64_t state = 88172645463325252u;
-
-static uint32_t draw(uint32_t below)
-{
-    state ^= state << 13;
-    state ^= state >> 7;
-    state ^= state << 17;
-    return (uint32_t)(state >> 32) % below;
-}
-
-static int ring_send(void *context, const uint8_t *bytes, size_t size)
-{
-    struct ring *ring = ((struct end *)context)->out;
-    size_t room = RING - ring->used;
-    size = size < room ? size : room;
-    size = draw(8) == 0 && size > 1 ? 1 + draw((uint32_t)size) : size;
-    for (size_t i = 0; i < size; i++) {
-        ring->data[(ring->first + ring->used++) % RING] = bytes[i];
-    }
-    return (int)size;
-}
-
-static int ring_receive(void *context, uint8_t *bytes, size_t size)
-{
-    struct ring *ring = ((struct end *)context)->in;
-    size = size < ring->used ? size : ring->used;
-    size = draw(8) == 0 ? 0 : size;
-    for (size_t i = 0; i < size; i++) {
-        bytes[i] = ring->data[ring->first];
-        ring->first = (ring->first + 1) % RING;
-        ring->used--;
-    }
-    return (int)size;
-}
-
 static uint64_t now_us(void *context)
 {
     (void)context;
     return world.now_us;
 }
 
-static void idle(void *context, uint64_t wait_us)
-{
-    (void)context;
-    (void)wait_us;
-}
-
-static void reset(void *context, int status)
-{
-    (void)context;
-    (void)status;
-}
-
-static struct link_pipe pipe_of(struct end *end)
-{
-    struct link_pipe pipe = {end, ring_send, ring_receive};
-    return pipe;
-}
-
 /* The wires of a hypercube, and the host's to node 0. */
 static void wire(void)
 {
+    unsigned dimension = world.dimension;
     for (unsigned i = 0; i < world.nodes; i++) {
-        for (unsigned d = 0; d < world.dimension; d++) {
+        for (unsigned d = 0; d < dimension; d++) {
             unsigned other = i ^ 1u << d;
-            struct ring *pair = world.ring[i < other ? i : other][d];
-            world.end[i][d].in = &pair[i < other];
-            world.end[i][d].out = &pair[i > other];
-            world.board[i].pipes[d] = pipe_of(&world.end[i][d]);
+            world.end[i][d] = (struct ring_end){
+                &world.wire[i < other ? i : other][d], i > other};
+            world.end[i][d].wire->hesitates = true;
+            world.board[i].pipes[d] = ring_pipe(&world.end[i][d]);
         }
     }
-    struct ring *pair = world.ring[0][world.dimension];
-    world.end[0][world.dimension] = (struct end){&pair[0], &pair[1]};
-    world.host_end = (struct end){&pair[1], &pair[0]};
-    world.board[0].pipes[world.dimension] =
-        pipe_of(&world.end[0][world.dimension]);
+    world.end[0][dimension] = (struct ring_end){&world.wire[0][dimension], 0};
+    world.host_end = (struct ring_end){&world.wire[0][dimension], 1};
+    world.wire[0][dimension].hesitates = true;
+    world.board[0].pipes[dimension] = ring_pipe(&world.end[0][dimension]);
 }
 
 static void start(unsigned window, size_t memory)
@@ -153,8 +92,8 @@ static void start(unsigned window, size_t memory)
         board->identity.epoch = 100 + i;
         board->now_us = now_us;
         board->busy_us = now_us;
-        board->idle = idle;
-        board->reset = reset;
+        board->idle = ring_idle;
+        board->reset = ring_reset;
         board->arena = world.memory[i];
         board->arena_bytes = memory - FIXED;
         board->fixed_bytes = FIXED;
@@ -166,7 +105,7 @@ static void start(unsigned window, size_t memory)
     config.dimension = (uint8_t)world.dimension;
     config.window = (uint16_t)window;
     config.epoch = 99;
-    config.pipes[0] = pipe_of(&world.host_end);
+    config.pipes[0] = ring_pipe(&world.host_end);
     size_t bytes = (cube_arena_bytes(&config) + 63) / 64 * 64;
     world.memory[NODES] = aligned_alloc(64, bytes);
     assert_non_null(world.memory[NODES]);
@@ -467,7 +406,7 @@ static void test_small(void **unused)
     const char *why = NULL;
     memset(&board, 0, sizeof board);
     board.identity.epoch = 1;
-    board.pipes[0] = pipe_of(&world.host_end);
+    board.pipes[0] = ring_pipe(&world.host_end);
     board.arena = arena;
     board.arena_bytes = sizeof arena;
     assert_null(node_start(&board, &why));

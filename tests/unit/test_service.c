@@ -16,30 +16,15 @@
 #include "../../host/gen.h"
 #include "../../host/run.h"
 #include "../../node/node.h"
+#include "rings.h"
 
 enum {
     DIMENSION = 3,
     NODES = 8,
-    RING = 4096,
     MEMORY = 1 << 20,
     FIXED = 73728,
     EVENTS = 8,
     DEAD_US = 2000000
-};
-
-struct ring {
-    uint8_t data[RING];
-    size_t first, used;
-};
-
-struct wire {
-    struct ring way[2];
-    bool cut; /* swallows all bytes */
-};
-
-struct end {
-    struct wire *wire;
-    int side;
 };
 
 enum what { NOTHING, RESTART, STOP, CONTINUE, CUT };
@@ -51,8 +36,8 @@ struct event {
 };
 
 static struct {
-    struct wire wire[NODES][DIMENSION + 1]; /* by the lower end */
-    struct end end[NODES][DIMENSION + 1], host[2];
+    struct ring_wire wire[NODES][DIMENSION + 1]; /* by the lower end */
+    struct ring_end end[NODES][DIMENSION + 1], host[2];
     struct node_board board[NODES];
     struct node *node[NODES];
     bool stopped[NODES], ended[NODES];
@@ -70,50 +55,6 @@ static uint64_t undisturbed_us;
 static struct host_digest expected;
 static struct host_points points;
 static struct host_run_result result;
-static uint64_t state = 88172645463325252u;
-
-static uint32_t draw(uint32_t below)
-{
-    state ^= state << 13;
-    state ^= state >> 7;
-    state ^= state << 17;
-    return (uint32_t)(state >> 32) % below;
-}
-
-static int ring_send(void *context, const uint8_t *bytes, size_t size)
-{
-    struct end *end = context;
-    struct ring *ring = &end->wire->way[end->side];
-    size_t room = RING - ring->used;
-    if (end->wire->cut) {
-        return (int)size;
-    }
-    size = size < room ? size : room;
-    size = draw(8) == 0 && size > 1 ? 1 + draw((uint32_t)size) : size;
-    for (size_t i = 0; i < size; i++) {
-        ring->data[(ring->first + ring->used++) % RING] = bytes[i];
-    }
-    return (int)size;
-}
-
-static int ring_receive(void *context, uint8_t *bytes, size_t size)
-{
-    struct end *end = context;
-    struct ring *ring = &end->wire->way[1 - end->side];
-    size = size < ring->used ? size : ring->used;
-    for (size_t i = 0; i < size; i++) {
-        bytes[i] = ring->data[ring->first];
-        ring->first = (ring->first + 1) % RING;
-        ring->used--;
-    }
-    return (int)size;
-}
-
-static struct link_pipe pipe_of(struct end *end)
-{
-    struct link_pipe pipe = {end, ring_send, ring_receive};
-    return pipe;
-}
 
 static uint64_t now_us(void *context)
 {
@@ -121,19 +62,7 @@ static uint64_t now_us(void *context)
     return world.now_us;
 }
 
-static void node_idle(void *context, uint64_t wait_us)
-{
-    (void)context;
-    (void)wait_us;
-}
-
-static void node_reset(void *context, int status)
-{
-    (void)context;
-    (void)status;
-}
-
-static struct wire *wire_of(unsigned node, unsigned link)
+static struct ring_wire *wire_of(unsigned node, unsigned link)
 {
     unsigned other = link == DIMENSION ? node : node ^ 1u << link;
     return &world.wire[node < other ? node : other][link];
@@ -157,11 +86,11 @@ static void wire_up(void)
         for (unsigned d = 0; d <= DIMENSION; d++) {
             world.end[i][d].wire = wire_of(i, d);
             world.end[i][d].side = d < DIMENSION && (i >> d & 1) != 0;
-            world.board[i].pipes[d] = pipe_of(&world.end[i][d]);
+            world.board[i].pipes[d] = ring_pipe(&world.end[i][d]);
         }
     }
-    world.host[0] = (struct end){wire_of(0, DIMENSION), 1};
-    world.host[1] = (struct end){wire_of(world.spare, DIMENSION), 1};
+    world.host[0] = (struct ring_end){wire_of(0, DIMENSION), 1};
+    world.host[1] = (struct ring_end){wire_of(world.spare, DIMENSION), 1};
 }
 
 static void start_world(void)
@@ -175,8 +104,8 @@ static void start_world(void)
         board->identity.dead_us = world.dead_us;
         board->now_us = now_us;
         board->busy_us = now_us;
-        board->idle = node_idle;
-        board->reset = node_reset;
+        board->idle = ring_idle;
+        board->reset = ring_reset;
         board->arena_bytes = MEMORY - FIXED;
         board->arena = aligned_alloc(64, MEMORY - FIXED);
         assert_non_null(board->arena);
@@ -270,10 +199,10 @@ static struct host_machine make_machine(void)
     machine.nodes = NODES;
     machine.dimension = DIMENSION;
     machine.epoch = ++world.epoch;
-    machine.pipe = pipe_of(&world.host[0]);
+    machine.pipe = ring_pipe(&world.host[0]);
     machine.spare_node = world.spare;
     machine.absent_s = world.absent_s;
-    machine.spare = pipe_of(&world.host[1]);
+    machine.spare = ring_pipe(&world.host[1]);
     machine.now_us = now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;
@@ -431,8 +360,10 @@ static void test_gone(void **unused)
     for (unsigned i = 1; i < NODES; i++) {
         prepare();
         world.dead_us = i % 2 == 0 ? 0 : DEAD_US;
-        world.events[0] = (struct event){STOP, 0.4, i, 0};
-        survives(i % 3 == 0 ? HOST_SEQUENTIAL : HOST_SPATIAL);
+        /* A node that holds pages is soon needed no more. */
+        bool holds = i % 3 == 0;
+        world.events[0] = (struct event){STOP, holds ? 0.1 : 0.4, i, 0};
+        survives(holds ? HOST_SEQUENTIAL : HOST_SPATIAL);
         assert_true(result.generations > 1);
     }
     prepare();
@@ -593,7 +524,7 @@ static void test_late_node(void **unused)
 static void swap(unsigned node, unsigned link, unsigned other,
                  unsigned other_link)
 {
-    struct end end = world.end[node][link];
+    struct ring_end end = world.end[node][link];
     world.end[node][link] = world.end[other][other_link];
     world.end[other][other_link] = end;
 }
