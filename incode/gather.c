@@ -26,24 +26,29 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
     const struct incode_brick *b = &frame->page.brick;
     for (; leaves != 0; leaves &= leaves - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
-        uint32_t n = frame->count - slot;
+        uint32_t end = slot + INCODE_LEAF_POINTS;
         if (g->around + INCODE_LEAF_POINTS > INCODE_AROUND_POINTS)
             return false;
-        incode_vd x = incode_vd_load(b->x + slot),
-                  y = incode_vd_load(b->y + slot),
-                  z = incode_vd_load(b->z + slot);
-        uint32_t in = incode_vd_mask(
-            (x >= incode_vd_all(q->lo[0])) & (x <= incode_vd_all(q->hi[0])) &
-            (y >= incode_vd_all(q->lo[1])) & (y <= incode_vd_all(q->hi[1])) &
-            (z >= incode_vd_all(q->lo[2])) & (z <= incode_vd_all(q->hi[2])));
-        if (n < INCODE_LEAF_POINTS)
-            in &= (UINT32_C(1) << n) - 1;
-        incode_vd_pack(g->p[0] + g->around, in, x);
-        incode_vd_pack(g->p[1] + g->around, in, y);
-        incode_vd_pack(g->p[2] + g->around, in, z);
-        incode_pack_count(g->id + g->around, in,
-                          brick * INCODE_BRICK_POINTS + slot);
-        g->around += (uint32_t)__builtin_popcount(in);
+        for (; slot < end && slot < frame->count; slot += INCODE_VD_LANES) {
+            incode_vd x = incode_vd_load(b->x + slot),
+                      y = incode_vd_load(b->y + slot),
+                      z = incode_vd_load(b->z + slot);
+            uint32_t n = frame->count - slot;
+            uint32_t in = incode_vd_mask((x >= incode_vd_all(q->lo[0])) &
+                                         (x <= incode_vd_all(q->hi[0])) &
+                                         (y >= incode_vd_all(q->lo[1])) &
+                                         (y <= incode_vd_all(q->hi[1])) &
+                                         (z >= incode_vd_all(q->lo[2])) &
+                                         (z <= incode_vd_all(q->hi[2])));
+            if (n < INCODE_VD_LANES)
+                in &= (UINT32_C(1) << n) - 1;
+            incode_vd_pack(g->p[0] + g->around, in, x);
+            incode_vd_pack(g->p[1] + g->around, in, y);
+            incode_vd_pack(g->p[2] + g->around, in, z);
+            incode_pack_count(g->id + g->around, in,
+                              brick * INCODE_BRICK_POINTS + slot);
+            g->around += (uint32_t)__builtin_popcount(in);
+        }
     }
     return true;
 }
@@ -148,7 +153,7 @@ static void choose_units(struct incode_gather *g, const double p[3],
  * no scan mistakes for a point: up to two vectors, with e infinite. */
 static void set_near(struct incode_gather *g, uint32_t n)
 {
-    incode_vi lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    incode_vi lane = incode_vi_count();
     incode_vf zero = incode_vf_all(0), infinite = incode_vf_all(INFINITE);
     double share = g->scale / g->per_unit;
     incode_vf factor = incode_vf_all((float)share);
@@ -188,7 +193,7 @@ static bool select_near(struct incode_gather *g)
 {
     incode_vi lo[3], span[3];
     bool whole = true;
-    incode_vi at = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    incode_vi at = incode_vi_count();
     for (int d = 0; d < 3; d++) {
         int32_t a = unit_of(g, d, g->lo[d]), b = unit_of(g, d, g->hi[d]);
         lo[d] = incode_vi_all(a);
@@ -363,7 +368,7 @@ static uint32_t list(const struct incode_gather *g, const struct bits *bits,
 
 INCODE_INLINE void note(struct bits *bits, uint32_t i, incode_vm out)
 {
-    uint64_t in = ~incode_vm_bits(out) & 0xffff;
+    uint64_t in = ~incode_vm_bits(out) & INCODE_VF_ALL;
     if (i % 64 == 0)
         bits->word[i / 64] = 0;
     bits->word[i / 64] |= in << (i % 64);

@@ -155,7 +155,7 @@ struct boxes {
 INCODE_INLINE incode_vl meets(const struct incode_query *q,
                               const struct boxes *boxes, unsigned i)
 {
-    incode_vl in = (incode_vl){-1, -1, -1, -1, -1, -1, -1, -1};
+    incode_vl in = incode_vl_ones();
     for (int d = 0; d < 3; d++) {
         incode_vd lo = incode_vd_load(boxes->lo[d] + i);
         incode_vd hi = incode_vd_load(boxes->hi[d] + i);
@@ -167,7 +167,7 @@ INCODE_INLINE incode_vl meets(const struct incode_query *q,
 INCODE_INLINE incode_vl not_done(const struct incode_query *q,
                                  const struct boxes *boxes, unsigned i)
 {
-    incode_vl in = (incode_vl){-1, -1, -1, -1, -1, -1, -1, -1};
+    incode_vl in = incode_vl_ones();
     for (int d = 0; d < 3; d++) {
         incode_vd lo = incode_vd_load(boxes->lo[d] + i);
         incode_vd hi = incode_vd_load(boxes->hi[d] + i);
@@ -274,7 +274,7 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
 {
     uint32_t mask = 0;
     for (unsigned i = 0; i < count; i += INCODE_VD_LANES) {
-        incode_vl in = (incode_vl){-1, -1, -1, -1, -1, -1, -1, -1};
+        incode_vl in = incode_vl_ones();
         if (q->boxed) {
             in = meets(q, boxes, i);
             if (incode_vd_mask(in) == 0)

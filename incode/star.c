@@ -47,13 +47,10 @@ static void take_faces(struct incode_triangulator *t, uint32_t limit)
 
 static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c)
 {
-    int32_t x = (int32_t)b, y = (int32_t)c;
-    incode_vi bs = {x, x, x, x, x, x, x, x, x, x, x, x, x, x, x, x};
-    incode_vi cs = {y, y, y, y, y, y, y, y, y, y, y, y, y, y, y, y};
+    incode_vi bs = incode_vi_all((int32_t)b), cs = incode_vi_all((int32_t)c);
     for (uint32_t i = 0; i < star->faces; i += INCODE_VF_LANES) {
-        uint32_t found = incode_vf_mask(
-            (*(const incode_vi *)(const void *)(star->b + i) == bs) &
-            (*(const incode_vi *)(const void *)(star->c + i) == cs));
+        uint32_t found = incode_vf_mask((incode_vi_load(star->b + i) == bs) &
+                                        (incode_vi_load(star->c + i) == cs));
         if (star->faces - i < INCODE_VF_LANES)
             found &= (UINT32_C(1) << (star->faces - i)) - 1;
         if (found == 0)

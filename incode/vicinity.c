@@ -89,7 +89,7 @@ struct chosen {
     uint64_t word[INCODE_VICINITY_BRICKS / 64];
 };
 
-/* Boxes [i, i + 16) that are in doubt. */
+/* The boxes from i on, a vector of them, that are in doubt. */
 INCODE_INLINE void note(struct chosen *chosen, uint32_t i, uint32_t in)
 {
     if (i % 64 == 0)
@@ -118,7 +118,7 @@ static void in_box(const struct incode_vicinity *v,
         for (int d = 1; d < 3; d++)
             out |= incode_vf_less(hi[d], incode_vf_load(v->lo[d] + i)) |
                    incode_vf_less(incode_vf_load(v->hi[d] + i), lo[d]);
-        note(chosen, i, ~incode_vm_bits(out) & 0xffff);
+        note(chosen, i, ~incode_vm_bits(out) & INCODE_VF_ALL);
     }
 }
 
@@ -156,7 +156,7 @@ static void in_ball(const struct incode_vicinity *v,
         note(chosen, i,
              ~incode_vm_bits(incode_vf_less(square, sum) |
                              incode_vf_less(top, floor)) &
-                 0xffff);
+                 INCODE_VF_ALL);
     }
 }
 

@@ -4,15 +4,15 @@
 #include "simd.h"
 
 /* What a walk does with the points of the leaves that it comes to: each
- * question's candidates, eight at a time. */
+ * question's candidates, a vector of points at a time. */
 
 struct lane_points {
-    incode_vd r[3]; /* relative coordinates of one leaf's points */
+    incode_vd r[3]; /* relative coordinates */
 };
 
-INCODE_INLINE void load_leaf(struct lane_points *p,
-                             const struct incode_query *q,
-                             const struct incode_frame *frame, unsigned slot)
+INCODE_INLINE void load_points(struct lane_points *p,
+                               const struct incode_query *q,
+                               const struct incode_frame *frame, unsigned slot)
 {
     incode_vd scale = incode_vd_all(q->scale);
     p->r[0] =
@@ -26,7 +26,7 @@ INCODE_INLINE void load_leaf(struct lane_points *p,
         scale;
 }
 
-/* Points of a leaf that are not certainly beaten, one bit each. */
+/* Points that are not certainly beaten, one bit each. */
 INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
                                   const struct lane_points *p)
 {
@@ -52,11 +52,11 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
         value_error += incode_vd_all(s->pdet) * square;
         out |= value + (value_error * eps + tiny) < zero;
     }
-    return ~incode_vd_mask(out) & 0xff;
+    return ~incode_vd_mask(out) & INCODE_VD_ALL;
 }
 
-/* Points of a leaf that lie in the ball and not certainly on the known side of
- * the plane: a coarser test, and a cheaper one. */
+/* Points that lie in the ball and not certainly on the known side of the plane:
+ * a coarser test, and a cheaper one. */
 INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
                                   const struct lane_points *p)
 {
@@ -69,10 +69,10 @@ INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
     /* A difference that overflows tells nothing. */
     incode_vl far = (square > incode_vd_all(q->square)) &
                     (square < incode_vd_all(__builtin_inf()));
-    return 0xff & ~incode_vd_mask(far | (plane < incode_vd_all(0)));
+    return INCODE_VD_ALL & ~incode_vd_mask(far | (plane < incode_vd_all(0)));
 }
 
-/* ---- eight points in twice the precision ---- */
+/* ---- a vector of points in twice the precision ---- */
 
 struct lane_dd {
     incode_vd hi, lo;
@@ -114,9 +114,10 @@ INCODE_INLINE struct lane_dd all_lanes(struct incode_dd a)
     return (struct lane_dd){incode_vd_all(a.hi), incode_vd_all(a.lo)};
 }
 
-/* incode_flat_outside for the points of a leaf, one bit each. */
-static uint32_t outside_lanes(const struct incode_query *q,
-                              const struct incode_frame *frame, unsigned slot)
+/* incode_flat_outside for some points, one bit each. */
+INCODE_INLINE uint32_t outside_lanes(const struct incode_query *q,
+                                     const struct incode_frame *frame,
+                                     unsigned slot)
 {
     const struct incode_brick *brick = &frame->page.brick;
     const double *const axis[3] = {brick->x + slot, brick->y + slot,
@@ -147,11 +148,16 @@ static uint32_t outside_lanes(const struct incode_query *q,
 uint32_t incode_query_lanes(const struct incode_query *q,
                             const double *const axis[3])
 {
-    struct lane_points points;
-    for (int d = 0; d < 3; d++)
-        points.r[d] = (incode_vd_load(axis[d]) - incode_vd_all(q->pv[d])) *
-                      incode_vd_all(q->scale);
-    return apex_lanes(q, &points);
+    uint32_t mask = 0;
+    for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
+        struct lane_points points;
+        for (int d = 0; d < 3; d++)
+            points.r[d] =
+                (incode_vd_load(axis[d] + i) - incode_vd_all(q->pv[d])) *
+                incode_vd_all(q->scale);
+        mask |= apex_lanes(q, &points) << i;
+    }
+    return mask;
 }
 
 static void point_of(double p[3], const struct incode_frame *frame,
@@ -236,6 +242,29 @@ static bool is_done(const struct incode_query *q, const double p[3])
     return done;
 }
 
+/* The points of a leaf that an APEX query must consider, one bit each. */
+static uint32_t apex_leaf(const struct incode_query *q,
+                          const struct incode_frame *frame, unsigned first,
+                          uint32_t lanes)
+{
+    uint32_t in = 0;
+    for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
+        struct lane_points points;
+        uint32_t here = lanes >> i & INCODE_VD_ALL;
+        load_points(&points, q, frame, first + i);
+        if (q->round)
+            here &= ball_lanes(q, &points);
+        if (here != 0)
+            here &= apex_lanes(q, &points);
+        in |= here << i;
+    }
+    if ((in & (in - 1)) == 0 || q->flat.spread == 0)
+        return in;
+    for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES)
+        in &= ~(outside_lanes(q, frame, first + i) << i);
+    return in;
+}
+
 static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
                        const struct incode_frame *frame, uint32_t brick,
                        unsigned leaf)
@@ -244,16 +273,8 @@ static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
     unsigned count = frame->count - first;
     uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
     *walker->candidates += (unsigned)__builtin_popcount(lanes);
-    if (q->question == INCODE_QUERY_APEX) {
-        struct lane_points points;
-        load_leaf(&points, q, frame, first);
-        if (q->round)
-            lanes &= ball_lanes(q, &points);
-        if (lanes != 0)
-            lanes &= apex_lanes(q, &points);
-        if ((lanes & (lanes - 1)) != 0 && q->flat.spread != 0)
-            lanes &= ~outside_lanes(q, frame, first);
-    }
+    if (q->question == INCODE_QUERY_APEX)
+        lanes = apex_leaf(q, frame, first, lanes);
     for (; lanes != 0; lanes &= lanes - 1) {
         unsigned slot = first + (unsigned)__builtin_ctz(lanes);
         uint32_t id = brick * INCODE_BRICK_POINTS + slot;
@@ -345,19 +366,32 @@ void incode_hit_add(struct incode_query *q, struct incode_hits *hits,
         draw_in(q, pencil, hit->t);
 }
 
+/* The points of a leaf that lie in the ball, or may be beyond the face while
+ * there is none, one bit each. */
+INCODE_INLINE uint32_t pencil_leaf(const struct incode_query *q,
+                                   const struct incode_frame *frame,
+                                   unsigned first)
+{
+    uint32_t in = 0;
+    for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
+        struct lane_points points;
+        load_points(&points, q, frame, first + i);
+        in |= (q->round ? ball_lanes(q, &points) : apex_lanes(q, &points)) << i;
+    }
+    return in;
+}
+
 bool incode_visit_pencil(struct incode_walker *walker, struct incode_query *q,
                          const struct incode_frame *frame, uint32_t brick,
                          uint32_t leaves, void *context)
 {
     struct incode_hits *hits = context;
-    struct lane_points points;
     for (; leaves != 0; leaves &= leaves - 1) {
         unsigned first = (unsigned)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
         unsigned count = frame->count - first;
         uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
         *walker->candidates += (unsigned)__builtin_popcount(lanes);
-        load_leaf(&points, q, frame, first);
-        lanes &= q->round ? ball_lanes(q, &points) : apex_lanes(q, &points);
+        lanes &= pencil_leaf(q, frame, first);
         for (; lanes != 0; lanes &= lanes - 1) {
             unsigned slot = first + (unsigned)__builtin_ctz(lanes);
             uint32_t id = brick * INCODE_BRICK_POINTS + slot;
