@@ -147,8 +147,9 @@ chmod +x "$scratch/dies" "$scratch/mute"
 hopeless 'a node program that a signal ends' "$scratch/dies"
 hopeless 'a node program that says nothing' "$scratch/mute"
 
-# A node that is killed whenever it comes up.
-start --strategy spatial
+# A node that is killed whenever it comes up; the host reads slowly, so that the
+# run does not end before.
+start --strategy spatial --host-rate 100000
 while kill -0 $host 2> /dev/null; do strike KILL 3; done
 wait $host
 status=$?
