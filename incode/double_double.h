@@ -66,4 +66,26 @@ static inline struct incode_dd incode_dd_difference(double a, double b,
     return r;
 }
 
+struct incode_dd_vector {
+    struct incode_dd d[3];
+};
+
+/* (p - v) * scale, as above. */
+static inline struct incode_dd_vector
+incode_dd_relative(const double p[3], const double v[3], double scale)
+{
+    struct incode_dd_vector r;
+    for (int k = 0; k < 3; k++)
+        r.d[k] = incode_dd_difference(p[k], v[k], scale);
+    return r;
+}
+
+static inline struct incode_dd incode_dd_dot(const struct incode_dd a[3],
+                                             const struct incode_dd b[3])
+{
+    return incode_dd_plus(incode_dd_plus(incode_dd_times(a[0], b[0]),
+                                         incode_dd_times(a[1], b[1])),
+                          incode_dd_times(a[2], b[2]));
+}
+
 #endif

@@ -52,13 +52,6 @@ static struct incode_dd minor3(const struct incode_dd a[3],
     return incode_dd_plus(incode_dd_plus(bc, ca), ab);
 }
 
-static struct incode_dd norm(const struct incode_dd a[3])
-{
-    return incode_dd_plus(incode_dd_plus(incode_dd_times(a[0], a[0]),
-                                         incode_dd_times(a[1], a[1])),
-                          incode_dd_times(a[2], a[2]));
-}
-
 bool incode_pair_orient3d(const double *const p[4], double most, int *sign)
 {
     struct incode_dd d[3][3];
@@ -75,10 +68,14 @@ bool incode_pair_in_sphere(const double *const p[5], double most, int *sign)
     double m[3];
     if (!differences(d, m, p, 4, p[4], most))
         return false;
-    struct incode_dd a = incode_dd_times(norm(d[0]), minor3(d[1], d[2], d[3]));
-    struct incode_dd b = incode_dd_times(norm(d[1]), minor3(d[0], d[2], d[3]));
-    struct incode_dd c = incode_dd_times(norm(d[2]), minor3(d[0], d[1], d[3]));
-    struct incode_dd e = incode_dd_times(norm(d[3]), minor3(d[0], d[1], d[2]));
+    struct incode_dd a =
+        incode_dd_times(incode_dd_dot(d[0], d[0]), minor3(d[1], d[2], d[3]));
+    struct incode_dd b =
+        incode_dd_times(incode_dd_dot(d[1], d[1]), minor3(d[0], d[2], d[3]));
+    struct incode_dd c =
+        incode_dd_times(incode_dd_dot(d[2], d[2]), minor3(d[0], d[1], d[3]));
+    struct incode_dd e =
+        incode_dd_times(incode_dd_dot(d[3], d[3]), minor3(d[0], d[1], d[2]));
     double w = m[0] > m[1] ? m[0] : m[1];
     w = m[2] > w ? m[2] : w;
     return decide(incode_dd_plus(incode_dd_minus(a, b), incode_dd_minus(c, e)),

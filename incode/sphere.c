@@ -39,34 +39,15 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
 
 /* ---- twice the precision ---- */
 
-struct vector {
-    struct incode_dd d[3];
-};
-
-static struct vector relative(const double p[3], const double v[3],
-                              double scale)
+static struct incode_dd_vector cross(const struct incode_dd_vector *a,
+                                     const struct incode_dd_vector *b)
 {
-    struct vector r;
-    for (int k = 0; k < 3; k++)
-        r.d[k] = incode_dd_difference(p[k], v[k], scale);
-    return r;
-}
-
-static struct vector cross(const struct vector *a, const struct vector *b)
-{
-    struct vector r;
+    struct incode_dd_vector r;
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
         r.d[k] = incode_dd_cross(a->d[i], b->d[j], a->d[j], b->d[i]);
     }
     return r;
-}
-
-static struct incode_dd dot(const struct vector *a, const struct vector *b)
-{
-    return incode_dd_plus(incode_dd_plus(incode_dd_times(a->d[0], b->d[0]),
-                                         incode_dd_times(a->d[1], b->d[1])),
-                          incode_dd_times(a->d[2], b->d[2]));
 }
 
 /* What is left: the roundings of the evaluation, at most 7 units on a term with
@@ -81,20 +62,23 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
                         const double b[3], const double c[3], const double *a,
                         double scale)
 {
-    struct vector rb = relative(b, v, scale), rc = relative(c, v, scale);
-    struct vector n = cross(&rb, &rc);
+    struct incode_dd_vector rb = incode_dd_relative(b, v, scale),
+                            rc = incode_dd_relative(c, v, scale);
+    struct incode_dd_vector n = cross(&rb, &rc);
     memcpy(f->n, n.d, sizeof f->n);
     if (a == NULL)
         return;
-    struct vector ra = relative(a, v, scale);
-    struct vector ca = cross(&rc, &ra), ab = cross(&ra, &rb);
-    struct incode_dd bb = dot(&rb, &rb), cc = dot(&rc, &rc), aa = dot(&ra, &ra);
+    struct incode_dd_vector ra = incode_dd_relative(a, v, scale);
+    struct incode_dd_vector ca = cross(&rc, &ra), ab = cross(&ra, &rb);
+    struct incode_dd bb = incode_dd_dot(rb.d, rb.d),
+                     cc = incode_dd_dot(rc.d, rc.d),
+                     aa = incode_dd_dot(ra.d, ra.d);
     for (int k = 0; k < 3; k++) {
         struct incode_dd m = incode_dd_plus(incode_dd_times(bb, ca.d[k]),
                                             incode_dd_times(cc, ab.d[k]));
         f->m[k] = incode_dd_plus(m, incode_dd_times(aa, n.d[k]));
     }
-    f->det = dot(&ra, &n);
+    f->det = incode_dd_dot(ra.d, n.d);
 }
 
 void incode_sphere_refine(struct incode_sphere *s, const double v[3],

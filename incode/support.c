@@ -7,27 +7,6 @@
 /* Twice the precision, relative to its terms. */
 #define FINE 1e-29
 
-struct vector {
-    struct incode_dd d[3];
-};
-
-static struct vector relative(const double p[3], const double v[3],
-                              double scale)
-{
-    struct vector r;
-    for (int k = 0; k < 3; k++)
-        r.d[k] = incode_dd_difference(p[k], v[k], scale);
-    return r;
-}
-
-static struct incode_dd dot(const struct incode_dd a[3],
-                            const struct incode_dd b[3])
-{
-    return incode_dd_plus(incode_dd_plus(incode_dd_times(a[0], b[0]),
-                                         incode_dd_times(a[1], b[1])),
-                          incode_dd_times(a[2], b[2]));
-}
-
 static double length_of(const double a[3])
 {
     return __builtin_sqrt(incode_dot(a, a));
@@ -36,10 +15,10 @@ static double length_of(const double a[3])
 struct incode_dd incode_support_height(const struct incode_support *s,
                                        const double x[3])
 {
-    struct vector r = relative(x, s->p, s->scale), n;
+    struct incode_dd_vector r = incode_dd_relative(x, s->p, s->scale), n;
     for (int k = 0; k < 3; k++)
         n.d[k] = (struct incode_dd){s->n[k], 0};
-    return dot(n.d, r.d);
+    return incode_dd_dot(n.d, r.d);
 }
 
 enum { SLOPES = 1000000 }; /* one in so many is a direction of its own */
@@ -157,10 +136,11 @@ bool incode_flat_outside(const struct incode_flat *flat, const double pv[3],
 {
     if (flat->spread == 0)
         return false;
-    struct vector r = relative(p, pv, scale);
-    struct incode_dd square = dot(r.d, r.d);
-    struct incode_dd value = incode_dd_minus(
-        dot(flat->sphere.m, r.d), incode_dd_times(flat->sphere.det, square));
+    struct incode_dd_vector r = incode_dd_relative(p, pv, scale);
+    struct incode_dd square = incode_dd_dot(r.d, r.d);
+    struct incode_dd value =
+        incode_dd_minus(incode_dd_dot(flat->sphere.m, r.d),
+                        incode_dd_times(flat->sphere.det, square));
     double far = __builtin_sqrt(square.hi);
     return value.hi < -flat->spread * (far + square.hi) - INCODE_SPHERE_TINY;
 }
