@@ -307,6 +307,14 @@ bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
 
 /* ---- along a pencil ---- */
 
+INCODE_INLINE incode_vl done_lanes(const struct incode_query *q, int d,
+                                   const double *p)
+{
+    incode_vd x = incode_vd_load(p);
+    return (x >= incode_vd_all(q->done_lo[d])) &
+           (x <= incode_vd_all(q->done_hi[d]));
+}
+
 /* The ball of the pencil's sphere at t, widened by 1e-6 of its size. */
 static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
                     double t)
@@ -367,40 +375,49 @@ void incode_hit_add(struct incode_query *q, struct incode_hits *hits,
 }
 
 /* The points of a leaf that lie in the ball, or may be beyond the face while
- * there is none, one bit each. */
+ * there is none, and not in the box that is done, one bit each. */
 INCODE_INLINE uint32_t pencil_leaf(const struct incode_query *q,
                                    const struct incode_frame *frame,
                                    unsigned first)
 {
+    const struct incode_brick *b = &frame->page.brick;
     uint32_t in = 0;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
         struct lane_points points;
         load_points(&points, q, frame, first + i);
-        in |= (q->round ? ball_lanes(q, &points) : apex_lanes(q, &points)) << i;
+        uint32_t here =
+            q->round ? ball_lanes(q, &points) : apex_lanes(q, &points);
+        if (q->done)
+            here &= ~incode_vd_mask(done_lanes(q, 0, b->x + first + i) &
+                                    done_lanes(q, 1, b->y + first + i) &
+                                    done_lanes(q, 2, b->z + first + i));
+        in |= here << i;
     }
     return in;
 }
 
+/* Leaf after leaf without a branch on what is there: candidates are few. */
 bool incode_visit_pencil(struct incode_walker *walker, struct incode_query *q,
                          const struct incode_frame *frame, uint32_t brick,
                          uint32_t leaves, void *context)
 {
     struct incode_hits *hits = context;
+    uint64_t candidates = 0;
+    *walker->candidates +=
+        (unsigned)__builtin_popcount(leaves) * INCODE_LEAF_POINTS;
     for (; leaves != 0; leaves &= leaves - 1) {
         unsigned first = (unsigned)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
-        unsigned count = frame->count - first;
-        uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
-        *walker->candidates += (unsigned)__builtin_popcount(lanes);
-        lanes &= pencil_leaf(q, frame, first);
-        for (; lanes != 0; lanes &= lanes - 1) {
-            unsigned slot = first + (unsigned)__builtin_ctz(lanes);
-            uint32_t id = brick * INCODE_BRICK_POINTS + slot;
-            double p[3];
-            point_of(p, frame, slot);
-            if (id != q->v && id != q->b && id != q->c && id != q->best &&
-                !(q->done && is_done(q, p)))
-                incode_hit_add(q, hits, id, p);
-        }
+        candidates |= (uint64_t)pencil_leaf(q, frame, first) << first;
+    }
+    if (frame->count < INCODE_BRICK_POINTS)
+        candidates &= (UINT64_C(1) << frame->count) - 1;
+    for (; candidates != 0; candidates &= candidates - 1) {
+        unsigned slot = (unsigned)__builtin_ctzll(candidates);
+        uint32_t id = brick * INCODE_BRICK_POINTS + slot;
+        double p[3];
+        point_of(p, frame, slot);
+        if (id != q->v && id != q->b && id != q->c && id != q->best)
+            incode_hit_add(q, hits, id, p);
     }
     return true;
 }
