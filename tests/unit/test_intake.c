@@ -12,6 +12,7 @@
 #include "../../host/gen.h"
 #include "../../host/intake.h"
 #include "../../node/result.h"
+#include "line.h"
 
 enum { NODES = 4 };
 
@@ -30,29 +31,15 @@ static struct host_machine machine;
 static struct host_order order;
 static struct host_tetrahedra tets;
 
-/* The host's end of a cube whose wires bring nothing: which link of a node is
- * named is known all the same. */
-static int no_bytes(void *unused, uint8_t *bytes, size_t size)
-{
-    (void)unused;
-    (void)bytes;
-    (void)size;
-    return 0;
-}
-
-static int no_room(void *unused, const uint8_t *bytes, size_t size)
-{
-    (void)unused;
-    (void)bytes;
-    (void)size;
-    return 0;
-}
+/* The host's end of a cube, which nobody polls: which link of a node is named is
+ * known all the same. */
+static struct sim_end nowhere;
 
 static void *open_cube(void)
 {
     struct cube_config config = {
         .self = CUBE_HOST, .dimension = 2, .window = 1, .epoch = 1};
-    config.pipes[0] = (struct link_pipe){.send = no_room, .receive = no_bytes};
+    config.pipes[0] = line_pipe(&nowhere);
     void *arena = malloc(cube_arena_bytes(&config));
     assert_non_null(arena);
     service.cube = cube_init(arena, cube_arena_bytes(&config), &config);
