@@ -31,8 +31,8 @@ static struct host_machine machine;
 static struct host_order order;
 static struct host_tetrahedra tets;
 
-/* The host's end of a cube, which nobody polls: which link of a node is named is
- * known all the same. */
+/* The host's end of a cube, which nobody polls: the link of a node is named
+ * all the same. */
 static struct sim_end nowhere;
 
 static void *open_cube(void)
