@@ -234,10 +234,10 @@ endif
 		--verify --table --stats "$$result.json" -o "$$result.vtu"
 
 test: deps-test
-	@BUILD='$(BUILD)' bash tests/run
+	@exec env BUILD='$(BUILD)' bash tests/run
 
 test-full: deps-full
-	@BUILD='$(BUILD)' bash tests/run --full
+	@exec env BUILD='$(BUILD)' bash tests/run --full
 
 bench: deps-bench
 	@$(MAKE) --no-print-directory all
