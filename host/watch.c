@@ -223,12 +223,13 @@ static int fail_wrong(const struct host_service *s, struct host_error *error)
  * silent: at first nobody is blamed, but each is called alone. */
 static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
 {
-    uint64_t limit = s->patience_us;
-    if (s->probing && limit > PROBE_US) {
-        limit = PROBE_US;
-    }
+    uint16_t gate = cube_wiring(s->cube)->gate;
     for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];
+        /* Without the only gate the run is over: haste gains nothing. */
+        bool haste = s->probing && (i != gate || s->machine->spare_node != 0);
+        uint64_t limit =
+            haste && s->patience_us > PROBE_US ? PROBE_US : s->patience_us;
         if (node->calling && now_us - node->called_us >= node->call_again_us) {
             node->call_due = true;
             node->called_us = now_us;
