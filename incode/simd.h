@@ -41,6 +41,7 @@
 typedef float incode_vf __attribute__((vector_size(INCODE_VECTOR), may_alias));
 typedef int32_t incode_vi
     __attribute__((vector_size(INCODE_VECTOR), may_alias));
+typedef int32_t incode_lane __attribute__((may_alias));
 typedef uint32_t incode_vu
     __attribute__((vector_size(INCODE_VECTOR), may_alias));
 typedef double incode_vd __attribute__((vector_size(INCODE_VECTOR), may_alias));
@@ -358,7 +359,7 @@ INCODE_INLINE void incode_vi_pack(void *out, uint32_t mask, incode_vi a)
     _mm256_storeu_si256(
         out, _mm256_permutevar8x32_epi32((__m256i)a, incode_packing(bytes)));
 #else
-    int32_t *to = out;
+    incode_lane *to = out;
     for (uint32_t i = 0, n = 0; i < INCODE_VF_LANES; i++) {
         to[n] = a[i];
         n += mask >> i & 1;

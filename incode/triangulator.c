@@ -331,7 +331,9 @@ static void look_ahead(struct incode_triangulator *t)
     const struct incode_frame *f = incode_pager_get(&t->pager, brick);
     if (f == NULL) {
         for (uint32_t i = 1; i < t->lookahead && t->ahead + i < own; i++)
-            (void)incode_pager_get(&t->pager, brick + i);
+            if (incode_pager_get(&t->pager, brick + i) == NULL &&
+                !incode_pager_loading(&t->pager, brick + i))
+                break; /* no more can be asked for at present */
         return;
     }
     struct incode_query q;
