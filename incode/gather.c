@@ -334,7 +334,9 @@ uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
     g->y[k] = (float)r[1];
     g->z[k] = (float)r[2];
     g->w[k] = (float)square;
-    g->e[k] = (float)(length * FLOAT_SHARE + 2.1 * g->doubt);
+    /* Farther than that, single precision says nothing of its square. */
+    g->e[k] = length < 0x1p60 ? (float)(length * FLOAT_SHARE + 2.1 * g->doubt)
+                              : INFINITE;
     g->at[k] = i;
     g->near_id[k] = id;
     /* What follows is padding. */
