@@ -113,16 +113,19 @@ static void floats(void **unused)
 {
     (void)unused;
     _Alignas(INCODE_VECTOR) float x[F], y[F];
+    _Alignas(INCODE_VECTOR) int32_t known[F];
     for (int round = 0; round < ROUNDS; round++) {
         float least = INFINITY;
         for (int i = 0; i < F; i++) {
             x[i] = draw_float();
             y[i] = draw() % 4 == 0 ? x[i] : draw_float();
+            known[i] = isnan(x[i]) ? 0 : -1;
             least = x[i] < least ? x[i] : least;
         }
         incode_vf a = incode_vf_load(x), b = incode_vf_load(y);
         incode_vf max = incode_vf_max(a, b), ratio = incode_vf_ratio(a, b);
-        incode_vf number = incode_vf_select(a == a, a, incode_vf_all(INFINITY));
+        incode_vf number =
+            incode_vf_select(incode_vi_load(known), a, incode_vf_all(INFINITY));
         uint32_t less = incode_vm_bits(incode_vf_less(a, b));
         assert_true(incode_vf_least_of(number) == least);
         for (int i = 0; i < F; i++) {
