@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "child.h"
+#include "parallel.h"
 #include "progress.h"
 
 /* Sanitizers map memory by the terabyte: no limit then. */
@@ -22,6 +23,8 @@
 #else
 #define LIMITED true
 #endif
+
+enum { WATCH_US = 100 }; /* a page's way to a node, where nobody sleeps */
 
 extern char **environ;
 
@@ -62,7 +65,7 @@ static bool set_limit(int resource, uint64_t bytes)
 static void become_node(const void *context, unsigned node)
 {
     const struct host_cluster *c = context;
-    char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
+    char text[7][32], links[CUBE_LINKS_MAX * 12] = "";
     char *no_environment[] = {NULL};
     size_t at = 0;
     (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
@@ -79,6 +82,7 @@ static void become_node(const void *context, unsigned node)
     snprintf(text[3], sizeof text[3], "%d", (int)HOST_STACK_BYTES);
     snprintf(text[4], sizeof text[4], "%u", c->options.window);
     snprintf(text[5], sizeof text[5], "%lu", (unsigned long)c->epoch);
+    snprintf(text[6], sizeof text[6], "%llu", (unsigned long long)c->watch_us);
     char *argv[] = {(char[]){"incode-node"},
                     (char[]){"--node"},
                     text[0],
@@ -92,6 +96,8 @@ static void become_node(const void *context, unsigned node)
                     text[4],
                     (char[]){"--epoch"},
                     text[5],
+                    (char[]){"--watch"},
+                    text[6],
                     (char[]){"--links"},
                     links,
                     NULL};
@@ -154,6 +160,8 @@ int host_cluster_start(struct host_cluster *cluster,
     cluster->nodes = options->nodes;
     cluster->options = *options;
     cluster->limited = LIMITED;
+    /* Not where others wait for the processor. */
+    cluster->watch_us = options->nodes < host_threads() ? WATCH_US : 0;
     cluster->epoch = first_epoch();
     for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
         cluster->process[i].ended = true;
@@ -286,7 +294,7 @@ static uint64_t machine_now_us(void *context)
 static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_cluster *cluster = context;
-    host_port_idle(&cluster->port, 1, wait_us);
+    host_port_idle(&cluster->port, 1, wait_us, cluster->watch_us);
 }
 
 static int machine_check(void *context, struct host_error *error)

@@ -3,9 +3,9 @@
 #include <errno.h>
 #include <poll.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "../transport/drivers/wait.h"
 #include "progress.h"
 
 void host_port_socket(struct host_port *port, int fd)
@@ -82,7 +82,8 @@ static unsigned add_events(const struct host_port *port, struct pollfd *fds)
     }
 }
 
-void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
+void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
+                    uint64_t watch_us)
 {
     struct pollfd fds[HOST_PORTS_MAX * TCP_WIRE_FDS_MAX];
     nfds_t used = 0;
@@ -98,9 +99,7 @@ void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
             unplug(port);
         }
     }
-    struct timespec wait = {(time_t)(wait_us / 1000000),
-                            (long)(wait_us % 1000000) * 1000};
-    (void)ppoll(fds, used, &wait, NULL);
+    wait_files(fds, used, wait_us, watch_us);
 }
 
 void host_port_rest(struct host_port *port, uint64_t rest_us)

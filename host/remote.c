@@ -119,7 +119,7 @@ static uint64_t machine_now_us(void *context)
 static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_remote *r = context;
-    host_port_idle(r->port, r->ports, wait_us);
+    host_port_idle(r->port, r->ports, wait_us, 0);
 }
 
 /* A node that says why it cannot start would do so again. */

@@ -37,6 +37,7 @@ struct linux_board {
     struct linux_wire wire[CUBE_LINKS_MAX];
     unsigned links_count;
     uint8_t key[SECURE_KEY_BYTES];
+    uint64_t watch_us;
     char **again; /* arguments of the next start; NULL: there is none */
 };
 
@@ -55,7 +56,7 @@ static uint64_t busy_us(void *context)
 static void idle(void *context, uint64_t wait_us)
 {
     struct linux_board *board = context;
-    linux_wires_idle(board->wire, board->links_count, wait_us);
+    linux_wires_idle(board->wire, board->links_count, wait_us, board->watch_us);
 }
 
 /* A node that a user started begins anew, with an epoch of its own. */
@@ -236,6 +237,7 @@ static int prepare(char **argv, struct straps *straps,
                         4);
     }
     linux_board->links_count = straps->links_count + straps->wires_count;
+    linux_board->watch_us = straps->watch;
     if (straps->wires_count > 0 &&
         !open_wires(linux_board, straps, net, &fault)) {
         return complain(fault, 2);

@@ -29,6 +29,8 @@ static const char help[] =
     "Of the host that starts nodes itself:\n"
     "  --links FD,FD,..   the wires of links 0, 1, .. are these open files\n"
     "  --epoch N          of this start, never repeated\n"
+    "  --watch US         microseconds to stay awake when there is nothing to "
+    "do\n"
     "\n"
     "Exit status: 0 done, 2 wrong usage, 4 it cannot start.\n";
 
@@ -99,7 +101,8 @@ static const char *read_one(const char *name, const char *text,
                  {"--epoch", &straps->epoch, UINT32_MAX},
                  {"--lines", &straps->lines, UINT32_MAX},
                  {"--host-wire", &straps->host_wire, 1},
-                 {"--dead", &straps->dead, UINT32_MAX}};
+                 {"--dead", &straps->dead, UINT32_MAX},
+                 {"--watch", &straps->watch, UINT32_MAX}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
         if (strcmp(name, known[i].name) == 0) {
             bool good = read_number(&text, known[i].value) && *text == '\0';

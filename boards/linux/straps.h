@@ -17,7 +17,7 @@
 
 struct straps {
     uint64_t node, dimension, memory, stack, window, epoch, lines, host_wire,
-        dead;
+        dead, watch;
     int links[CUBE_LINKS_MAX];
     unsigned links_count;
     /* That the node opens itself: the arguments, as "2=call:10.0.0.1:7001". */

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "../../transport/drivers/secure_sodium.h"
+#include "../../transport/drivers/wait.h"
 
 enum { LOOK_US = 500000 };
 
@@ -147,7 +148,7 @@ static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds)
 }
 
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
-                      uint64_t wait_us)
+                      uint64_t wait_us, uint64_t watch_us)
 {
     struct pollfd fds[CUBE_LINKS_MAX * TCP_WIRE_FDS_MAX];
     nfds_t used = 0;
@@ -159,7 +160,5 @@ void linux_wires_idle(struct linux_wire *wires, unsigned count,
         }
         used += add_events(wire, fds + used);
     }
-    struct timespec wait = {(time_t)(wait_us / 1000000),
-                            (long)(wait_us % 1000000) * 1000};
-    (void)ppoll(fds, used, &wait, NULL);
+    wait_files(fds, used, wait_us, watch_us);
 }
