@@ -4,14 +4,14 @@
  * are met.
  *
  * Memory: struct incode_gather, about 35 KB.  Work: one walk a leaf, one pass a
- * vertex; a scan looks at every point around the vertex, 16 at a time in single
- * precision, and leaves what its error bound cannot tell to the exact
+ * vertex; a scan looks at every point around the vertex, a vector at a time in
+ * single precision, and leaves what its error bound cannot tell to the exact
  * predicates.
  *
  *     incode_gather_around(&g, &walker, &vicinity, leaf, lo, hi, radius);
  *     incode_gather_centre(&g, v, p, radius, domain_lo, domain_hi);
- *     i = incode_gather_first(&g, 0, g.inner, n, m, nn);   first by distance
- *     count = incode_gather_inside(&g, 0, g.inner, &sphere, out);
+ *     count = incode_gather_first(&g, &pencil, &t, out);   first by distance
+ *     count = incode_gather_inside(&g, &sphere, out);
  */
 #ifndef INCODE_GATHER_H
 #define INCODE_GATHER_H

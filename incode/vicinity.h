@@ -2,8 +2,8 @@
  * points at hand end among them, without the tree.
  *
  * Memory: struct incode_vicinity, about 6 KB.  Work: a walk of the box pages a
- * brick; a search looks at every box of the list, 16 at a time, and at the
- * leaves of those that it cannot rule out.
+ * brick; a search looks at every box of the list, a vector at a time, and at
+ * the leaves of those that it cannot rule out.
  *
  *     incode_vicinity_make(&vicinity, &walker, brick, lo, hi, pages_max);
  *     r = incode_vicinity_visit(&vicinity, &walker, &query, visit, context);

@@ -127,6 +127,28 @@ static void reach_on_a_rough_plane(void **unused)
     assert_true(reaches > 50 && short_ones > 10 && outside > 10000);
 }
 
+/* The pencil of the face (0, b, c), but for its size; false: the square of the
+ * face's sine is no more than `least`, by the maximum norm. */
+static bool set_pencil(struct incode_pencil *pencil, const double b[3],
+                       const double c[3], double least)
+{
+    double n[3], cn[3], nb[3];
+    incode_cross(n, b, c);
+    double nn = incode_dot(n, n);
+    double product = incode_max_norm(b) * incode_max_norm(c);
+    if (!(nn > least * product * product)) {
+        return false;
+    }
+    incode_cross(cn, c, n);
+    incode_cross(nb, n, b);
+    for (int d = 0; d < 3; d++) {
+        pencil->n[d] = n[d] / sqrt(nn);
+        pencil->c0[d] =
+            (incode_dot(b, b) * cn[d] + incode_dot(c, c) * nb[d]) / (2 * nn);
+    }
+    return true;
+}
+
 /* The places of points in a pencil against the predicates. */
 static void places_in_a_pencil(void **unused)
 {
@@ -147,20 +169,8 @@ static void places_in_a_pencil(void **unused)
             r[0][d] = p[3][d] - p[0][d];
             r[1][d] = p[4][d] - p[0][d];
         }
-        double n[3], cn[3], nb[3];
-        incode_cross(n, b, c);
-        double nn = incode_dot(n, n);
-        double product = incode_max_norm(b) * incode_max_norm(c);
-        if (!(nn > 1e-4 * product * product)) {
+        if (!set_pencil(&pencil, b, c, 1e-4)) {
             continue;
-        }
-        incode_cross(cn, c, n);
-        incode_cross(nb, n, b);
-        for (int d = 0; d < 3; d++) {
-            pencil.n[d] = n[d] / sqrt(nn);
-            pencil.c0[d] =
-                (incode_dot(b, b) * cn[d] + incode_dot(c, c) * nb[d]) /
-                (2 * nn);
         }
         pencil.size = fmax(fmax(incode_max_norm(b), incode_max_norm(c)),
                            incode_max_norm(pencil.c0));
@@ -206,22 +216,11 @@ static void first_of_the_gathered(void **unused)
         incode_gather_centre(&g, 7, p, 0.35, lo, hi);
         assert_true(g.near > 4 && g.self == 7);
         struct incode_pencil pencil;
-        double b[3], c[3], n[3], cn[3], nb[3], t;
+        double b[3], c[3], t;
         incode_gather_relative(&g, g.at[below(g.near)], b);
         incode_gather_relative(&g, g.at[below(g.near)], c);
-        incode_cross(n, b, c);
-        double nn = incode_dot(n, n);
-        double product = incode_max_norm(b) * incode_max_norm(c);
-        if (!(nn > 1e-2 * product * product) || !(product > 0)) {
+        if (!set_pencil(&pencil, b, c, 1e-2)) {
             continue;
-        }
-        incode_cross(cn, c, n);
-        incode_cross(nb, n, b);
-        for (int d = 0; d < 3; d++) {
-            pencil.n[d] = n[d] / sqrt(nn);
-            pencil.c0[d] =
-                (incode_dot(b, b) * cn[d] + incode_dot(c, c) * nb[d]) /
-                (2 * nn);
         }
         pencil.size = fmax(incode_max_norm(b), incode_max_norm(c));
         uint32_t count = incode_gather_first(&g, &pencil, &t, out);
