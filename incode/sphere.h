@@ -93,15 +93,13 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
  * rounding). */
 static inline bool incode_plane_is_blurred(const struct incode_sphere *s)
 {
-    double n = incode_max_norm(s->n);
-    return s->pn[0] > 1024 * n && n > INCODE_SPHERE_LEAST;
+    return s->pn[0] > 1024 * incode_max_norm(s->n);
 }
 
 static inline bool incode_sphere_is_blurred(const struct incode_sphere *s)
 {
     double det = __builtin_fabs(s->det), m = incode_max_norm(s->m);
-    return (s->pdet > 1024 * det || s->pm[0] > 1024 * m) &&
-           det > INCODE_SPHERE_LEAST && m > INCODE_SPHERE_LEAST;
+    return s->pdet > 1024 * det || s->pm[0] > 1024 * m;
 }
 
 /* So ill-conditioned, or so much larger than its face, that it tells nothing of
