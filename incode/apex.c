@@ -480,11 +480,13 @@ static bool reach_fits(struct incode_make *n)
             continue;
         const double *const q[4] = {n->pv, n->pb, n->pc, p};
         incode_flat_lessen(&n->flat, q, g->scale);
+        const struct incode_ball *ball = &n->flat.ball;
+        double radius = ball->radius * (1 + 1e-9);
         asked++;
         fits = true;
         for (int d = 0; d < 3; d++)
-            fits = fits && n->flat.reach * (1 + 1e-9) < g->rhi[d] &&
-                   n->flat.reach * (1 + 1e-9) < -g->rlo[d];
+            fits = fits && ball->centre[d] + radius < g->rhi[d] &&
+                   ball->centre[d] - radius > g->rlo[d];
     }
     return fits;
 }
@@ -495,7 +497,7 @@ static bool contest_flat(struct incode_make *n)
     const struct incode_triangulator *t = n->t;
     const struct incode_gather *g = &t->gather;
     n->flat.known = true;
-    n->flat.reach = __builtin_inf();
+    n->flat.ball.radius = __builtin_inf();
     n->flat.spread = 0;
     n->flat.regular = n->regular;
     if (n->regular)
@@ -545,7 +547,7 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
         incode_count_candidates(t, g->near);
         return r;
     }
-    bool lost = lie == UNSUPPORTED && vast && n.flat.reach > 1e300;
+    bool lost = lie == UNSUPPORTED && vast && n.flat.ball.radius > 1e300;
     if (lost || !incode_apex_around(&n, s)) {
         if (lie == UNSUPPORTED)
             incode_query_support(&s->query, n.pv, n.sphere.n, g->scale);

@@ -63,10 +63,9 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
         if (r == INCODE_WALK_DONE)
             incode_search_last(s);
     }
-    /* An ill-conditioned sphere has no ball, but may have a box. */
-    bool whole =
-        q->boxed && !q->round && incode_vicinity_holds(list, q->lo, q->hi);
-    if (r != INCODE_WALK_DONE || (!q->round && !whole) ||
+    bool whole = q->boxed && incode_vicinity_holds(list, q->lo, q->hi);
+    /* Without a ball of its own, a sphere does not fit. */
+    if (r != INCODE_WALK_DONE || (!whole && (!q->round || q->lens)) ||
         incode_vicinity_visit(list, &t->walker, q, incode_visit_points, NULL) !=
             INCODE_WALK_DONE)
         return false;
@@ -143,7 +142,7 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     hits.pencil = &n->pencil;
     hits.count = 0;
     hits.full = false;
-    q->t = __builtin_inf();
+    hits.thinned = q->t = __builtin_inf();
     s->radius = g->radius > 0x1p-1022 ? g->radius : 0x1p-1022;
     if (n->best != INCODE_GATHER_NONE) {
         add_best(n, q, &hits);

@@ -39,20 +39,39 @@ void incode_query_face(struct incode_query *q)
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, NULL, q->scale);
 }
 
+/* Sets the ball, relative and scaled, and the box around it; false: there is no
+ * such box. */
+static bool set_ball(struct incode_query *q, const double centre[3],
+                     double radius)
+{
+    double inverse = 1 / q->scale, far = 0;
+    for (int d = 0; d < 3; d++) {
+        double lo = (centre[d] - radius) * inverse;
+        double hi = (centre[d] + radius) * inverse;
+        double slack = 1e-15 * (__builtin_fabs(q->pv[d]) + hi - lo);
+        q->lo[d] = q->pv[d] + lo - slack;
+        q->hi[d] = q->pv[d] + hi + slack;
+        if (!(q->lo[d] <= q->hi[d]))
+            return false;
+        q->centre[d] = centre[d];
+        far += __builtin_fabs(centre[d]);
+    }
+    q->square = radius * radius;
+    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 3 *
+                                              (far + radius) *
+                                              incode_max_norm(q->sphere.pn);
+    q->boxed = q->round = true;
+    return true;
+}
+
 /* Where the sphere says nothing, the points' half-space may. */
 static void bound_flat(struct incode_query *q)
 {
-    if (!q->flat.known || q->best == INCODE_NONE)
-        return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
     incode_flat_lessen(&q->flat, p, q->scale);
-    double reach = q->flat.reach / q->scale * (1 + 1e-9);
-    q->boxed = reach < 1e300;
-    for (int d = 0; d < 3 && q->boxed; d++) {
-        double slack = 1e-15 * (__builtin_fabs(q->pv[d]) + reach);
-        q->lo[d] = q->pv[d] - reach - slack;
-        q->hi[d] = q->pv[d] + reach + slack;
-    }
+    const struct incode_ball *ball = &q->flat.ball;
+    q->lens = q->large = ball->radius < 1e300 &&
+                         set_ball(q, ball->centre, ball->radius * (1 + 1e-9));
 }
 
 /* Face sizes: the ball of a larger sphere is too coarse where its surface runs
@@ -64,7 +83,7 @@ static void bound_flat(struct incode_query *q)
 static void bound_sphere(struct incode_query *q)
 {
     const struct incode_sphere *s = &q->sphere;
-    q->boxed = q->round = false;
+    q->boxed = q->round = q->lens = false;
     if (q->flat.known && incode_sphere_is_vast(s)) {
         bound_flat(q);
         return;
@@ -75,21 +94,8 @@ static void bound_sphere(struct incode_query *q)
     double half = 0.5 / s->det, radius = __builtin_sqrt(incode_dot(s->m, s->m));
     radius = radius * half * (1 + 1e-6) +
              12 * INCODE_SPHERE_EPS * incode_max_norm(s->pm) * half;
-    double inverse = 1 / q->scale;
-    for (int d = 0; d < 3; d++) {
-        double lo = (q->centre[d] - radius) * inverse;
-        double hi = (q->centre[d] + radius) * inverse;
-        double slack = 1e-15 * (__builtin_fabs(q->pv[d]) + hi - lo);
-        q->lo[d] = q->pv[d] + lo - slack;
-        q->hi[d] = q->pv[d] + hi + slack;
-        if (!(q->lo[d] <= q->hi[d]))
-            return;
-    }
-    q->square = radius * radius;
     q->large = radius > LARGE * (s->lb + s->lc);
-    q->plane_slack = INCODE_SPHERE_TINY +
-                     INCODE_SPHERE_EPS * 6 * radius * incode_max_norm(s->pn);
-    q->boxed = q->round = true;
+    (void)set_ball(q, q->peak, radius);
 }
 
 void incode_query_shrink(struct incode_query *q)
@@ -105,7 +111,7 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
     q->flat.spread = 0;
     memcpy(q->best_p, p, sizeof q->best_p);
     for (int d = 0; d < 3; d++)
-        q->centre[d] = q->sphere.m[d] * half;
+        q->peak[d] = q->sphere.m[d] * half;
     if (q->shrinking)
         bound_sphere(q);
 }
@@ -118,7 +124,7 @@ static bool is_outside(struct incode_query *q, const double p[3])
 {
     if (q->contests < CONTESTS) {
         q->contests++;
-        if (!q->flat.known || q->round)
+        if (!q->flat.known || (q->round && !q->lens))
             return false;
     }
     if (q->flat.spread == 0) {
@@ -198,7 +204,7 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
         if (!s->has_apex)
             continue;
         incode_vd m = incode_vd_all(s->m[d]);
-        incode_vd peak = incode_vd_all(q->centre[d]);
+        incode_vd peak = incode_vd_all(q->peak[d]);
         incode_vd top = incode_vd_max(incode_vd_min(peak, hi), lo);
         incode_vd best =
             incode_vd_max((m - det * lo) * lo, (m - det * hi) * hi);

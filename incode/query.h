@@ -36,7 +36,8 @@ struct incode_query {
     bool timid;          /* APEX: only points clearly beyond the face */
     bool ahead;          /* BOX: asks for missing bricks and passes them over */
     bool shrinking;      /* APEX: the box is that of the best's sphere */
-    bool round;          /* APEX: shrinking, and the ball below holds it */
+    bool round;          /* APEX: what matters lies in the ball below */
+    bool lens;           /* round: it is less than the sphere (support.h) */
     bool large;          /* round, and the sphere itself tells more */
     bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
     bool done;           /* not what lies within [done_lo, done_hi] */
@@ -49,9 +50,10 @@ struct incode_query {
     struct incode_sphere sphere; /* SUPPORT: its plane's normal alone */
     struct incode_flat flat; /* APEX: bounds the box of a best without a ball */
     struct incode_support support; /* SUPPORT: what holds all points so far */
-    double centre[3];              /* of the sphere: where its value peaks */
-    double square;                 /* of its radius, widened */
-    double plane_slack;            /* of n . p within the ball */
+    double peak[3];     /* centre of the sphere, where its value peaks */
+    double centre[3];   /* of the ball */
+    double square;      /* of its radius, widened */
+    double plane_slack; /* of n . p within the ball */
     double t; /* where in a pencil the ball is, of the first candidate so far */
     double limit;      /* NEAREST, CIRCLE: squared, relative */
     uint32_t contests; /* APEX: points in doubt so far */
@@ -85,7 +87,8 @@ struct incode_hits {
     const struct incode_pencil *pencil;
     struct incode_hit hit[INCODE_HITS];
     uint32_t count;
-    bool full; /* some are missing */
+    bool full;      /* some are missing */
+    double thinned; /* the query's t when those out of the ball last went */
 };
 
 /* What a walk runs on. */

@@ -1,6 +1,6 @@
 #include "support.h"
 
-#include <stddef.h>
+#include <string.h>
 
 /* The bounds below hold in double precision with this much to spare. */
 #define SPARE 1e-9
@@ -37,42 +37,58 @@ bool incode_support_faces(const struct incode_support *support,
     return sine(support->n, n) * SLOPES < 1;
 }
 
-/* |a x b| of a in twice the precision and b exact. */
-static double cross_length(const struct incode_dd a[3], const double b[3])
+/* a x b of a in twice the precision and b exact. */
+static void cross(double c[3], const struct incode_dd a[3], const double b[3])
 {
-    double c[3];
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
         struct incode_dd bi = {b[i], 0}, bj = {b[j], 0};
         c[k] = incode_dd_cross(a[i], bj, a[j], bi).hi;
     }
-    return length_of(c);
 }
 
-/* Of a vast sphere through v with its centre outside the support, radius R:
- * what lies inside at distance r from v is at least r^2 / 2R towards the
- * centre, and at most depth + slope r. */
-static double reach_under(const struct incode_support *support,
-                          const struct incode_fine *sphere, const double pv[3],
-                          double scale)
+/* How far every point lies below the support, seen from v, at least; 0 or
+ * more. */
+static double depth_of(const struct incode_support *support, const double pv[3],
+                       double scale)
 {
-    double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
-    if (!incode_support_faces(support, m))
-        return __builtin_inf();
-    double across = length_of(m), length = length_of(support->n), far = 0;
-    double slope = cross_length(sphere->m, support->n) / (across * length);
-    double radius = across * 0.5 / sphere->det.hi * (1 + SPARE);
-    double ratio = scale / support->scale;
     struct incode_dd height = incode_support_height(support, pv);
     struct incode_dd top = {support->most[0], support->most[1]};
+    double ratio = scale / support->scale, far = 0;
     for (int k = 0; k < 3; k++)
         far += __builtin_fabs((pv[k] - support->p[k]) * support->scale);
-    double depth =
-        incode_dd_minus(top, height).hi * ratio / length * (1 + SPARE) +
-        FINE * far * ratio;
-    depth = depth > 0 ? depth : 0;
-    double a = radius * (slope * (1 + SPARE) + FINE * 1e9);
-    return (a + __builtin_sqrt(a * a + 2 * radius * depth)) * (1 + SPARE);
+    double depth = incode_dd_minus(top, height).hi * ratio /
+                       length_of(support->n) * (1 + SPARE) +
+                   FINE * far * ratio;
+    return depth > 0 ? depth : 0;
+}
+
+/* Of a vast sphere through v with its centre outside the support: a point x
+ * inside, h above v in the support's direction and y along it, has
+ *     h^2 + y^2 <= 2 (h, y) . centre,  h <= depth,
+ * so y lies in a disc around the centre's foot, and |h| is next to nothing. */
+static struct incode_ball ball_under(const struct incode_support *support,
+                                     const struct incode_fine *sphere,
+                                     const double pv[3], double scale)
+{
+    struct incode_ball ball = {{0, 0, 0}, __builtin_inf()};
+    double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
+    if (!incode_support_faces(support, m))
+        return ball;
+    const double *n = support->n;
+    double tilt[3], foot[3], half = 0.5 / sphere->det.hi;
+    cross(tilt, sphere->m, n);
+    incode_cross(foot, n, tilt);
+    for (int k = 0; k < 3; k++)
+        ball.centre[k] = foot[k] * half / incode_dot(n, n);
+    double radius = length_of(m) * half * (1 + SPARE);
+    double depth = depth_of(support, pv, scale);
+    double off = length_of(ball.centre), doubt = off * SPARE;
+    doubt += radius * FINE * 1e9;
+    off += doubt;
+    double disc = __builtin_sqrt(off * off + 2 * radius * depth);
+    ball.radius = disc * (1 + 1e-6) + depth + 2 * doubt;
+    return ball;
 }
 
 void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
@@ -91,10 +107,12 @@ void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
     flat->spread = FINE * 1e2 * lengths * longest;
 }
 
-static double reach_of(struct incode_flat *flat, const double *const p[4],
-                       double scale)
+/* The least ball that is known to hold what comes before p[3]. */
+static struct incode_ball ball_of(struct incode_flat *flat,
+                                  const double *const p[4], double scale)
 {
-    double r[3], reach = __builtin_inf();
+    double r[3];
+    struct incode_ball ball = {{0, 0, 0}, __builtin_inf()};
     for (int k = 0; k < 3; k++)
         r[k] = (p[3][k] - p[0][k]) * scale;
     double far = length_of(r);
@@ -105,8 +123,11 @@ static double reach_of(struct incode_flat *flat, const double *const p[4],
         double circle = length_of(flat->c0) * (1 + 1e-8);
         double above = far * far - 2 * incode_dot(flat->c0, r) +
                        1e-8 * far * (far + 2 * circle);
-        if (above <= 0)
-            return 2 * circle;
+        if (above <= 0) {
+            memcpy(ball.centre, flat->c0, sizeof ball.centre);
+            ball.radius = circle * (1 + 1e-8);
+            return ball;
+        }
     }
     const struct incode_fine *sphere = &flat->sphere;
     incode_flat_sphere(flat, p, scale);
@@ -116,19 +137,20 @@ static double reach_of(struct incode_flat *flat, const double *const p[4],
     if (!(sphere->det.hi > far_off) ||
         !(sphere->det.hi > INCODE_SPHERE_LEAST) ||
         !(incode_max_norm(m) > far_off * far))
-        return reach;
+        return ball;
     for (uint32_t i = 0; i < flat->count; i++) {
-        double here = reach_under(&flat->supports[i], sphere, p[0], scale);
-        reach = here < reach ? here : reach;
+        struct incode_ball here =
+            ball_under(&flat->supports[i], sphere, p[0], scale);
+        ball = here.radius < ball.radius ? here : ball;
     }
-    return reach;
+    return ball;
 }
 
 void incode_flat_lessen(struct incode_flat *flat, const double *const p[4],
                         double scale)
 {
-    double reach = reach_of(flat, p, scale);
-    flat->reach = reach < flat->reach ? reach : flat->reach;
+    struct incode_ball ball = ball_of(flat, p, scale);
+    flat->ball = ball.radius < flat->ball.radius ? ball : flat->ball;
 }
 
 bool incode_flat_outside(const struct incode_flat *flat, const double pv[3],

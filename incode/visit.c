@@ -352,26 +352,24 @@ static void thin_out(const struct incode_query *q, struct incode_hits *hits)
                                 : incode_query_holds(q, hits->hit[i].p))
             hits->hit[kept++] = hits->hit[i];
     hits->count = kept;
+    hits->thinned = q->t;
 }
 
 void incode_hit_add(struct incode_query *q, struct incode_hits *hits,
                     uint32_t id, const double p[3])
 {
-    const struct incode_pencil *pencil = hits->pencil;
-    if (hits->count == INCODE_HITS)
-        thin_out(q, hits);
-    if (hits->count == INCODE_HITS) {
-        hits->full = true;
-        return;
-    }
-    struct incode_hit *hit = &hits->hit[hits->count++];
+    struct incode_hit hit = {.id = id, .p = {p[0], p[1], p[2]}};
     double r[3];
     incode_query_relative(r, q, p);
-    hit->id = id;
-    memcpy(hit->p, p, sizeof hit->p);
-    hit->placed = incode_pencil_place(pencil, r, &hit->t);
-    if (hit->placed && hit->t < q->t)
-        draw_in(q, pencil, hit->t);
+    hit.placed = incode_pencil_place(hits->pencil, r, &hit.t);
+    if (hit.placed && hit.t < q->t)
+        draw_in(q, hits->pencil, hit.t);
+    if (hits->count == INCODE_HITS && q->t < hits->thinned)
+        thin_out(q, hits);
+    if (hits->count == INCODE_HITS)
+        hits->full = true;
+    else
+        hits->hit[hits->count++] = hit;
 }
 
 /* The points of a leaf that lie in the ball, or may be beyond the face while

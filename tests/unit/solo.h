@@ -39,6 +39,7 @@ struct solo {
     struct host_digest digest;
     struct host_tetrahedra tets; /* input rows, sorted */
     uint64_t built, spilled, hulls, seeds, evictions;
+    uint64_t far_calls; /* that looked at more than 2,048 points */
     uint32_t hubs;
 
     /* At work. */
@@ -305,6 +306,8 @@ static inline void solo_run(struct solo *s, const double *xyz, uint64_t n)
     s->hulls = stats->hull_facets;
     s->seeds = stats->seeds;
     s->evictions = stats->page_evictions;
+    s->far_calls =
+        stats->candidates_histogram[22] + stats->candidates_histogram[23];
     for (size_t i = 0; i < SOLO_GUARD; i++)
         assert_int_equal(s->arena[s->memory + i], 0xa5);
     host_tetrahedra_map(&s->tets, s->order.row);

@@ -57,10 +57,15 @@ static bool draw_face(const double *f[4], double (*p)[3], size_t n, size_t near,
            incode_orient3d(tally, f[0], f[1], f[2], f[3]) > 0;
 }
 
-static double distance(const double a[3], const double b[3])
+static bool in_ball(const struct incode_ball *ball, const double v[3],
+                    const double p[3], double scale)
 {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
-                (a[2] - b[2]) * (a[2] - b[2]));
+    double square = 0;
+    for (int d = 0; d < 3; d++) {
+        double gap = (p[d] - v[d]) * scale - ball->centre[d];
+        square += gap * gap;
+    }
+    return sqrt(square) <= ball->radius;
 }
 
 static struct incode_support support_of(const double *const f[4],
@@ -85,12 +90,12 @@ static struct incode_support support_of(const double *const f[4],
     return s;
 }
 
-static void reach_on_a_rough_plane(void **unused)
+static void ball_on_a_rough_plane(void **unused)
 {
     enum { SIDE = 24, POINTS = SIDE * SIDE };
     static double p[POINTS][3];
     struct incode_tally tally = {0};
-    size_t reaches = 0, outside = 0, short_ones = 0;
+    size_t balls = 0, outside = 0, small = 0, firsts = 0;
     (void)unused;
     for (int k = 0; k < 400; k++) {
         double size = ldexp(1, (int)below(80) - 40), scale = 0.5 / size;
@@ -101,11 +106,13 @@ static void reach_on_a_rough_plane(void **unused)
         }
         struct incode_support support =
             support_of((const double **)f, p, n, scale);
-        struct incode_flat flat = {
-            .known = true, .reach = INFINITY, .supports = &support, .count = 1};
+        struct incode_flat flat = {.known = true,
+                                   .ball.radius = INFINITY,
+                                   .supports = &support,
+                                   .count = 1};
         incode_flat_lessen(&flat, f, scale);
-        reaches += flat.reach < INFINITY;
-        short_ones += flat.reach < 12;
+        balls += flat.ball.radius < INFINITY;
+        small += flat.ball.radius < 12;
         for (size_t i = 0; i < n; i++) {
             if (p[i] == f[0] || p[i] == f[1] || p[i] == f[2] || p[i] == f[3]) {
                 continue;
@@ -114,7 +121,8 @@ static void reach_on_a_rough_plane(void **unused)
                 incode_orient3d(&tally, f[0], f[1], f[2], p[i]) > 0 &&
                 incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p[i]) > 0;
             if (first) {
-                assert_true(distance(f[0], p[i]) * scale <= flat.reach);
+                assert_true(in_ball(&flat.ball, f[0], p[i], scale));
+                firsts += flat.ball.radius < INFINITY;
             }
             if (incode_flat_outside(&flat, f[0], p[i], scale)) {
                 outside++;
@@ -124,7 +132,46 @@ static void reach_on_a_rough_plane(void **unused)
         }
     }
     /* It must tell something, too. */
-    assert_true(reaches > 50 && short_ones > 10 && outside > 10000);
+
+    assert_true(balls > 50 && small > 10 && firsts > 100 && outside > 10000);
+}
+
+/* Four points of a square of the lattice: in double precision their determinant
+ * may cancel to nothing at all, and in twice the precision must not. */
+static void spheres_of_rough_squares(void **unused)
+{
+    enum { SIDE = 24, POINTS = SIDE * SIDE };
+    static double p[POINTS][3];
+    struct incode_tally tally = {0};
+    size_t vanished = 0, outside = 0;
+    (void)unused;
+    for (int k = 0; k < 4000; k++) {
+        size_t n = lattice(p, SIDE, 1), at = below(n - 2 * SIDE - 2);
+        const double *f[4] = {p[at], p[at + 1], p[at + SIDE], p[at + SIDE + 1]};
+        double r[4][3], scale = 1.0 / 32;
+        if (incode_orient3d(&tally, f[0], f[1], f[2], f[3]) <= 0)
+            continue;
+        struct incode_sphere s;
+        for (int i = 1; i < 4; i++)
+            for (int d = 0; d < 3; d++)
+                r[i][d] = (f[i][d] - f[0][d]) * scale;
+        incode_sphere_plane(&s, r[1], r[2]);
+        incode_sphere_apex(&s, r[1], r[2], r[3]);
+        vanished += s.det == 0;
+        assert_true(incode_sphere_is_blurred(&s));
+        incode_sphere_refine(&s, f[0], f[1], f[2], f[3], scale);
+        assert_true(s.det > 0);
+        for (size_t i = 0; i < n; i += 1 + below(7)) {
+            for (int d = 0; d < 3; d++)
+                r[0][d] = (p[i][d] - f[0][d]) * scale;
+            if (incode_sphere_value(&s, r[0]) >= -incode_sphere_error(&s, r[0]))
+                continue;
+            outside++;
+            assert_true(incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p[i]) <
+                        0);
+        }
+    }
+    assert_true(vanished > 10 && outside > 100000);
 }
 
 /* The pencil of the face (0, b, c), but for its size; false: the square of the
@@ -243,7 +290,8 @@ static void first_of_the_gathered(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(reach_on_a_rough_plane),
+        cmocka_unit_test(ball_on_a_rough_plane),
+        cmocka_unit_test(spheres_of_rough_squares),
         cmocka_unit_test(places_in_a_pencil),
         cmocka_unit_test(first_of_the_gathered),
     };
