@@ -4,6 +4,7 @@
 
 #include "../node/result.h"
 #include "../node/totals.h"
+#include "missing.h"
 #include "watch.h"
 
 /* A message that no sound node sends. */
@@ -180,6 +181,7 @@ static int take_finished(struct host_service *s,
         s->working--;
     }
     node->reported = true;
+    host_missing_heard(s, message->source, finished.links);
     node->unreported = 0;
     report->statistics = node->before;
     node_totals_add(&report->statistics, &finished);

@@ -9,7 +9,9 @@ enum {
     WAIT_US_MAX = 10000000,  /* for one more node; at most half the patience */
     SEARCH_US_MAX = 4000000, /* and two fifths */
     AGAIN_US = 10000000,
-    ABSENT_S = 3 /* not up for so long, in a search */
+    ABSENT_S = 3,          /* not up for so long, in a search */
+    ABSENT_US = 3000000,   /* and where nothing needs it */
+    ATTENTIVE_US = 1000000 /* a node without an answer for longer is not */
 };
 
 /* Follows live links from the gate; true: they lead to all nodes. */
@@ -38,19 +40,23 @@ static bool holds_together(const struct host_service *s,
 }
 
 /* Errors and what is as good as one go there, whatever else is quiet. */
-static void tell(const struct host_service *s, const struct cube_wiring *w)
+static void name_wire(struct host_service *s, unsigned node, unsigned link)
+{
+    char other[16] = "the host";
+    if (link < s->machine->dimension) {
+        snprintf(other, sizeof other, "node %u", node ^ 1u << link);
+    }
+    fprintf(stderr,
+            "incode: node %u link %u: the wire to %s does not come up; "
+            "the run goes on without it, look after that wire\n",
+            node, link, other);
+    s->missing_wires++;
+}
+
+static void tell(struct host_service *s, const struct cube_wiring *w)
 {
     for (unsigned i = w->settled; i < w->dead_count; i++) {
-        const struct cube_dead *d = &w->dead[i];
-        char other[16] = "the host";
-        if (d->dimension < s->machine->dimension) {
-            snprintf(other, sizeof other, "node %u",
-                     (unsigned)d->node ^ 1u << d->dimension);
-        }
-        fprintf(stderr,
-                "incode: node %u link %u: the wire to %s does not come up; "
-                "the run goes on without it, look after that wire\n",
-                d->node, d->dimension, other);
+        name_wire(s, w->dead[i].node, w->dead[i].dimension);
     }
 }
 
@@ -110,4 +116,129 @@ bool host_missing_check(struct host_service *service, uint64_t now_us,
         search(s, now_us);
     }
     return true;
+}
+
+/* --- wires that nothing needs --------------------------------------------- */
+
+static uint32_t bit_of(unsigned link)
+{
+    return (uint32_t)1 << link;
+}
+
+void host_missing_heard(struct host_service *service, unsigned node,
+                        uint32_t links)
+{
+    struct host_service *s = service;
+    s->node[node].links_heard_us = s->uncabled_us;
+    s->node[node].links |= links;
+    for (unsigned d = 0; d < s->machine->dimension; d++) {
+        s->node[node ^ 1u << d].links |= links & bit_of(d);
+    }
+}
+
+static bool has_host_wire(const struct host_machine *m, unsigned node)
+{
+    return m->host_wires > 1
+               ? node < m->host_wires
+               : node == 0 || (m->spare_node != 0 && node == m->spare_node);
+}
+
+/* Links of a node whose wires should have been up and never were, by their
+ * lower ends; what is dead was named, or will be. */
+static uint32_t missing_of(const struct host_service *s, unsigned node)
+{
+    const struct cube_wiring *w = cube_wiring(s->cube);
+    unsigned dimension = s->machine->dimension;
+    uint32_t missing = has_host_wire(s->machine, node) ? bit_of(dimension) : 0;
+    missing |= ~node & (bit_of(dimension) - 1);
+    missing &= ~s->node[node].links;
+    for (unsigned d = 0; missing >> d != 0; d++) {
+        bool there = !s->node[node].lost &&
+                     (d == dimension || !s->node[node ^ 1u << d].lost) &&
+                     !wiring_is_dead(w, w->dead_count, node, d, dimension);
+        missing &= there ? ~(uint32_t)0 : ~bit_of(d);
+    }
+    return missing;
+}
+
+/* Whether both ends have spoken of it late enough. */
+static bool is_certain(const struct host_service *s, unsigned node,
+                       unsigned link)
+{
+    unsigned other = link < s->machine->dimension ? node ^ 1u << link : node;
+    return s->node[node].links_heard_us >= ABSENT_US &&
+           s->node[other].links_heard_us >= ABSENT_US;
+}
+
+/* How many wires are missing, and of how many that is certain. */
+static unsigned count_missing(const struct host_service *s, unsigned *certain)
+{
+    unsigned count = 0;
+    *certain = 0;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        uint32_t missing = missing_of(s, i);
+        for (unsigned d = 0; missing >> d != 0; d++) {
+            bool one = (missing & bit_of(d)) != 0;
+            count += one;
+            *certain += one && is_certain(s, i, d);
+        }
+    }
+    return count;
+}
+
+static void name_all(struct host_service *s)
+{
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        uint32_t missing = missing_of(s, i);
+        for (unsigned d = 0; missing >> d != 0; d++) {
+            if ((missing & bit_of(d)) != 0) {
+                name_wire(s, i, d);
+            }
+        }
+    }
+}
+
+static bool all_attentive(const struct host_service *s)
+{
+    bool all = true;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        all = all && (s->node[i].lost || s->node[i].silent_us <= ATTENTIVE_US);
+    }
+    return all;
+}
+
+/* When the run is over, calls are all there is to do. */
+static void call_all(struct host_service *s)
+{
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct host_node *node = &s->node[i];
+        node->call_due = node->call_due || (!node->lost && !node->calling);
+    }
+}
+
+void host_missing_look(struct host_service *service, uint64_t elapsed_us)
+{
+    struct host_service *s = service;
+    unsigned certain;
+    if (s->cabled || !s->started) {
+        return;
+    }
+    unsigned missing = count_missing(s, &certain);
+    if (missing > 0 && all_attentive(s)) {
+        s->uncabled_us += elapsed_us;
+    }
+    if (missing == certain) {
+        name_all(s);
+        s->cabled = true;
+    } else if (s->finished) {
+        call_all(s);
+    }
+}
+
+bool host_missing_awaited(const struct host_service *service)
+{
+    const struct host_service *s = service;
+    unsigned certain;
+    return s->finished && !s->over && !s->cabled &&
+           count_missing(s, &certain) > 0;
 }

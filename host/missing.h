@@ -8,10 +8,19 @@
  * and the run goes on round them.  Where it does not hold together a node is
  * still to come, and the search begins anew every ten seconds.
  *
- * Memory: none of its own.  Work: constant a check; at the end of a search a
- * pass over nodes and links for each hop from the gate.
+ * A wire that no path needs hides nobody.  So each node says with its answers
+ * and its statistics which links have been up.  A wire of which both ends say
+ * that it never was, three seconds and more after all nodes have answered, is
+ * named as well; nothing else changes, as nothing needs it.  Time in which a
+ * node does not answer does not count, so that a slow start is no alarm.
+ *
+ * Memory: none of its own.  Work: constant a check, and a pass over nodes and
+ * links until every wire has been up; at the end of a search such a pass for
+ * each hop from the gate.
  *
  *     searching = host_missing_check(service, now_us, patience_us);
+ *     host_missing_heard(service, node, answer.links);
+ *     host_missing_look(service, elapsed_us);
  */
 #ifndef HOST_MISSING_H
 #define HOST_MISSING_H
@@ -22,5 +31,15 @@
  * absent so far. */
 bool host_missing_check(struct host_service *service, uint64_t now_us,
                         uint64_t patience_us);
+
+/* A node has said which of its links have been up. */
+void host_missing_heard(struct host_service *service, unsigned node,
+                        uint32_t links);
+
+/* At each check: names the wires that never came up, when it is time. */
+void host_missing_look(struct host_service *service, uint64_t elapsed_us);
+
+/* After the run: whether there is a wire of which it is not known yet. */
+bool host_missing_awaited(const struct host_service *service);
 
 #endif

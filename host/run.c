@@ -235,6 +235,10 @@ int host_triangulate_on(const struct host_run_options *options,
     }
     result->time_triangulation_s = seconds_since(start);
     result->tetrahedra = tets->count;
+    if (status == 0) {
+        status = host_service_wires(&service, error);
+        result->missing_wires = service.missing_wires;
+    }
     host_service_end(&service);
     if (status == 0) {
         status =

@@ -70,6 +70,7 @@ struct host_run_result {
     uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
     uint64_t retransmitted, faces_spilled;
     unsigned restarts, generations; /* of nodes; of the cube's wiring */
+    unsigned missing_wires;         /* that were named */
     uint64_t candidates, candidates_histogram[24];
     uint64_t vertices, vertices_waited;
     int socket_send_bytes, socket_receive_bytes; /* buffers of a wire's end */

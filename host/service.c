@@ -6,6 +6,7 @@
 
 #include "../transport/wiring.h"
 #include "intake.h"
+#include "missing.h"
 #include "watch.h"
 
 enum {
@@ -557,6 +558,15 @@ int host_service_run(struct host_service *service, struct host_error *error)
     }
     s->finished = true;
     return 0;
+}
+
+int host_service_wires(struct host_service *service, struct host_error *error)
+{
+    int status = 0;
+    while (status == 0 && host_missing_awaited(service)) {
+        status = round_trip(service, error);
+    }
+    return status;
 }
 
 /* Whether no node is there that has to hear the end. */

@@ -57,6 +57,8 @@ struct host_node {
     uint32_t start;          /* the epoch of its start; 0: not heard of */
     uint64_t silent_us;      /* that it has not answered */
     uint64_t called_us, call_again_us;
+    uint32_t links;          /* that have been up, as either end has said */
+    uint64_t links_heard_us; /* uncabled_us when this end said so last */
     /* Statistics of starts that are over, and tetrahedra of the present one
      * that no statistics know of yet. */
     struct node_finished_message before;
@@ -89,6 +91,7 @@ struct host_service {
     uint64_t retransmitted;          /* frames, on the host's wire */
     unsigned restarts;               /* of nodes, by the machine */
     unsigned generations;            /* of the cube's wiring; 1: no loss */
+    unsigned missing_wires;          /* that were named: missing.h */
     /* Private. */
     struct cube *cube;
     void *cube_memory;
@@ -108,8 +111,10 @@ struct host_service {
     bool wire_lost; /* the one in use is dead */
     /* Wires that never came up are looked for: missing.h. */
     bool searching;
-    uint64_t search_us;  /* since when, */
-    uint64_t news_us;    /* and when a node answered for the first time last */
+    uint64_t search_us;   /* since when, */
+    uint64_t news_us;     /* and when a node answered for the first time last */
+    bool cabled;          /* every wire has been up, or was named */
+    uint64_t uncabled_us; /* time without that, while all nodes answer */
     bool probe, probing; /* nodes are called one by one: in the next generation;
                             now, until all have answered */
     unsigned living;     /* nodes that are not lost */
@@ -129,6 +134,11 @@ int host_service_start(struct host_service *service, struct host_error *error);
 /* Hands out the setup and the jobs, and returns when every brick is committed
  * and every node has told its statistics. */
 int host_service_run(struct host_service *service, struct host_error *error);
+
+/* After the run, and no part of its time: waits for wires that have not been up
+ * yet, and that nothing needed, until they are or are named.  At once where all
+ * have been, as is the rule. */
+int host_service_wires(struct host_service *service, struct host_error *error);
 
 /* For missing.h: the node by which the host speaks from now on: as before, or
  * the other one that has a wire to the host. */

@@ -131,6 +131,7 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "retransmitted_frames", r->retransmitted);
     put(o, "node_restarts", r->restarts);
     put(o, "generations", r->generations);
+    put(o, "missing_wires", r->missing_wires);
     for (unsigned i = 0; i < r->nodes; i++) {
         json_array_append_new(nodes, node_object(r, i));
     }

@@ -152,6 +152,7 @@ int host_watch_answer(struct host_service *service,
         here.sent != node->received) {
         s->loss = true;
     }
+    host_missing_heard(s, message->source, here.links);
     node->calling = false;
     node->call_due = false; /* what would have been asked again, is answered */
     if (first && s->probing) {
@@ -362,7 +363,9 @@ int host_watch_check(struct host_service *service, uint64_t now_us,
         s->loss = s->loss || wiring->dead_count > wiring->settled;
     }
     call_in_turn(s, now_us);
-    listen(s, now_us, elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX);
+    elapsed = elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX;
+    listen(s, now_us, elapsed);
+    host_missing_look(s, elapsed);
     if (check_wire(s, now_us, error) != 0) {
         return error->code;
     }

@@ -19,7 +19,7 @@
 #include "../transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 2,         /* both ends must agree */
+    NODE_PROTOCOL = 3,         /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64, /* page numbers in one NODE_PAGE_REQUEST */
     NODE_FAULT_TEXT_MAX = 200,
     NODE_FACES_A_MESSAGE = 128 /* faces in one NODE_SPILL or NODE_UNSPILL */
@@ -63,6 +63,7 @@ struct node_here_message {
     uint32_t called;   /* `sent` of the call that is answered */
     uint32_t received; /* letters from the host before that call */
     uint32_t sent;     /* letters to the host before this one */
+    uint32_t links;    /* bit d: link d has been up since this start */
 };
 
 struct node_setup_message {
@@ -116,7 +117,8 @@ struct node_ready_message {
 struct node_finished_message {
     uint32_t epoch; /* of the job that is done; 0: it is a report alone */
     uint32_t start; /* the epoch of this start of the node */
-    uint32_t letters, reserved;
+    uint32_t letters;
+    uint32_t links;   /* as in struct node_here_message */
     uint64_t wall_us; /* from each job's arrival to its last result */
     uint64_t busy_us; /* processor time of the node */
     uint64_t bytes_in, bytes_out; /* payload of messages, at this node */

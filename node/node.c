@@ -242,10 +242,22 @@ static bool send_ready(struct node *n)
                               sizeof ready) == 0;
 }
 
+/* A wire whose ends never met is missing, or not there yet: the host says. */
+static uint32_t links_seen(const struct node *n)
+{
+    uint32_t seen = 0;
+    for (unsigned d = 0; d < cube_links(n->cube); d++) {
+        bool up = cube_link_statistics(n->cube, d)->sessions > 0;
+        seen |= (uint32_t)up << d;
+    }
+    return seen;
+}
+
 static bool send_here(struct node *n)
 {
     n->here.start = n->board->identity.epoch;
     n->here.sent = n->letters.sent;
+    n->here.links = links_seen(n);
     return node_letters_write(&n->letters, CUBE_HOST, NODE_HERE, &n->here,
                               sizeof n->here) == 0;
 }
@@ -294,6 +306,7 @@ static bool send_finished(struct node *n, uint32_t epoch)
     finished.epoch = epoch;
     finished.start = n->board->identity.epoch;
     finished.letters = n->letters.sent;
+    finished.links = links_seen(n);
     INCODE_ASSERT(node_letters_write(&n->letters, CUBE_HOST, NODE_FINISHED,
                                      &finished, sizeof finished) == 0);
     return true;

@@ -64,6 +64,31 @@ end_nodes() {
     wait $nodes 2> /dev/null
 }
 
+# make_cube FILE [KEY]: 8 nodes on TCP, started by the host, each wire through
+# the relay; $through its ports.
+make_cube() {
+    local node to wire=0
+    through=
+    {
+        printf 'dimension = 3;\nstart = [0, 1, 2, 3, 4, 5, 6, 7];\n'
+        [ -z "${2:-}" ] || printf 'key = "%s";\n' "$2"
+        printf 'links = (\n'
+        for node in 0 1 2 3 4 5 6 7; do
+            for to in $((node | 1)) $((node | 2)) $((node | 4)) '"host"'; do
+                [ "$to" = "$node" ] && continue
+                [ "$to" = '"host"' ] && [ $node != 0 ] && continue
+                [ $wire = 0 ] || printf ',\n'
+                printf '{ node = %d; to = %s; tcp = "127.0.0.1:%d"; ' $node \
+                    "$to" $((base + wire))
+                printf 'via = "127.0.0.1:%d"; }' $((base + 100 + wire))
+                through="$through $((base + 100 + wire)):$((base + wire))"
+                wire=$((wire + 1))
+            done
+        done
+        printf '\n);\n'
+    } > "$1"
+}
+
 # A node that knows another key, and one without any.
 wrong_keys() {
     cat > "$scratch/one.cube" <<-END
@@ -124,6 +149,28 @@ END
         grep -q '^incode: node 0 link 0: the wire to node 1 .*; ' \
         "$scratch/errors"
     end_nodes
+    unneeded_wire
+}
+
+# One that no node needs to reach node 0 or to be reached by it.
+unneeded_wire() {
+    base=$((base + 200))
+    make_cube "$scratch/unneeded.cube"
+    sed -i 's/ via = "[^"]*";//' "$scratch/unneeded.cube"
+    same 'no wire is missing' --cube "$scratch/unneeded.cube"
+    check 'links/no false alarm' "$(last "$scratch/errors")" \
+        test ! -s "$scratch/errors"
+    sed -i '/node = 5; to = 7;/s/; }/; via = "127.0.0.1:1"; }/' \
+        "$scratch/unneeded.cube"
+    same 'a wire that nothing needs' --cube "$scratch/unneeded.cube" \
+        --stats "$scratch/stats.json"
+    check 'links/a wire that nothing needs is named' \
+        "$(last "$scratch/errors")" \
+        grep -q '^incode: node 5 link 1: the wire to node 7 .*; ' \
+        "$scratch/errors"
+    check 'links/a wire that nothing needs is counted' 'it is not' \
+        test "$(stat_of "$scratch/stats.json" missing_wires)" = 1 -a \
+        "$(stat_of "$scratch/stats.json" generations)" = 1
 }
 
 # A second host is sent away and does no harm; one that comes after a host was
@@ -195,30 +242,6 @@ done
 RELAY=${RELAY:-$BUILD/tests/relay}
 openssl rand -hex 32 > "$scratch/cube.key"
 
-# make_cube FILE [KEY]: 8 nodes on TCP, started by the host, each wire through
-# the relay; $through its ports.
-make_cube() {
-    local node to wire=0
-    through=
-    {
-        printf 'dimension = 3;\nstart = [0, 1, 2, 3, 4, 5, 6, 7];\n'
-        [ -z "${2:-}" ] || printf 'key = "%s";\n' "$2"
-        printf 'links = (\n'
-        for node in 0 1 2 3 4 5 6 7; do
-            for to in $((node | 1)) $((node | 2)) $((node | 4)) '"host"'; do
-                [ "$to" = "$node" ] && continue
-                [ "$to" = '"host"' ] && [ $node != 0 ] && continue
-                [ $wire = 0 ] || printf ',\n'
-                printf '{ node = %d; to = %s; tcp = "127.0.0.1:%d"; ' $node \
-                    "$to" $((base + wire))
-                printf 'via = "127.0.0.1:%d"; }' $((base + 100 + wire))
-                through="$through $((base + 100 + wire)):$((base + wire))"
-                wire=$((wire + 1))
-            done
-        done
-        printf '\n);\n'
-    } > "$1"
-}
 # relayed NAME SEED BYTES_A_FAULT MS_A_CLOSE DELAY_MS CUBE: the same bytes.
 relayed() {
     # shellcheck disable=SC2086

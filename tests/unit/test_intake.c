@@ -247,7 +247,7 @@ static void test_unfinished(void **unused)
 static void answer(uint32_t start, uint32_t called, uint32_t received,
                    uint32_t sent)
 {
-    struct node_here_message here = {start, called, received, sent};
+    struct node_here_message here = {start, called, received, sent, 0};
     struct host_error error = {0};
     assert_int_equal(send(1, NODE_HERE, &here, sizeof here, &error), 0);
 }

@@ -27,7 +27,7 @@ enum {
     DEAD_US = 2000000
 };
 
-enum what { NOTHING, RESTART, STOP, CONTINUE, CUT };
+enum what { NOTHING, RESTART, STOP, CONTINUE, CUT, MEND };
 
 struct event {
     enum what what;
@@ -135,6 +135,9 @@ static void strike(struct event *event)
         break;
     case CUT:
         wire_of(event->node, event->link)->cut = true;
+        break;
+    case MEND:
+        wire_of(event->node, event->link)->cut = false;
         break;
     case NOTHING:
         break;
@@ -442,7 +445,6 @@ static void test_cut(void **unused)
     assert_true(lost >= 4); /* others have done with it */
 }
 
-/* In the cube's own dimension order, whichever is not needed is not missed. */
 static void lacks(unsigned node, unsigned link)
 {
     wire_of(node, link)->cut = true;
@@ -458,7 +460,8 @@ static void survives_as(enum host_strategy strategy)
     assert_string_equal(digest.text, expected.text);
 }
 
-/* Wires that were never there are gone round as well, once all else is. */
+/* Wires that were never there are gone round as well, once all else is; one
+ * that is on no node's way from or to node 0 is named all the same. */
 static void test_missing_wire(void **unused)
 {
     unsigned missed = 0;
@@ -472,6 +475,7 @@ static void test_missing_wire(void **unused)
                 lacks(i, d);
                 survives_as(d == 0 ? HOST_SEQUENTIAL : HOST_SPATIAL);
                 missed += result.generations > 1;
+                assert_int_equal(result.missing_wires, 1);
             }
         }
     }
@@ -484,6 +488,7 @@ static void test_missing_wire(void **unused)
     lacks(6, 1);
     survives_as(HOST_SPATIAL);
     assert_int_equal(result.generations, 2);
+    assert_int_equal(result.missing_wires, 3);
 }
 
 /* The host's own wire to node 0, where it has another. */
@@ -497,6 +502,37 @@ static void test_missing_host_wire(void **unused)
     lacks(0, DIMENSION);
     survives_as(HOST_SPATIAL);
     assert_int_equal(result.generations, 2);
+    assert_int_equal(result.missing_wires, 1);
+    prepare(); /* the other, which is there for a loss alone */
+    world.absent_s = 3;
+    world.spare = 5;
+    start_world();
+    lacks(5, DIMENSION);
+    survives_as(HOST_SPATIAL);
+    assert_int_equal(result.generations, 1);
+    assert_int_equal(result.missing_wires, 1);
+}
+
+/* A wire that nothing needs and that comes up late is no missing one, and what
+ * a node sleeps is not its wire's time. */
+static void test_late_wire(void **unused)
+{
+    (void)unused;
+    for (unsigned k = 0; k < 2; k++) {
+        uint64_t late_us = k == 0 ? 2500000 : 7000000;
+        double when = (double)late_us / (double)undisturbed_us;
+        prepare();
+        world.dead_us = 0;
+        start_world();
+        lacks(5, 1);
+        world.events[0] = (struct event){MEND, when, 5, 1};
+        world.events[1] = (struct event){k == 0 ? NOTHING : STOP, 0.4, 7, 0};
+        world.events[2] = (struct event){CONTINUE, 0.98 * when, 7, 0};
+        survives_as(HOST_SPATIAL);
+        assert_true(world.now_us > late_us);
+        assert_int_equal(result.generations, 1);
+        assert_int_equal(result.missing_wires, 0);
+    }
 }
 
 /* A node that is late is waited for, and all of its wires are used. */
@@ -513,6 +549,7 @@ static void test_late_node(void **unused)
         survives_as(HOST_SPATIAL);
         assert_true(world.now_us > 7600000);
         assert_int_equal(result.generations, 1);
+        assert_int_equal(result.missing_wires, 0);
     }
     prepare();
     world.absent_s = 3;
@@ -553,6 +590,7 @@ int main(void)
         cmocka_unit_test(test_wrong_wire),
         cmocka_unit_test(test_missing_wire),
         cmocka_unit_test(test_late_node),
+        cmocka_unit_test(test_late_wire),
         cmocka_unit_test(test_missing_host_wire),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
