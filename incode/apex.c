@@ -3,6 +3,7 @@
 
 #include "apex.h"
 #include "check.h"
+#include "finals.h"
 #include "simd.h"
 
 /* MakeTetra: the apex of a face.  Among the gathered points, single precision
@@ -303,7 +304,34 @@ void incode_make_sphere(struct incode_make *n)
     copy_point(n->store[3], &n->t->gather, n->best);
     incode_gather_relative(&n->t->gather, n->best, r);
     incode_sphere_apex(&n->sphere, n->rb, n->rc, r);
+    if (incode_sphere_is_blurred(&n->sphere))
+        incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, n->store[3],
+                             n->t->gather.scale);
     n->bare = false;
+}
+
+/* The best of those in doubt, in twice the precision if that can tell. */
+static bool rank_first(struct incode_make *n, const uint16_t *first,
+                       uint32_t count)
+{
+    const struct incode_gather *g = &n->t->gather;
+    struct incode_finals finals = {.count = 0};
+    uint16_t index[INCODE_FINALISTS];
+    for (uint32_t i = 0; i < count; i++) {
+        double p[3];
+        if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
+            continue;
+        copy_point(p, g, first[i]);
+        index[finals.count % INCODE_FINALISTS] = first[i];
+        if (!incode_finals_add(&finals, p))
+            return false;
+    }
+    uint32_t i = incode_finals_first(&finals, n->pv, n->pb, n->pc, g->scale,
+                                     &n->t->stats.tally);
+    if (i == INCODE_FINALS_NONE)
+        return false;
+    n->best = index[i];
+    return true;
 }
 
 /* The best of the first in the pencil, at *t of it; false: it does not stand
@@ -321,12 +349,12 @@ static bool contest_first(struct incode_make *n, double *t)
         only = first[i];
         others++;
     }
-    n->bare = others == 1;
-    if (n->bare)
+    bool ranked = others > 1 && rank_first(n, first, count);
+    n->bare = others == 1 || ranked;
+    if (others == 1)
         n->best = only;
-    else
-        for (uint32_t i = 0; i < count; i++)
-            consider(n, first[i]);
+    for (uint32_t i = 0; i < count && !n->bare; i++)
+        consider(n, first[i]);
     if (n->best != INCODE_GATHER_NONE) {
         double r[3];
         incode_gather_relative(g, n->best, r);
@@ -334,7 +362,9 @@ static bool contest_first(struct incode_make *n, double *t)
             incode_pencil_later(&n->pencil, *t) < most)
             return true;
     }
-    if (n->bare) {
+    if (ranked) {
+        incode_make_sphere(n);
+    } else if (n->bare) {
         n->bare = false;
         n->best = INCODE_GATHER_NONE;
         for (uint32_t i = 0; i < count; i++)

@@ -5,7 +5,7 @@
 
 /* Bounds of the error, in units of the products of the largest entries: as
  * for plain doubles, 46 (orient3d) or 1,104 (in_sphere) times that of one
- * operation, 8 * 2^-106; rounded up.  What underflows is below the other term,
+ * operation, 11 * 2^-106; rounded up.  What underflows is below the other term,
  * since every factor is below 2^61. */
 #define ORIENT3D_BOUND 0x1p-96
 #define IN_SPHERE_BOUND 0x1p-92

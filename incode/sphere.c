@@ -70,13 +70,12 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
         return;
     struct incode_dd_vector ra = incode_dd_relative(a, v, scale);
     struct incode_dd_vector ca = cross(&rc, &ra), ab = cross(&ra, &rb);
-    struct incode_dd bb = incode_dd_dot(rb.d, rb.d),
-                     cc = incode_dd_dot(rc.d, rc.d),
-                     aa = incode_dd_dot(ra.d, ra.d);
+    struct incode_dd squares[3] = {incode_dd_dot(rb.d, rb.d),
+                                   incode_dd_dot(rc.d, rc.d),
+                                   incode_dd_dot(ra.d, ra.d)};
     for (int k = 0; k < 3; k++) {
-        struct incode_dd m = incode_dd_plus(incode_dd_times(bb, ca.d[k]),
-                                            incode_dd_times(cc, ab.d[k]));
-        f->m[k] = incode_dd_plus(m, incode_dd_times(aa, n.d[k]));
+        struct incode_dd normals[3] = {ca.d[k], ab.d[k], n.d[k]};
+        f->m[k] = incode_dd_dot(squares, normals);
     }
     f->det = incode_dd_dot(ra.d, n.d);
 }

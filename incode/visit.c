@@ -1,7 +1,7 @@
 #include <string.h>
 
+#include "lanes.h"
 #include "query.h"
-#include "simd.h"
 
 /* What a walk does with the points of the leaves that it comes to: each
  * question's candidates, a vector of points at a time. */
@@ -72,48 +72,6 @@ INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
     return INCODE_VD_ALL & ~incode_vd_mask(far | (plane < incode_vd_all(0)));
 }
 
-/* ---- a vector of points in twice the precision ---- */
-
-struct lane_dd {
-    incode_vd hi, lo;
-};
-
-INCODE_INLINE incode_vd two_sum(incode_vd a, incode_vd b, incode_vd *error)
-{
-    incode_vd s = a + b, c = s - a;
-    *error = (a - (s - c)) + (b - c);
-    return s;
-}
-
-INCODE_INLINE incode_vd fast_two_sum(incode_vd a, incode_vd b, incode_vd *error)
-{
-    incode_vd s = a + b;
-    *error = b - (s - a);
-    return s;
-}
-
-INCODE_INLINE struct lane_dd plus(struct lane_dd a, struct lane_dd b)
-{
-    struct lane_dd r;
-    incode_vd e, f, s = two_sum(a.hi, b.hi, &e), t = two_sum(a.lo, b.lo, &f);
-    s = fast_two_sum(s, e + t, &e);
-    r.hi = fast_two_sum(s, e + f, &r.lo);
-    return r;
-}
-
-INCODE_INLINE struct lane_dd times(struct lane_dd a, struct lane_dd b)
-{
-    struct lane_dd r;
-    incode_vd e, p = incode_vd_two_product(a.hi, b.hi, &e);
-    r.hi = fast_two_sum(p, e + (a.hi * b.lo + a.lo * b.hi), &r.lo);
-    return r;
-}
-
-INCODE_INLINE struct lane_dd all_lanes(struct incode_dd a)
-{
-    return (struct lane_dd){incode_vd_all(a.hi), incode_vd_all(a.lo)};
-}
-
 /* incode_flat_outside for some points, one bit each. */
 INCODE_INLINE uint32_t outside_lanes(const struct incode_query *q,
                                      const struct incode_frame *frame,
@@ -122,20 +80,17 @@ INCODE_INLINE uint32_t outside_lanes(const struct incode_query *q,
     const struct incode_brick *brick = &frame->page.brick;
     const double *const axis[3] = {brick->x + slot, brick->y + slot,
                                    brick->z + slot};
-    incode_vd scale = incode_vd_all(q->scale);
-    struct lane_dd zero = {incode_vd_all(0), incode_vd_all(0)};
-    struct lane_dd value = zero, square = zero;
+    struct incode_lanes zero = {incode_vd_all(0), incode_vd_all(0)};
+    struct incode_lanes value = zero, square = zero;
     for (int d = 0; d < 3; d++) {
-        struct lane_dd r;
-        r.hi =
-            two_sum(incode_vd_load(axis[d]), incode_vd_all(-q->pv[d]), &r.lo);
-        r.hi *= scale;
-        r.lo *= scale;
-        square = plus(square, times(r, r));
-        value = plus(value, times(all_lanes(q->flat.sphere.m[d]), r));
+        struct incode_lanes r = incode_lanes_difference(incode_vd_load(axis[d]),
+                                                        q->pv[d], q->scale);
+        struct incode_lanes m = incode_lanes_all(q->flat.sphere.m[d]);
+        square = incode_lanes_plus(square, incode_lanes_times(r, r));
+        value = incode_lanes_plus(value, incode_lanes_times(m, r));
     }
-    struct incode_dd det = {-q->flat.sphere.det.hi, -q->flat.sphere.det.lo};
-    value = plus(value, times(all_lanes(det), square));
+    struct incode_lanes det = incode_lanes_all(q->flat.sphere.det);
+    value = incode_lanes_minus(value, incode_lanes_times(det, square));
     /* 1 + |r|^2 is more than |r|. */
     incode_vd slack = incode_vd_all(q->flat.spread) *
                           (incode_vd_all(1) + square.hi + square.hi) +

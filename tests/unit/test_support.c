@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "../../incode/finals.h"
 #include "../../incode/gather.h"
 #include "../../incode/predicates.h"
 #include "../../incode/support.h"
@@ -287,11 +288,74 @@ static void first_of_the_gathered(void **unused)
     assert_true(found > 500);
 }
 
+/* The point that comes first by the predicates alone, or NULL. */
+static const double *first_of(const double *const f[3], const double *const *p,
+                              size_t n, struct incode_tally *tally)
+{
+    const double *first = NULL;
+    for (size_t i = 0; i < n; i++) {
+        if (incode_orient3d(tally, f[0], f[1], f[2], p[i]) > 0 &&
+            (first == NULL ||
+             incode_in_sphere(tally, f[0], f[1], f[2], first, p[i]) > 0)) {
+            first = p[i];
+        }
+    }
+    return first;
+}
+
+/* A random face of a cubic lattice that is turned and rounded, and the other
+ * corners of its cell: all on one sphere but for the rounding. */
+static void finals_of_a_rough_lattice(void **unused)
+{
+    static const double turn[3][3] = {
+        {20, 20, -10}, {-4, 22, 20}, {22, -4, 20}};
+    struct incode_tally tally = {0};
+    size_t certain = 0, alone = 0;
+    (void)unused;
+    for (int k = 0; k < 50000; k++) {
+        bool exact = k % 10 == 0;
+        int power = exact ? 0 : (int)below(200) - 100;
+        double corner[8][3], at[3];
+        const double *q[8];
+        for (int j = 0; j < 3; j++) {
+            at[j] = (double)below(100) - 50;
+        }
+        for (size_t i = 0; i < 8; i++) {
+            size_t other = below(i + 1);
+            q[i] = q[other];
+            q[other] = corner[i];
+            for (int d = 0; d < 3; d++) {
+                double sum = 0;
+                for (int j = 0; j < 3; j++) {
+                    sum += turn[j][d] * (at[j] + (double)(i >> j & 1));
+                }
+                corner[i][d] = ldexp(exact ? sum : sum / 30, power);
+            }
+        }
+        struct incode_finals finals = {.count = 0};
+        size_t n = 1 + below(5);
+        for (size_t i = 0; i < n; i++) {
+            assert_true(incode_finals_add(&finals, q[3 + i]));
+        }
+        uint32_t first = incode_finals_first(
+            &finals, q[0], q[1], q[2], ldexp(1, -power - exact * 5), &tally);
+        if (first == INCODE_FINALS_NONE) {
+            continue;
+        }
+        certain++;
+        alone += n == 1;
+        assert_ptr_equal(q[3 + first], first_of(q, q + 3, n, &tally));
+    }
+    /* Rounded alike, some corners share a sphere indeed. */
+    assert_true(alone > 1000 && certain > 20000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ball_on_a_rough_plane),
         cmocka_unit_test(spheres_of_rough_squares),
+        cmocka_unit_test(finals_of_a_rough_lattice),
         cmocka_unit_test(places_in_a_pencil),
         cmocka_unit_test(first_of_the_gathered),
     };

@@ -1,0 +1,155 @@
+#include "finals.h"
+
+#include <float.h>
+
+#include "lanes.h"
+#include "sphere.h"
+
+/* In coordinates relative to v: with n = b x c, w = |b|^2 c - |c|^2 b and
+ * m = w x n, the face's circle has the centre m / 2 |n|^2, and the sphere of
+ * the pencil through r lies at
+ *
+ *     A / B = (|n|^2 |r|^2 - m . r) / (n . r)
+ *
+ * times a positive number.  Errors of the numerator are below FINE times the
+ * products of the lengths that its terms have, and of the denominator likewise:
+ * fewer than 1000 roundings of 2^-104. */
+#define FINE 1e-27
+#define TINY 1e-250
+
+bool incode_finals_add(struct incode_finals *f, const double p[3])
+{
+    if (f->count == INCODE_FINALISTS)
+        return false;
+    for (int d = 0; d < 3; d++)
+        f->p[d][f->count] = p[d];
+    f->count++;
+    return true;
+}
+
+struct face {
+    struct incode_dd n[3], m[3], nn;
+    double numerator[2]; /* errors over |r| and |r|^2 */
+    double denominator;  /* over |r| */
+};
+
+static void cross(struct incode_dd r[3], const struct incode_dd a[3],
+                  const struct incode_dd b[3])
+{
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        r[k] = incode_dd_cross(a[i], b[j], a[j], b[i]);
+    }
+}
+
+static double length_of(const struct incode_dd a[3])
+{
+    const double hi[3] = {a[0].hi, a[1].hi, a[2].hi};
+    return incode_max_norm(hi);
+}
+
+/* False: the products have so few digits that ties are likely. */
+static bool set_face(struct face *f, const double v[3], const double pb[3],
+                     const double pc[3], double scale)
+{
+    struct incode_dd_vector b = incode_dd_relative(pb, v, scale);
+    struct incode_dd_vector c = incode_dd_relative(pc, v, scale);
+    struct incode_dd w[3];
+    cross(f->n, b.d, c.d);
+    if (f->n[0].lo == 0 && f->n[1].lo == 0 && f->n[2].lo == 0)
+        return false;
+    struct incode_dd bb = incode_dd_dot(b.d, b.d);
+    struct incode_dd cc = incode_dd_dot(c.d, c.d);
+    for (int k = 0; k < 3; k++)
+        w[k] = incode_dd_cross(bb, c.d[k], cc, b.d[k]);
+    cross(f->m, w, f->n);
+    f->nn = incode_dd_dot(f->n, f->n);
+    double lb = length_of(b.d), lc = length_of(c.d), area = lb * lc;
+    f->denominator = FINE * area;
+    f->numerator[0] = FINE * area * area * (lb + lc);
+    f->numerator[1] = FINE * area * area;
+    return true;
+}
+
+/* Places of a vector of candidates in the pencil: hi + lo, and its error; 0 for
+ * one that is certainly not beyond the face, infinite for one in doubt. */
+struct places {
+    alignas(64) double hi[INCODE_FINALISTS];
+    alignas(64) double lo[INCODE_FINALISTS];
+    alignas(64) double error[INCODE_FINALISTS];
+};
+
+INCODE_INLINE void place(struct places *out, uint32_t i, const struct face *f,
+                         const struct incode_finals *finals, const double v[3],
+                         double scale)
+{
+    struct incode_lanes r[3], n[3], m[3];
+    incode_vd size = incode_vd_all(0), tiny = incode_vd_all(TINY);
+    for (int d = 0; d < 3; d++) {
+        r[d] = incode_lanes_difference(incode_vd_load(finals->p[d] + i), v[d],
+                                       scale);
+        n[d] = incode_lanes_all(f->n[d]);
+        m[d] = incode_lanes_all(f->m[d]);
+        size = incode_vd_max(size, incode_vd_abs(r[d].hi));
+    }
+    struct incode_lanes above = incode_lanes_dot(n, r),
+                        nn = incode_lanes_all(f->nn);
+    struct incode_lanes power = incode_lanes_minus(
+        incode_lanes_times(nn, incode_lanes_dot(r, r)), incode_lanes_dot(m, r));
+    incode_vd level = size * incode_vd_all(f->denominator) + tiny;
+    incode_vd error = (incode_vd_all(f->numerator[0]) +
+                       incode_vd_all(f->numerator[1]) * size) *
+                          size +
+                      tiny;
+    incode_vd hi = power.hi / above.hi;
+    incode_vd rest, back = incode_vd_two_product(hi, above.hi, &rest);
+    incode_vd lo =
+        ((power.hi - back) - rest + power.lo - hi * above.lo) / above.hi;
+    error = (error + incode_vd_abs(hi) * level) / above.hi +
+            incode_vd_abs(hi) * incode_vd_all(FINE);
+    error = incode_vd_select(above.hi > level + level, error,
+                             incode_vd_all(__builtin_inf()));
+    error = incode_vd_select(above.hi < -level, incode_vd_all(0), error);
+    *(incode_vd *)(out->hi + i) = hi;
+    *(incode_vd *)(out->lo + i) = lo;
+    *(incode_vd *)(out->error + i) = error;
+}
+
+static bool is_beyond(const struct incode_finals *f, uint32_t i,
+                      const double v[3], const double b[3], const double c[3],
+                      struct incode_tally *tally)
+{
+    const double p[3] = {f->p[0][i], f->p[1][i], f->p[2][i]};
+    return incode_orient3d(tally, v, b, c, p) > 0;
+}
+
+uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
+                             const double b[3], const double c[3], double scale,
+                             struct incode_tally *tally)
+{
+    struct face face;
+    struct places at;
+    uint32_t best = INCODE_FINALS_NONE;
+    if (f->count == 0 || !set_face(&face, v, b, c, scale))
+        return best;
+    for (uint32_t i = f->count; i % INCODE_VD_LANES != 0; i++)
+        for (int d = 0; d < 3; d++)
+            f->p[d][i] = f->p[d][0];
+    for (uint32_t i = 0; i < f->count; i += INCODE_VD_LANES)
+        place(&at, i, &face, f, v, scale);
+    for (uint32_t i = 0; i < f->count; i++) {
+        if (at.error[i] > DBL_MAX && !is_beyond(f, i, v, b, c, tally))
+            at.error[i] = 0;
+        if (at.error[i] != 0 &&
+            (best == INCODE_FINALS_NONE ||
+             (at.hi[i] - at.hi[best]) + (at.lo[i] - at.lo[best]) < 0))
+            best = i;
+    }
+    for (uint32_t i = 0; i < f->count && best != INCODE_FINALS_NONE; i++) {
+        double gap = (at.hi[i] - at.hi[best]) + (at.lo[i] - at.lo[best]);
+        if (i != best && at.error[i] != 0 &&
+            !(gap > 2 * (at.error[i] + at.error[best])))
+            best = INCODE_FINALS_NONE;
+    }
+    return best;
+}
