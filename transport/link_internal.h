@@ -117,6 +117,8 @@ struct link {
     uint32_t session_in, session_out;
     uint32_t intruder; /* epoch that is to be told of the present one; 0 */
     uint64_t kept_us;  /* when the present session was heard last */
+    uint32_t told_by;  /* the start of the peer that said that it is in use, */
+    uint64_t told_us;  /* and when */
     uint64_t now_us, heard_us, sent_us, hello_us, bye_us, deadline_us;
     bool pipe_up, up, hello_now, stalled;
     bool closing, closed, bye_due;

@@ -94,13 +94,22 @@ static enum link_refusal fits(const struct link *link, const uint8_t *hello)
     return LINK_FITS;
 }
 
-/* That a link is in use stays so until its end speaks of this one's epoch
- * again. */
+/* Whether a greeting leaves the link in use: it was, and its end does not speak
+ * of this one's epoch.  Another start of that end cannot know of whom the one
+ * before kept to: he has time to come back. */
+static bool still_in_use(const struct link *link, uint32_t epoch, bool to_us)
+{
+    bool reborn = epoch != link->told_by &&
+                  link->now_us - link->told_us <= link->config.silence_us;
+    return link->peer.refusal == LINK_IN_USE && (!to_us || reborn);
+}
+
 static void note_peer(struct link *link, const uint8_t *hello)
 {
     struct link_peer *peer = &link->peer;
     bool to_us = get32(hello + 12) == link->config.epoch;
-    bool in_use = to_us ? hello[22] != 0 : peer->refusal == LINK_IN_USE;
+    bool told = to_us && hello[22] != 0;
+    bool in_use = told || still_in_use(link, get32(hello + 8), to_us);
     peer->version = hello[0];
     peer->port = hello[1];
     peer->greeting = hello[7];
@@ -109,7 +118,11 @@ static void note_peer(struct link *link, const uint8_t *hello)
     peer->window = get16(hello + 16);
     peer->frame_payload = get16(hello + 18);
     peer->message_max = get16(hello + 20);
-    peer->in_use += to_us && hello[22] != 0;
+    peer->in_use += told;
+    if (told) {
+        link->told_by = peer->epoch;
+        link->told_us = link->now_us;
+    }
     peer->refusal = fits(link, hello);
     if (peer->refusal == LINK_FITS && in_use) {
         peer->refusal = LINK_IN_USE;

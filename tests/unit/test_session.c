@@ -167,6 +167,38 @@ static void an_end_may_keep_to_its_peer(void **unused)
     free_pair(p);
 }
 
+/* One that was told so does not slip in when that end starts again: whom it
+ * kept to has time to come back. */
+static void who_is_sent_away_waits_for_the_other(void **unused)
+{
+    (void)unused;
+    struct link_config loyal = small;
+    loyal.keeps_peer = true;
+    struct pair *p = new_pair(&small, &perfect, 3);
+    p->ends[0].config = loyal;
+    start(p, 0, 77);
+    run(p, 50, 100, 1000000000);
+    struct end first = p->ends[1];
+    p->ends[1].memory = NULL;
+    start(p, 1, 99);
+    for (unsigned i = 0; link_peer(p->ends[1].link)->in_use == 0; i++) {
+        assert_true(i < 1000);
+        step(p, 100);
+    }
+    start(p, 0, 78);
+    for (unsigned i = 0; i < 32000; i++) {
+        p->now_us += 100;
+        for (unsigned who = 0; who < 2; who++) {
+            link_poll(p->ends[who].link, p->now_us);
+        }
+        bool up = link_state(p->ends[1].link) == LINK_UP;
+        assert_true(!up || i > 29000);
+    }
+    assert_int_equal(link_state(p->ends[1].link), LINK_UP);
+    free(first.memory);
+    free_pair(p);
+}
+
 static void a_wrong_wire_is_named(void **unused)
 {
     (void)unused;
@@ -457,6 +489,7 @@ int main(void)
         cmocka_unit_test(a_peer_that_stops_for_long_is_called_silent),
         cmocka_unit_test(a_restarted_peer_is_noticed),
         cmocka_unit_test(an_end_may_keep_to_its_peer),
+        cmocka_unit_test(who_is_sent_away_waits_for_the_other),
         cmocka_unit_test(a_wrong_wire_is_named),
         cmocka_unit_test(sizes_that_do_not_fit_are_refused),
         cmocka_unit_test(a_wire_to_itself_is_refused),
