@@ -35,6 +35,9 @@ struct host_machine {
     /* A wire that is missing from the start is gone round, and later one that
      * was not up for so many seconds; 0: the machine has made its wires. */
     uint8_t absent_s;
+    /* Is told of a wire that is missing from the start; NULL: the user is, on
+     * standard error. */
+    void (*missing)(void *context, unsigned node, unsigned link);
     /* Microseconds since any fixed time, never going back. */
     uint64_t (*now_us)(void *context);
     /* Sleeps until bytes have come, or room for them where there was none, but

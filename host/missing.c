@@ -43,6 +43,11 @@ static bool holds_together(const struct host_service *s,
 static void name_wire(struct host_service *s, unsigned node, unsigned link)
 {
     char other[16] = "the host";
+    s->missing_wires++;
+    if (s->machine->missing != NULL) {
+        s->machine->missing(s->machine->context, node, link);
+        return;
+    }
     if (link < s->machine->dimension) {
         snprintf(other, sizeof other, "node %u", node ^ 1u << link);
     }
@@ -50,7 +55,6 @@ static void name_wire(struct host_service *s, unsigned node, unsigned link)
             "incode: node %u link %u: the wire to %s does not come up; "
             "the run goes on without it, look after that wire\n",
             node, link, other);
-    s->missing_wires++;
 }
 
 static void tell(struct host_service *s, const struct cube_wiring *w)
@@ -72,7 +76,7 @@ static void search(struct host_service *s, uint64_t now_us)
 }
 
 /* missing: the dead that were found are. */
-static void end_search(struct host_service *s, bool missing)
+static void end_search(struct host_service *s, uint64_t now_us, bool missing)
 {
     struct cube_wiring next = *cube_wiring(s->cube);
     next.generation++;
@@ -85,7 +89,29 @@ static void end_search(struct host_service *s, bool missing)
         next.dead_count = next.settled;
     }
     s->searching = false;
+    s->began_us = now_us;
     cube_renew(s->cube, &next);
+}
+
+/* For one more node, and for wires that do not come up. */
+static uint64_t wait_us(uint64_t patience_us)
+{
+    return patience_us / 2 < WAIT_US_MAX ? patience_us / 2 : WAIT_US_MAX;
+}
+
+static uint64_t search_us(uint64_t patience_us)
+{
+    uint64_t most = patience_us * 2 / 5;
+    return most < SEARCH_US_MAX ? most : SEARCH_US_MAX;
+}
+
+bool host_missing_undecided(const struct host_service *service, uint64_t now_us,
+                            uint64_t patience_us)
+{
+    const struct host_service *s = service;
+    return s->machine->absent_s != 0 &&
+           (s->searching ? now_us - s->search_us < search_us(patience_us)
+                         : now_us - s->news_us < wait_us(patience_us));
 }
 
 bool host_missing_check(struct host_service *service, uint64_t now_us,
@@ -93,25 +119,24 @@ bool host_missing_check(struct host_service *service, uint64_t now_us,
 {
     struct host_service *s = service;
     struct cube_wiring found = *cube_wiring(s->cube);
-    uint64_t wait_us = patience_us / 2, search_us = patience_us * 2 / 5;
-    wait_us = wait_us < WAIT_US_MAX ? wait_us : WAIT_US_MAX;
-    search_us = search_us < SEARCH_US_MAX ? search_us : SEARCH_US_MAX;
     if (s->started || s->machine->absent_s == 0) {
         return false;
     }
     if (!s->searching) {
-        if (s->here < s->living && now_us - s->news_us >= wait_us) {
+        if (s->here < s->living &&
+            now_us - s->news_us >= wait_us(patience_us)) {
             search(s, now_us);
         }
         return s->searching;
     }
     found.gate = host_service_gate(s, &found);
     if (s->here == s->living) {
-        end_search(s, false); /* all have come, or the wires are not needed */
-    } else if (now_us - s->search_us < search_us) {
+        end_search(s, now_us,
+                   false); /* all have come, or the wires are not needed */
+    } else if (now_us - s->search_us < search_us(patience_us)) {
         return true;
     } else if (found.dead_count < CUBE_DEAD_MAX && holds_together(s, &found)) {
-        end_search(s, true);
+        end_search(s, now_us, true);
     } else if (now_us - s->search_us >= AGAIN_US) {
         search(s, now_us);
     }

@@ -32,6 +32,10 @@
 bool host_missing_check(struct host_service *service, uint64_t now_us,
                         uint64_t patience_us);
 
+/* Whether a search is on or due, so that nobody is to be blamed yet. */
+bool host_missing_undecided(const struct host_service *service, uint64_t now_us,
+                            uint64_t patience_us);
+
 /* A node has said which of its links have been up. */
 void host_missing_heard(struct host_service *service, unsigned node,
                         uint32_t links);

@@ -322,7 +322,8 @@ static int check_bring_up(const struct host_service *s, uint64_t now_us,
                           struct host_error *error)
 {
     if (s->started || s->here == s->living ||
-        now_us - s->began_us <= patience_of(s)) {
+        now_us - s->began_us <= patience_of(s) ||
+        host_missing_undecided(s, now_us, patience_of(s))) {
         return 0;
     }
     for (unsigned i = 0; i < s->machine->nodes; i++) {

@@ -491,6 +491,24 @@ static void test_missing_wire(void **unused)
     assert_int_equal(result.missing_wires, 3);
 }
 
+/* A node that comes late moves the search on, and not into the end of the
+ * patience with nodes. */
+static void test_missing_wire_and_late_node(void **unused)
+{
+    (void)unused;
+    prepare();
+    world.absent_s = 3;
+    start_world();
+    lacks(2, 2);
+    world.stopped[5] = true;
+    world.events[0] =
+        (struct event){CONTINUE, 3e6 / (double)undisturbed_us, 5, 0};
+    survives_as(HOST_SPATIAL);
+    assert_true(world.now_us > 8000000);
+    assert_int_equal(result.generations, 2);
+    assert_int_equal(result.missing_wires, 1);
+}
+
 /* The host's own wire to node 0, where it has another. */
 static void test_missing_host_wire(void **unused)
 {
@@ -589,6 +607,7 @@ int main(void)
         cmocka_unit_test(test_cut),
         cmocka_unit_test(test_wrong_wire),
         cmocka_unit_test(test_missing_wire),
+        cmocka_unit_test(test_missing_wire_and_late_node),
         cmocka_unit_test(test_late_node),
         cmocka_unit_test(test_late_wire),
         cmocka_unit_test(test_missing_host_wire),
