@@ -438,8 +438,9 @@ static int renew(struct host_service *s, uint64_t now_us,
 }
 
 /* One round of the loop: read, serve, and sleep where nothing moved. */
-static int round_trip(struct host_service *s, struct host_error *error)
+int host_service_round(struct host_service *service, struct host_error *error)
 {
+    struct host_service *s = service;
     uint64_t now = now_of(s);
     unsigned moved = (unsigned)cube_poll(s->cube, now);
     /* Nodes that have served another start of the host know a later one. */
@@ -466,7 +467,7 @@ static int round_trip(struct host_service *s, struct host_error *error)
     return 0;
 }
 
-int host_service_start(struct host_service *service, struct host_error *error)
+int host_service_open(struct host_service *service, struct host_error *error)
 {
     struct host_service *s = service;
     s->spill.file = -1;
@@ -482,12 +483,21 @@ int host_service_start(struct host_service *service, struct host_error *error)
     s->generations = 1;
     s->check_us = s->wire_down_us = now_of(s);
     host_watch_begin(s, s->check_us);
-    while (s->here < s->living || s->searching) {
-        if (round_trip(s, error) != 0) {
-            return error->code;
-        }
-    }
     return 0;
+}
+
+bool host_service_is_up(const struct host_service *service)
+{
+    return service->here == service->living && !service->searching;
+}
+
+int host_service_start(struct host_service *service, struct host_error *error)
+{
+    int status = host_service_open(service, error);
+    while (status == 0 && !host_service_is_up(service)) {
+        status = host_service_round(service, error);
+    }
+    return status;
 }
 
 /* What is the same in all generations. */
@@ -536,7 +546,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
     host_progress_start(&s->progress, s->show_progress);
     bool asked = false;
     while (!s->over && !(asked && all_reported(s))) {
-        if (round_trip(s, error) != 0) {
+        if (host_service_round(s, error) != 0) {
             host_progress_end(&s->progress);
             return error->code;
         }
@@ -564,7 +574,7 @@ int host_service_wires(struct host_service *service, struct host_error *error)
 {
     int status = 0;
     while (status == 0 && host_missing_awaited(service)) {
-        status = round_trip(service, error);
+        status = host_service_round(service, error);
     }
     return status;
 }

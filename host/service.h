@@ -131,6 +131,12 @@ struct host_service {
  * answered: the start-up. */
 int host_service_start(struct host_service *service, struct host_error *error);
 
+/* The same in parts, for who has other things to do between two rounds of the
+ * loop: before the first; one; and whether every node has answered. */
+int host_service_open(struct host_service *service, struct host_error *error);
+int host_service_round(struct host_service *service, struct host_error *error);
+bool host_service_is_up(const struct host_service *service);
+
 /* Hands out the setup and the jobs, and returns when every brick is committed
  * and every node has told its statistics. */
 int host_service_run(struct host_service *service, struct host_error *error);

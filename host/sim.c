@@ -6,12 +6,15 @@
 #include "gen.h"
 #include "service.h"
 #include "sim_reference.h"
+#include "sim_rival.h"
 #include "verify.h"
 
 enum {
     LASTING_MAX = 32, /* faults that are to be taken back */
     TRIES_MAX = 50,   /* for a kind of fault that is wanted and possible */
     REBOOT_US = 3000,
+    TOLD_US = 1000000,
+    KNOCK_AGAIN_US = 5000,
     HOST_US_CALM = 200,       /* for a look at the clock, at most, in the end */
     TIME_US_MAX = 1800000000, /* half an hour in virtual time, */
     STEPS_MAX = 60000000      /* or so many steps: it hangs */
@@ -30,10 +33,11 @@ struct run {
     struct host_sim_outcome *outcome;
     struct host_world world;
     struct host_service service;
+    struct host_rival rival;
     struct host_points points;
     struct host_order order;
     struct host_tetrahedra tets;
-    uint64_t random, calm_us, event_us;
+    uint64_t random, calm_us, event_us, knock_us;
     unsigned events;
     bool open, crash_due, broken;
     uint64_t frames;                  /* seen by `decide` */
@@ -99,6 +103,21 @@ static void weather(struct run *r, bool bad)
     }
 }
 
+/* Node 0 forgets which host it keeps to, and is his who comes first: no other
+ * may come then but one that has just been told. */
+static bool may_crash(const struct run *r)
+{
+    return !r->rival.there ||
+           (r->rival.told > 0 && r->world.now_us - r->rival.told_us < TOLD_US);
+}
+
+static bool may_knock(const struct run *r)
+{
+    const struct host_world_node *node = &r->world.node[0];
+    return node->state == HOST_WORLD_UP &&
+           r->service.node[0].start == node->board.identity.epoch;
+}
+
 /* One fault of those that the plan wants; false: none was possible. */
 static bool happen(struct run *r)
 {
@@ -113,6 +132,9 @@ static bool happen(struct run *r)
     l.node = node;
     l.link = (unsigned)draw(r, 0, w->options.dimension);
     if (!r->plan->wanted[kind]) {
+        return false;
+    }
+    if (kind == HOST_SIM_CRASH && node == 0 && !may_crash(r)) {
         return false;
     }
     if (kind == HOST_SIM_PAUSE) {
@@ -152,7 +174,7 @@ static void break_for_good(struct run *r)
     struct host_world *w = &r->world;
     r->broken = true;
     if (r->plan->wanted[HOST_SIM_DEAD_WIRE]) {
-        host_world_cut(w, (unsigned)draw(r, 0, w->wires - 2), true);
+        host_world_cut(w, (unsigned)draw(r, 0, w->host_wire - 1), true);
         r->outcome->struck[HOST_SIM_DEAD_WIRE] += r->open;
     }
     if (r->plan->wanted[HOST_SIM_DEAD_NODE]) {
@@ -171,9 +193,18 @@ static void strike(void *context)
         host_world_crash(w, r->plan->restart_node, REBOOT_US, false);
     }
     mend(r, false);
+    if (w->now_us >= r->knock_us && !may_knock(r)) {
+        r->knock_us = w->now_us + KNOCK_AGAIN_US;
+    } else if (w->now_us >= r->knock_us) {
+        r->knock_us = UINT64_MAX;
+        host_rival_come(&r->rival, w, w->now_us + r->plan->knock_lasts_us,
+                        w->options.host_us);
+        r->outcome->struck[HOST_SIM_SECOND_HOST] += r->open;
+    }
     if (w->now_us >= r->calm_us) {
         mend(r, true);
         weather(r, false);
+        w->strike_us = r->knock_us;
         if (w->options.host_us > HOST_US_CALM) {
             w->options.host_us = HOST_US_CALM;
         }
@@ -195,6 +226,7 @@ static void strike(void *context)
                   : w->now_us + draw(r, 1, 2 * (uint64_t)r->plan->gap_us);
     }
     w->strike_us = r->calm_us < r->event_us ? r->calm_us : r->event_us;
+    w->strike_us = r->knock_us < w->strike_us ? r->knock_us : w->strike_us;
     for (unsigned i = 0; i < r->lasting_count; i++) {
         uint64_t until = r->lasting[i].until_us;
         w->strike_us = until < w->strike_us ? until : w->strike_us;
@@ -278,10 +310,23 @@ static int open_world(struct run *r, struct host_error *error)
         .seed = p->seed,
         .time_us_max = TIME_US_MAX,
         .steps_max = STEPS_MAX,
+        .absent_s = p->absent_s,
+        .second_host = p->wanted[HOST_SIM_SECOND_HOST],
         .strike = strike,
         .context = r,
+        .guest = host_rival_round,
+        .guest_context = &r->rival,
     };
-    return host_world_open(&r->world, &o, error);
+    if (host_world_open(&r->world, &o, error) != 0) {
+        return error->code;
+    }
+    for (unsigned i = 0; i < p->missing; i++) {
+        unsigned wire = (unsigned)draw(r, 0, r->world.host_wire - 1);
+        if (!r->world.wire[wire].missing) {
+            host_world_leave_out(&r->world, wire);
+        }
+    }
+    return 0;
 }
 
 static int make_work(struct run *r, struct host_error *error)
@@ -304,9 +349,15 @@ static void begin(struct run *r)
     r->calm_us = w->now_us + r->plan->calm_us;
     r->event_us = w->now_us + draw(r, 1, r->plan->gap_us);
     r->events = r->plan->events_max;
+    r->knock_us = r->plan->wanted[HOST_SIM_SECOND_HOST]
+                      ? w->now_us + r->plan->knock_us
+                      : UINT64_MAX;
+    for (unsigned i = 0; i < w->wires; i++) {
+        r->outcome->struck[HOST_SIM_MISSING_WIRE] += w->wire[i].missing;
+    }
     sum_strikes(w, r->before);
     weather(r, true);
-    w->strike_us = r->event_us;
+    w->strike_us = r->event_us < r->knock_us ? r->event_us : r->knock_us;
 }
 
 /* Pages that were dropped and faces that were spilled. */
@@ -328,6 +379,8 @@ static void finish(struct run *r)
         out->struck[k] = now[k] - r->before[k];
     }
     r->open = false;
+    r->knock_us = UINT64_MAX;
+    host_rival_leave(&r->rival);
     out->work_us = r->world.now_us - out->work_us;
     if (r->plan->wanted[HOST_SIM_SLOW_HOST]) {
         out->struck[HOST_SIM_SLOW_HOST]++;
@@ -359,6 +412,34 @@ static int check_queues(const struct run *r, struct host_error *error)
     return 0;
 }
 
+static int check_rival(const struct run *r, struct host_error *error)
+{
+    return r->rival.fault[0] == '\0'
+               ? 0
+               : host_fail(error, HOST_BROKEN, "node 0: %s; replay it",
+                           r->rival.fault);
+}
+
+/* Every wire that was missing was named, and no other. */
+static int check_wires(const struct run *r, struct host_error *error)
+{
+    const struct host_world *w = &r->world;
+    const bool *wanted = r->plan->wanted;
+    /* What died or was lost since may be named as dead, or not at all. */
+    bool all = !r->service.over && !wanted[HOST_SIM_DEAD_WIRE] &&
+               !wanted[HOST_SIM_DEAD_NODE];
+    for (unsigned i = 0; i < w->wires; i++) {
+        bool missing = w->wire[i].missing, named = w->wire[i].named;
+        if (missing ? all && !named : named) {
+            return host_fail(error, HOST_BROKEN, "host: wire %u %s; replay it",
+                             i,
+                             missing ? "is missing and was not named"
+                                     : "was named as missing and is there");
+        }
+    }
+    return 0;
+}
+
 static int serve(struct run *r, struct host_machine *machine,
                  struct host_error *error)
 {
@@ -376,7 +457,7 @@ static int serve(struct run *r, struct host_machine *machine,
     /* Early weather ends too, while there is patience left to come up. */
     uint64_t patience = p->patience_us != 0 ? p->patience_us : HOST_PATIENCE_US;
     r->calm_us = p->calm_us < patience / 2 ? p->calm_us : patience / 2;
-    r->event_us = UINT64_MAX;
+    r->event_us = r->knock_us = UINT64_MAX;
     r->world.strike_us = r->calm_us;
     weather(r, p->early);
     watch_frames(r);
@@ -387,6 +468,9 @@ static int serve(struct run *r, struct host_machine *machine,
         finish(r);
     }
     status = status != 0 ? status : check_queues(r, error);
+    status = status != 0 ? status : check_rival(r, error);
+    status = status != 0 ? status : host_service_wires(s, error);
+    status = status != 0 ? status : check_wires(r, error);
     r->calm_us = 0;
     r->world.strike_us = 0;
     host_service_end(s);

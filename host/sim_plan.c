@@ -3,14 +3,18 @@
 #include <string.h>
 
 const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
-    "loss",      "flip",    "delete",    "insert",    "repeat", "burst",
-    "stall",     "one-way", "cut",       "partition", "pause",  "crash",
-    "slow-host", "tiny",    "dead-wire", "dead-node"};
+    "loss",      "flip",         "delete",     "insert", "repeat",
+    "burst",     "stall",        "one-way",    "cut",    "partition",
+    "pause",     "crash",        "slow-host",  "tiny",   "dead-wire",
+    "dead-node", "missing-wire", "second-host"};
 
 /* A slow wire does not wake its node for every byte. */
 enum {
     FIFO_BYTES = 64,
-    SPHERE_MAX = 150 /* points of that kind on a large cube */
+    SPHERE_MAX = 150, /* points of that kind on a large cube */
+    ABSENT_S = 30,
+    ABSENT_S_MIN = 3,
+    HOST_KEEPS_US = 3000000 /* node 0 to a host that it does not hear */
 };
 
 /* Numbers of nodes, by weight. */
@@ -150,6 +154,42 @@ static void draw_death(struct host_sim_plan *p)
     p->dead_us = (uint32_t)draw(&state, 4000000, 8000000);
 }
 
+/* Fewer wires than a node has may be missing anywhere: the cube holds together.
+ * With dead ones one less, so that node 0 keeps one. */
+static void draw_missing(struct host_sim_plan *p)
+{
+    uint64_t state = sim_seed(p->seed, 79);
+    unsigned dimension = (unsigned)__builtin_ctz(p->nodes);
+    unsigned dead =
+        p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_DEAD_NODE];
+    if (p->nodes > 64 || dimension < 2 + dead || draw(&state, 1, 4) > 1) {
+        return;
+    }
+    p->wanted[HOST_SIM_MISSING_WIRE] = true;
+    p->missing = (unsigned)draw(&state, 1, dimension - 1 - dead);
+    p->absent_s = dead == 0 ? ABSENT_S : (uint8_t)(p->dead_us / 1000000);
+    p->absent_s = p->absent_s < ABSENT_S_MIN ? ABSENT_S_MIN : p->absent_s;
+}
+
+/* A second host is sent away as long as node 0 hears the first: nothing else
+ * then keeps it from that for long. */
+static void draw_second_host(struct host_sim_plan *p)
+{
+    uint64_t state = sim_seed(p->seed, 80);
+    if (p->nodes > 64 || draw(&state, 1, 4) > 1) {
+        return;
+    }
+    p->wanted[HOST_SIM_SECOND_HOST] = true;
+    p->knock_us = host_world_draw_log(&state, 100, 200000);
+    p->knock_lasts_us = host_world_draw_log(&state, 10000, 10000000);
+    p->events_max = p->events_max < 8 ? p->events_max : 8;
+    uint32_t most = HOST_KEEPS_US / 10;
+    p->lasts_us_max = p->lasts_us_max < most ? p->lasts_us_max : most;
+    most = HOST_KEEPS_US / 30;
+    p->weather.stall_us =
+        p->weather.stall_us < most ? p->weather.stall_us : most;
+}
+
 void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
                         unsigned nodes)
 {
@@ -166,6 +206,8 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
     draw_cube(plan, &state);
     draw_faults(plan, &state);
     draw_death(plan);
+    draw_missing(plan);
+    draw_second_host(plan);
 }
 
 void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)

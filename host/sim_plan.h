@@ -25,8 +25,10 @@ enum host_sim_fault {
     HOST_SIM_SLOW_HOST,
     HOST_SIM_TINY, /* memories so small that pages are dropped or faces spilled
                     */
-    HOST_SIM_DEAD_WIRE, /* a wire between two nodes breaks for good */
-    HOST_SIM_DEAD_NODE, /* a node, but for node 0, never comes back */
+    HOST_SIM_DEAD_WIRE,    /* a wire between two nodes breaks for good */
+    HOST_SIM_DEAD_NODE,    /* a node, but for node 0, never comes back */
+    HOST_SIM_MISSING_WIRE, /* a wire between two nodes was never there */
+    HOST_SIM_SECOND_HOST,  /* knocks at the cube while it is at work */
     HOST_SIM_FAULTS
 };
 
@@ -60,6 +62,11 @@ struct host_sim_plan {
     uint32_t dead_us;
     uint64_t patience_us;
     uint64_t calm_us; /* after the work began: no more faults */
+    unsigned missing; /* wires that were never there */
+    uint8_t absent_s; /* as in struct host_machine */
+    /* When a second host comes, after the work began, and when it goes by
+     * itself. */
+    uint64_t knock_us, knock_lasts_us;
     /* One fault alone, at frame `frame` of all that are sent: what becomes of
      * it, or a restart of the node that sends it.  0: none. */
     uint64_t frame;

@@ -3,7 +3,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { GUARD_BYTES = 256, GUARD = 0xa5, BOOT_US = 2000 };
+enum {
+    GUARD_BYTES = 256,
+    GUARD = 0xa5,
+    BOOT_US = 2000,
+    CALL_AGAIN_US = 20000, /* as TCP_PAUSE_MIN_US, */
+    CALL_AGAIN_US_MAX = 1000000
+};
 
 uint64_t host_world_draw(uint64_t *state, uint64_t lo, uint64_t hi)
 {
@@ -61,6 +67,9 @@ static void wake_at(struct host_world *w, uint32_t node, uint64_t us)
 /* Something comes for a node: it looks once it is free. */
 static void rouse(struct host_world *w, unsigned node, uint64_t us)
 {
+    if (node > w->options.nodes && us < w->guest_us) {
+        w->guest_us = us;
+    }
     if (node >= w->options.nodes || w->node[node].state != HOST_WORLD_UP) {
         return;
     }
@@ -98,6 +107,9 @@ static int port_send(void *context, const uint8_t *bytes, size_t size)
 {
     struct host_world_port *port = context;
     struct host_world *w = port->world;
+    if (port->replaced) {
+        return LINK_PIPE_CLOSED;
+    }
     int taken = port->pipe.send(port->pipe.context, bytes, size);
     if (taken > 0) {
         remember(w, w->now_us << 16 ^ port->wire << 1 ^ port->side);
@@ -110,6 +122,10 @@ static int port_send(void *context, const uint8_t *bytes, size_t size)
 static int port_receive(void *context, uint8_t *bytes, size_t size)
 {
     struct host_world_port *port = context;
+    if (port->replaced) {
+        port->replaced = false;
+        return LINK_PIPE_CLOSED;
+    }
     int got = port->pipe.receive(port->pipe.context, bytes, size);
     if (got > 0 && port->end->in->blocked) {
         rouse(port->world, port->peer, port->world->now_us);
@@ -126,7 +142,7 @@ unsigned host_world_wire_of(const struct host_world *world, unsigned node,
                             unsigned link)
 {
     if (link == world->options.dimension) {
-        return world->wires - 1;
+        return world->host_wire;
     }
     unsigned low = node & ((1u << link) - 1);
     return link * (world->options.nodes / 2) + (node >> (link + 1) << link) +
@@ -136,11 +152,13 @@ unsigned host_world_wire_of(const struct host_world *world, unsigned node,
 static void open_port(struct host_world *w, struct host_world_port *port,
                       unsigned owner, unsigned link, unsigned peer)
 {
+    unsigned nodes = w->options.nodes;
     port->world = w;
     port->owner = owner;
     port->peer = peer;
-    port->wire = owner == w->options.nodes ? w->wires - 1
-                                           : host_world_wire_of(w, owner, link);
+    port->wire = owner >= nodes  ? w->host_wire + owner - nodes
+                 : peer >= nodes ? w->host_wire + peer - nodes
+                                 : host_world_wire_of(w, owner, link);
     port->side = owner > peer;
     port->end = &w->wire[port->wire].wire.end[port->side];
     port->pipe = sim_pipe(port->end);
@@ -161,6 +179,71 @@ void host_world_deaf(struct host_world *world, unsigned wire, unsigned side,
     struct host_world_wire *one = &world->wire[wire];
     one->deaf[side] += deaf ? 1u : UINT32_MAX;
     sim_line_deaf(&one->wire.line[side], one->deaf[side] > 0);
+}
+
+void host_world_leave_out(struct host_world *world, unsigned wire)
+{
+    world->wire[wire].missing = true;
+    host_world_cut(world, wire, true);
+}
+
+/* --- two hosts ------------------------------------------------------------ */
+
+static void hang_up(struct host_world *w, unsigned k, uint64_t rest_us)
+{
+    struct host_world_door *door = &w->door[k];
+    if (door->connected) {
+        door->connected = false;
+        host_world_cut(w, door->port.wire, true);
+    }
+    door->call_us = w->now_us + rest_us;
+    door->pause_us = CALL_AGAIN_US;
+}
+
+static void call(struct host_world *w, unsigned k)
+{
+    unsigned dimension = w->options.dimension;
+    struct host_world_door *door = &w->door[k];
+    struct host_world_port *at = &w->node[0].port[dimension];
+    if (w->node[0].state != HOST_WORLD_UP) { /* nobody listens */
+        door->call_us = w->now_us + door->pause_us;
+        door->pause_us = 2 * door->pause_us < CALL_AGAIN_US_MAX
+                             ? 2 * door->pause_us
+                             : CALL_AGAIN_US_MAX;
+        return;
+    }
+    hang_up(w, 1 - k, CALL_AGAIN_US);
+    door->connected = true;
+    host_world_cut(w, door->port.wire, false);
+    open_port(w, at, 0, dimension, w->options.nodes + k);
+    at->replaced = true;
+    rouse(w, 0, w->now_us);
+}
+
+/* When a host calls, or UINT64_MAX. */
+static uint64_t next_call(const struct host_world *w, unsigned *k)
+{
+    uint64_t next = UINT64_MAX;
+    for (unsigned i = 0; i < 2; i++) {
+        const struct host_world_door *door = &w->door[i];
+        if (door->wanted && !door->connected && door->call_us < next) {
+            next = door->call_us;
+            *k = i;
+        }
+    }
+    return next;
+}
+
+void host_world_rest(struct host_world *world, uint64_t rest_us)
+{
+    hang_up(world, 1, rest_us);
+}
+
+void host_world_knock(struct host_world *world, bool comes)
+{
+    hang_up(world, 1, 0);
+    world->door[1].wanted = comes;
+    world->guest_us = comes ? world->now_us : UINT64_MAX;
 }
 
 /* --- nodes --------------------------------------------------------------- */
@@ -238,6 +321,10 @@ void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
         return;
     }
     n->state = HOST_WORLD_OFF;
+    if (node == 0 && world->options.second_host) {
+        hang_up(world, 0, CALL_AGAIN_US);
+        hang_up(world, 1, CALL_AGAIN_US);
+    }
     n->unplugged = unplugged;
     plug_in(world, node, false);
     n->busy_until_us = world->now_us + us;
@@ -307,11 +394,11 @@ static void step(struct host_world *w, unsigned i)
 
 /* --- time ---------------------------------------------------------------- */
 
-/* When the host has something to read, or room that it had not. */
-static uint64_t host_due(const struct host_world *w)
+uint64_t host_world_door_due(const struct host_world *world, unsigned host)
 {
-    uint64_t bytes = sim_next_us(w->host.end->in, w->options.gather_us);
-    uint64_t room = sim_room_us(w->host.end->out);
+    const struct sim_end *end = world->door[host].port.end;
+    uint64_t bytes = sim_next_us(end->in, world->options.gather_us);
+    uint64_t room = sim_room_us(end->out);
     return bytes < room ? bytes : room;
 }
 
@@ -319,10 +406,16 @@ static uint64_t host_due(const struct host_world *w)
 static void run_until(struct host_world *w, uint64_t until, bool for_host)
 {
     while (w->fault == NULL) {
+        unsigned caller = 0;
         uint64_t next = w->node[w->heap[0]].wake_us;
+        uint64_t called = next_call(w, &caller);
         bool strike = w->strike_us <= next;
         next = strike ? w->strike_us : next;
-        uint64_t host = for_host ? host_due(w) : UINT64_MAX;
+        bool guest = w->guest_us < next;
+        next = guest ? w->guest_us : next;
+        bool calls = called < next;
+        next = calls ? called : next;
+        uint64_t host = for_host ? host_world_door_due(w, 0) : UINT64_MAX;
         if (host <= next && host < until) {
             until = host;
         }
@@ -330,7 +423,12 @@ static void run_until(struct host_world *w, uint64_t until, bool for_host)
             break;
         }
         w->now_us = next > w->now_us ? next : w->now_us;
-        if (strike) {
+        if (calls) {
+            call(w, caller);
+        } else if (guest) {
+            w->guest_us = UINT64_MAX;
+            w->options.guest(w->options.guest_context);
+        } else if (strike) {
             w->strike_us = UINT64_MAX;
             w->options.strike(w->options.context);
         } else {
@@ -361,7 +459,7 @@ static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_world *w = context;
     run_until(w, w->now_us + wait_us, true);
-    w->host.end->out->blocked = false;
+    w->door[0].port.end->out->blocked = false;
 }
 
 static int machine_check(void *context, struct host_error *error)
@@ -391,6 +489,17 @@ static void machine_stop(void *context)
     }
 }
 
+struct link_pipe host_world_pipe(struct host_world *world, unsigned host)
+{
+    return port_pipe(&world->door[host].port);
+}
+
+static void machine_missing(void *context, unsigned node, unsigned link)
+{
+    struct host_world *w = context;
+    w->wire[host_world_wire_of(w, node, link)].named = true;
+}
+
 struct host_machine host_world_machine(struct host_world *world)
 {
     struct host_machine machine = {0};
@@ -398,7 +507,9 @@ struct host_machine host_world_machine(struct host_world *world)
     machine.nodes = world->options.nodes;
     machine.dimension = world->options.dimension;
     machine.epoch = world->epoch++;
-    machine.pipe = port_pipe(&world->host);
+    machine.pipe = host_world_pipe(world, 0);
+    machine.absent_s = world->options.absent_s;
+    machine.missing = machine_missing;
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;
@@ -455,20 +566,25 @@ int host_world_open(struct host_world *world,
     memset(w, 0, sizeof *w);
     w->options = *options;
     w->random = sim_seed(options->seed, 1);
-    w->strike_us = UINT64_MAX;
+    w->strike_us = w->guest_us = UINT64_MAX;
     w->epoch = (uint32_t)(sim_draw(&w->random) >> 33) | 1;
-    w->wires = nodes * options->dimension / 2 + 1;
+    w->host_wire = nodes * options->dimension / 2;
+    w->wires = w->host_wire + (options->second_host ? 2 : 1);
     size_t each = sim_wire_bytes(&options->wire);
     w->node = calloc(nodes, sizeof *w->node);
     w->wire = calloc(w->wires, sizeof *w->wire);
     w->heap = calloc(nodes, sizeof *w->heap);
     w->bytes =
-        malloc(each * (w->wires - 1) + sim_wire_bytes(&options->host_wire));
+        malloc(each * w->host_wire +
+               sim_wire_bytes(&options->host_wire) * (w->wires - w->host_wire));
     bool good = w->node != NULL && w->wire != NULL && w->heap != NULL &&
                 w->bytes != NULL;
     for (unsigned i = 0; good && i < w->wires; i++) {
-        bool host = i == w->wires - 1;
-        sim_wire_init(&w->wire[i].wire, w->bytes + i * each,
+        bool host = i >= w->host_wire;
+        size_t second =
+            i > w->host_wire ? sim_wire_bytes(&options->host_wire) : 0;
+        size_t at = host ? w->host_wire * each + second : i * each;
+        sim_wire_init(&w->wire[i].wire, w->bytes + at,
                       host ? &options->host_wire : &options->wire, &w->now_us,
                       sim_seed(options->seed, 1000 + i));
     }
@@ -483,7 +599,13 @@ int host_world_open(struct host_world *world,
         host_world_close(w);
         return host_fail_memory(error, "the simulated nodes");
     }
-    open_port(w, &w->host, nodes, 0, 0);
+    for (unsigned k = 0; k < w->wires - w->host_wire; k++) {
+        open_port(w, &w->door[k].port, nodes + k, 0, 0);
+    }
+    w->door[0].wanted = w->door[0].connected = true;
+    if (options->second_host) {
+        host_world_cut(w, w->host_wire + 1, true);
+    }
     return 0;
 }
 

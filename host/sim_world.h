@@ -34,9 +34,14 @@ struct host_world_options {
     uint32_t host_us;   /* a round of the host's loop */
     uint64_t seed;
     uint64_t time_us_max, steps_max; /* then it counts as hanging */
+    uint8_t absent_s;                /* as in struct host_machine */
+    bool second_host;                /* there is a place for one */
     /* Called whenever strike_us of the world is reached; sets the next. */
     void (*strike)(void *context);
     void *context;
+    /* And this at guest_us: the second host's round. */
+    void (*guest)(void *context);
+    void *guest_context;
 };
 
 enum host_world_state { HOST_WORLD_UP, HOST_WORLD_OFF, HOST_WORLD_ENDED };
@@ -49,7 +54,18 @@ struct host_world_port {
     struct link_pipe pipe; /* of the simulated wire */
     struct sim_end *end;
     unsigned wire, side;
-    unsigned owner, peer; /* node, or `nodes` for the host */
+    unsigned owner, peer; /* node, or `nodes` for the host; one more for the
+                             second host */
+    bool replaced;        /* by a newer connection: seen to break once */
+};
+
+/* A host calls node 0 as over TCP: the newest connection takes the place of
+ * the one before, whose end calls again.  There is one call at a time. */
+struct host_world_door {
+    struct host_world_port port;
+    bool wanted, connected;
+    uint64_t call_us;  /* the next call, while it is not connected, */
+    uint64_t pause_us; /* and what follows one that nobody answers */
 };
 
 struct host_world_node {
@@ -67,11 +83,12 @@ struct host_world_node {
 struct host_world_wire {
     struct sim_wire wire;
     uint32_t cuts, deaf[2]; /* reasons for it to be so */
+    bool missing, named;    /* never there; told to the user */
 };
 
 struct host_world {
     struct host_world_options options;
-    uint64_t now_us, steps, strike_us;
+    uint64_t now_us, steps, strike_us, guest_us;
     uint64_t random;
     uint32_t epoch; /* of the next start of anything */
     uint64_t trace; /* of all bytes sent, their times and wires */
@@ -81,9 +98,9 @@ struct host_world {
     unsigned ended;
     struct host_world_node *node;
     struct host_world_wire *wire;
-    unsigned wires; /* the last one is the host's */
-    uint32_t *heap; /* nodes by wake_us */
-    struct host_world_port host;
+    unsigned wires, host_wire; /* then perhaps the second host's */
+    uint32_t *heap;            /* nodes by wake_us */
+    struct host_world_door door[2];
     uint8_t *bytes; /* of all wires */
 };
 
@@ -93,9 +110,21 @@ int host_world_open(struct host_world *world,
 void host_world_close(struct host_world *world);
 struct host_machine host_world_machine(struct host_world *world);
 
-/* The wire of a node's link; of the host's link the last. */
+/* The wire of a node's link. */
 unsigned host_world_wire_of(const struct host_world *world, unsigned node,
                             unsigned link);
+
+/* The bytes of a host, 0 or 1, and when it has something to read, or room that
+ * it had not. */
+struct link_pipe host_world_pipe(struct host_world *world, unsigned host);
+uint64_t host_world_door_due(const struct host_world *world, unsigned host);
+
+/* A second host comes to node 0, or comes no more; and rests. */
+void host_world_knock(struct host_world *world, bool comes);
+void host_world_rest(struct host_world *world, uint64_t rest_us);
+
+/* A wire that was never there.  Before the world begins. */
+void host_world_leave_out(struct host_world *world, unsigned wire);
 
 /* Faults; those that last are taken back as often as they were made. */
 void host_world_cut(struct host_world *world, unsigned wire, bool cut);

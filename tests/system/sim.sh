@@ -24,7 +24,7 @@ fi
 # struck KIND: in how many seeds.
 struck() { awk -v kind="$1" '$1 == kind { print $3 }' "$said" | tail -n 1; }
 for kind in loss flip delete insert repeat burst stall one-way cut partition \
-    pause crash slow-host tiny dead-wire dead-node; do
+    pause crash slow-host tiny dead-wire dead-node missing-wire second-host; do
     check "sim/strikes $kind" "it struck in no seed" \
         [ "$(struck $kind)" -gt 0 ]
 done
