@@ -8,6 +8,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "progress.h"
+
 /* Ends with the reason in `report`, which a program that begins closes. */
 static _Noreturn void become(const struct host_child *child, pid_t host,
                              int report)
@@ -24,8 +26,8 @@ static _Noreturn void become(const struct host_child *child, pid_t host,
     _exit(127);
 }
 
-int host_child_start(pid_t *pid, const struct host_child *child,
-                     struct host_error *error)
+int host_child_start(struct host_process *process,
+                     const struct host_child *child, struct host_error *error)
 {
     int report[2], reason = 0;
     if (pipe2(report, O_CLOEXEC) != 0) {
@@ -43,8 +45,11 @@ int host_child_start(pid_t *pid, const struct host_child *child,
         return host_fail(error, HOST_CUBE, "node %u: %s; %s", child->node,
                          strerror(reason), child->otherwise);
     }
-    *pid = started;
-    ssize_t got = read(report[0], &reason, sizeof reason);
+    process->pid = started;
+    ssize_t got;
+    do {
+        got = read(report[0], &reason, sizeof reason);
+    } while (got < 0 && errno == EINTR);
     close(report[0]);
     if (got == (ssize_t)sizeof reason) {
         return host_fail(error, HOST_CUBE,
@@ -52,4 +57,75 @@ int host_child_start(pid_t *pid, const struct host_child *child,
                          child->node, child->path, strerror(reason));
     }
     return 0;
+}
+
+/* --- its end -------------------------------------------------------------- */
+
+static bool reap(struct host_process *process, int flags)
+{
+    int status;
+    if (process->pid == 0 ||
+        waitpid(process->pid, &status, flags) != process->pid) {
+        return false;
+    }
+    process->pid = 0;
+    process->status = status;
+    return true;
+}
+
+bool host_child_died(struct host_process *process)
+{
+    return reap(process, WNOHANG);
+}
+
+bool host_child_kill(const struct host_process *process)
+{
+    return process->pid != 0 && kill(process->pid, SIGKILL) == 0;
+}
+
+void host_child_wait(struct host_process *process)
+{
+    (void)reap(process, 0);
+}
+
+static int describe(const struct host_process *process, unsigned node,
+                    unsigned link, struct host_error *error)
+{
+    int status = process->status;
+    if (WIFSIGNALED(status)) {
+        int number = WTERMSIG(status);
+        return host_fail(
+            error, HOST_CUBE,
+            "node %u link %u: ended %u times, the last by signal %d (%s)%s; "
+            "run again, and look for what stopped it",
+            node, link, process->deaths, number, strsignal(number),
+            number == SIGILL    ? ", an invariant failed"
+            : number == SIGSEGV ? ", perhaps out of its memory"
+                                : "");
+    }
+    return host_fail(error, HOST_CUBE,
+                     "node %u link %u: ended %u times, the last with status "
+                     "%d; see what it printed, and run again",
+                     node, link, process->deaths, WEXITSTATUS(status));
+}
+
+/* What kills from without may stop; a node that ends by itself would do so
+ * again. */
+int host_child_check(struct host_process *process, unsigned node, unsigned link,
+                     struct host_error *error)
+{
+    uint64_t now = host_now_us();
+    int status = process->status;
+    bool killed = WIFSIGNALED(status) &&
+                  (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM);
+    if (now - process->deaths_us > HOST_DEATHS_US) {
+        process->deaths = process->faults;
+        process->deaths_us = now;
+    }
+    process->deaths++;
+    process->faults += !killed;
+    return process->faults < HOST_FAULTS_MAX &&
+                   process->deaths < HOST_DEATHS_MAX
+               ? 0
+               : describe(process, node, link, error);
 }

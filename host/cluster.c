@@ -3,17 +3,14 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
-#include "child.h"
 #include "parallel.h"
 #include "progress.h"
 
@@ -115,10 +112,7 @@ static int start_node(struct host_cluster *c, unsigned node,
     const struct host_child child = {
         node, c->path, "ask for fewer with --nodes", become_node, c};
     c->epoch++;
-    c->process[node].pid = 0;
-    int status = host_child_start(&c->process[node].pid, &child, error);
-    c->process[node].ended = c->process[node].pid == 0;
-    return status;
+    return host_child_start(&c->process[node], &child, error);
 }
 
 /* The host's end of its wire.  A terminal is opened by its name as a real port
@@ -163,9 +157,6 @@ int host_cluster_start(struct host_cluster *cluster,
     /* Not where others wait for the processor. */
     cluster->watch_us = options->nodes < host_threads() ? WATCH_US : 0;
     cluster->epoch = first_epoch();
-    for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
-        cluster->process[i].ended = true;
-    }
     while (1u << cluster->dimension < options->nodes) {
         cluster->dimension++;
     }
@@ -188,69 +179,16 @@ int host_cluster_start(struct host_cluster *cluster,
     return status;
 }
 
-static void reap(struct host_process *process, int flags)
-{
-    int status;
-    if (!process->ended &&
-        waitpid(process->pid, &status, flags) == process->pid) {
-        process->ended = true;
-        process->status = status;
-    }
-}
-
-static int describe(const struct host_cluster *cluster, unsigned node,
-                    struct host_error *error)
-{
-    const struct host_process *process = &cluster->process[node];
-    int status = process->status;
-    unsigned link = host_link_to(node, 0, cluster->dimension);
-    if (WIFSIGNALED(status)) {
-        int number = WTERMSIG(status);
-        return host_fail(
-            error, HOST_CUBE,
-            "node %u link %u: ended %u times, the last by signal %d (%s)%s; "
-            "run again, and look for what stopped it",
-            node, link, process->deaths, number, strsignal(number),
-            number == SIGILL    ? ", an invariant failed"
-            : number == SIGSEGV ? ", perhaps out of its memory"
-                                : "");
-    }
-    return host_fail(error, HOST_CUBE,
-                     "node %u link %u: ended %u times, the last with status "
-                     "%d; see what it printed, and run again",
-                     node, link, process->deaths, WEXITSTATUS(status));
-}
-
-/* Whether a node has died too often to be started again.  What kills from
- * without may stop; a node that ends by itself would do so again. */
-static bool hopeless(struct host_process *process)
-{
-    uint64_t now = host_now_us();
-    bool killed =
-        WIFSIGNALED(process->status) && (WTERMSIG(process->status) == SIGKILL ||
-                                         WTERMSIG(process->status) == SIGTERM);
-    if (now - process->deaths_us > HOST_DEATHS_US) {
-        process->deaths = process->faults;
-        process->deaths_us = now;
-    }
-    process->deaths++;
-    process->faults += !killed;
-    return process->faults >= HOST_FAULTS_MAX ||
-           process->deaths >= HOST_DEATHS_MAX;
-}
-
 int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
 {
     for (unsigned i = 0; i < cluster->nodes; i++) {
         struct host_process *process = &cluster->process[i];
-        reap(process, WNOHANG);
-        if (!process->ended) {
+        unsigned link = host_link_to(i, 0, cluster->dimension);
+        if (!host_child_died(process)) {
             continue;
         }
-        if (hopeless(process)) {
-            return describe(cluster, i, error);
-        }
-        if (start_node(cluster, i, error) != 0) {
+        if (host_child_check(process, i, link, error) != 0 ||
+            start_node(cluster, i, error) != 0) {
             return error->code;
         }
         cluster->restarts++;
@@ -263,8 +201,8 @@ bool host_cluster_ended(struct host_cluster *cluster)
     bool ended = true;
     host_wires_close_nodes(&cluster->wires); /* so that an end is heard */
     for (unsigned i = 0; i < cluster->nodes; i++) {
-        reap(&cluster->process[i], WNOHANG);
-        ended &= cluster->process[i].ended;
+        (void)host_child_died(&cluster->process[i]);
+        ended &= cluster->process[i].pid == 0;
     }
     return ended;
 }
@@ -272,12 +210,10 @@ bool host_cluster_ended(struct host_cluster *cluster)
 void host_cluster_stop(struct host_cluster *cluster)
 {
     for (unsigned i = 0; i < cluster->nodes; i++) {
-        if (!cluster->process[i].ended) {
-            kill(cluster->process[i].pid, SIGKILL);
-        }
+        (void)host_child_kill(&cluster->process[i]);
     }
     for (unsigned i = 0; i < cluster->nodes; i++) {
-        reap(&cluster->process[i], 0);
+        host_child_wait(&cluster->process[i]);
     }
     host_wires_close(&cluster->wires);
     host_port_close(&cluster->port);
@@ -311,11 +247,8 @@ static unsigned machine_restarts(void *context)
 /* As it ends, host_cluster_check finds it. */
 static bool machine_kill(void *context, unsigned node)
 {
-    struct host_cluster *cluster = context;
-    struct host_process *process = &cluster->process[node];
-    if (!process->ended) {
-        kill(process->pid, SIGKILL);
-    }
+    const struct host_cluster *cluster = context;
+    (void)host_child_kill(&cluster->process[node]);
     return true;
 }
 

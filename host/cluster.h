@@ -3,7 +3,7 @@
  * the kernel, all gone when the host goes.  One that dies is started again, on
  * the same wires; one that dies too often is an error.
  *
- * Memory: 32 bytes a node; both ends of every wire, for nodes that start again.
+ * Memory: 24 bytes a node; both ends of every wire, for nodes that start again.
  * Work: a fork and an exec a start of a node.
  *
  *     host_cluster_start(&cluster, &options, &error);
@@ -18,6 +18,7 @@
 #include <stdint.h>
 #include <sys/types.h>
 
+#include "child.h"
 #include "error.h"
 #include "machine.h"
 #include "port.h"
@@ -26,10 +27,7 @@
 enum {
     HOST_MEMORY_MIN = 256 * 1024,  /* bytes a node */
     HOST_STATIC_BYTES = 16 * 1024, /* .data and .bss of incode-node, at most */
-    HOST_STACK_BYTES = 64 * 1024,  /* of a node's memory */
-    HOST_FAULTS_MAX = 3,
-    HOST_DEATHS_MAX = 10,
-    HOST_DEATHS_US = 10000000
+    HOST_STACK_BYTES = 64 * 1024   /* of a node's memory */
 };
 
 struct host_cluster_options {
@@ -39,15 +37,6 @@ struct host_cluster_options {
     uint64_t unplug_us;  /* for tests: see port.h */
     unsigned window;     /* frames a link and direction; 0: node's choice */
     const char *program; /* NULL: incode-node beside this executable */
-};
-
-struct host_process {
-    pid_t pid;
-    bool ended;
-    int status;         /* as waitpid gives it, once ended */
-    unsigned faults;    /* times that it ended without being killed */
-    unsigned deaths;    /* times that it ended since... */
-    uint64_t deaths_us; /* ...this time */
 };
 
 struct host_cluster {
@@ -77,8 +66,7 @@ int host_cluster_start(struct host_cluster *cluster,
 struct host_machine host_cluster_machine(struct host_cluster *cluster);
 
 /* Starts nodes again that have died.  0, or HOST_CUBE for one that does so too
- * often: HOST_FAULTS_MAX times by itself, or HOST_DEATHS_MAX times within
- * HOST_DEATHS_US however it came. */
+ * often: child.h. */
 int host_cluster_check(struct host_cluster *cluster, struct host_error *error);
 
 /* Whether every node has ended, however it did.  From here on none is started

@@ -1,16 +1,13 @@
 #include "remote.h"
 
 #include <errno.h>
-#include <signal.h>
 #include <sodium.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/random.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "../transport/drivers/secure_sodium.h"
-#include "child.h"
 #include "cluster.h"
 #include "progress.h"
 #include "run.h"
@@ -35,7 +32,7 @@ static int start_node(struct host_remote *r, unsigned node,
     const struct host_child child = {node, r->program,
                                      "start it yourself and take it from start",
                                      become_node, r};
-    return host_child_start(&r->process[node].pid, &child, error);
+    return host_child_start(&r->process[node], &child, error);
 }
 
 static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
@@ -95,13 +92,9 @@ int host_remote_start(struct host_remote *remote,
 
 void host_remote_stop(struct host_remote *remote)
 {
-    remote->ending = true;
     for (unsigned i = 0; i < remote->file->nodes; i++) {
-        if (remote->process[i].pid > 0) {
-            kill(remote->process[i].pid, SIGKILL);
-            (void)waitpid(remote->process[i].pid, NULL, 0);
-            remote->process[i].pid = 0;
-        }
+        (void)host_child_kill(&remote->process[i]);
+        host_child_wait(&remote->process[i]);
     }
     while (remote->ports > 0) {
         host_port_close(&remote->port[--remote->ports]);
@@ -122,38 +115,19 @@ static void machine_idle(void *context, uint64_t wait_us)
     host_port_idle(r->port, r->ports, wait_us, 0);
 }
 
-/* A node that says why it cannot start would do so again. */
-static int restart(struct host_remote *r, unsigned node, int status,
-                   struct host_error *error)
-{
-    unsigned link = host_link_to(node, 0, r->file->dimension);
-    r->process[node].pid = 0;
-    if (WIFEXITED(status) && WEXITSTATUS(status) != 0) {
-        return host_fail(error, HOST_CUBE,
-                         "node %u link %u: ended with status %d; see what it "
-                         "printed, and run again",
-                         node, link, WEXITSTATUS(status));
-    }
-    if (++r->process[node].deaths > HOST_REMOTE_DEATHS_MAX) {
-        return host_fail(error, HOST_CUBE,
-                         "node %u link %u: ended %u times; look for what ends "
-                         "it, and run again",
-                         node, link, r->process[node].deaths);
-    }
-    r->restarts++;
-    return start_node(r, node, error);
-}
-
 static int machine_check(void *context, struct host_error *error)
 {
     struct host_remote *r = context;
     for (unsigned i = 0; i < r->file->nodes; i++) {
-        int status;
-        pid_t pid = r->process[i].pid;
-        if (pid > 0 && waitpid(pid, &status, WNOHANG) == pid &&
-            restart(r, i, status, error) != 0) {
+        unsigned link = host_link_to(i, 0, r->file->dimension);
+        if (!host_child_died(&r->process[i])) {
+            continue;
+        }
+        if (host_child_check(&r->process[i], i, link, error) != 0 ||
+            start_node(r, i, error) != 0) {
             return error->code;
         }
+        r->restarts++;
     }
     return 0;
 }
@@ -165,9 +139,8 @@ static unsigned machine_restarts(void *context)
 
 static bool machine_kill(void *context, unsigned node)
 {
-    struct host_remote *r = context;
-    pid_t pid = r->process[node].pid;
-    return pid > 0 && kill(pid, SIGKILL) == 0;
+    const struct host_remote *r = context;
+    return host_child_kill(&r->process[node]);
 }
 
 static void machine_rest(void *context, uint64_t rest_us)

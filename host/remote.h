@@ -2,7 +2,7 @@
  * under `start` the host starts on this machine, and again when they die; the
  * others are there already, or come.
  *
- * Memory: two ports, and 16 bytes a node.  Work: a fork and an exec for each
+ * Memory: two ports, and 24 bytes a node.  Work: a fork and an exec for each
  * node that the host starts.
  *
  *     host_remote_prepare(&options, &error); host_run(&options, ..);
@@ -16,27 +16,19 @@
 #ifndef HOST_REMOTE_H
 #define HOST_REMOTE_H
 
-#include <sys/types.h>
-
+#include "child.h"
 #include "cube_file.h"
 #include "port.h"
 
-enum {
-    HOST_REMOTE_DEATHS_MAX = 20, /* of one node, then the run ends */
-    HOST_ABSENT_MIN_S = 3
-};
+enum { HOST_ABSENT_MIN_S = 3 };
 
 struct host_remote {
     const struct host_cube_file *file;
     const char *program;
     unsigned ports;
     struct host_port port[HOST_PORTS_MAX];
-    struct {
-        pid_t pid; /* 0: not running, or not here */
-        unsigned deaths;
-    } process[HOST_NODES_MAX];
+    struct host_process process[HOST_NODES_MAX]; /* of those started here */
     unsigned restarts;
-    bool ending;
 };
 
 struct host_run_options;

@@ -146,6 +146,16 @@ printf '#!/bin/sh\nexec sleep 60\n' > "$scratch/mute"
 chmod +x "$scratch/dies" "$scratch/mute"
 hopeless 'a node program that a signal ends' "$scratch/dies"
 hopeless 'a node program that says nothing' "$scratch/mute"
+cat > "$scratch/one.cube" <<-END
+	dimension = 0;
+	start = [0];
+	links = ( { node = 0; to = "host";
+	            tcp = "127.0.0.1:$((10000 + RANDOM % 20000))"; } );
+END
+refuses 'survival/a node of a cube file that a signal ends' 4 \
+    '^incode: node 0 link 0: ended 3 times, the last by signal 11 ' \
+    "$INCODE" run "$points" -q --cube "$scratch/one.cube" \
+    --node-program "$scratch/dies" -o "$scratch/left/out.npy"
 
 # A node that is killed whenever it comes up; the host reads slowly, so that the
 # run does not end before.
