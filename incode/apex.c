@@ -130,6 +130,16 @@ void incode_count_candidates(struct incode_triangulator *t, uint64_t looked)
     t->stats.candidates_histogram[half < last ? half : last]++;
 }
 
+/* Where many points were in doubt, the sphere found helps the next search. */
+void incode_search_learn(struct incode_triangulator *t,
+                         const struct incode_query *q)
+{
+    const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
+    if (q->best != INCODE_NONE && q->shrinking &&
+        q->doubts >= INCODE_QUERY_CROWD)
+        incode_empties_add(&t->empties, p, q->scale);
+}
+
 enum incode_outcome incode_search_run(struct incode_triangulator *t,
                                       struct incode_search *s)
 {
@@ -310,27 +320,35 @@ void incode_make_sphere(struct incode_make *n)
     n->bare = false;
 }
 
-/* The best of those in doubt, in twice the precision if that can tell. */
+/* The best of those in doubt, in twice the precision if that can tell: the
+ * first of some meets the next of them. */
 static bool rank_first(struct incode_make *n, const uint16_t *first,
                        uint32_t count)
 {
     const struct incode_gather *g = &n->t->gather;
     struct incode_finals finals = {.count = 0};
     uint16_t index[INCODE_FINALISTS];
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0; i <= count; i++) {
         double p[3];
-        if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
-            continue;
-        copy_point(p, g, first[i]);
-        index[finals.count % INCODE_FINALISTS] = first[i];
-        if (!incode_finals_add(&finals, p))
+        if (i < count) {
+            if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
+                continue;
+            copy_point(p, g, first[i]);
+            index[finals.count] = first[i];
+            (void)incode_finals_add(&finals, p);
+            if (finals.count < INCODE_FINALISTS)
+                continue;
+        }
+        uint32_t k = incode_finals_first(&finals, n->pv, n->pb, n->pc, g->scale,
+                                         &n->t->stats.tally);
+        if (k == INCODE_FINALS_NONE)
             return false;
+        index[0] = index[k];
+        copy_point(p, g, index[0]);
+        finals.count = 0;
+        (void)incode_finals_add(&finals, p);
     }
-    uint32_t i = incode_finals_first(&finals, n->pv, n->pb, n->pc, g->scale,
-                                     &n->t->stats.tally);
-    if (i == INCODE_FINALS_NONE)
-        return false;
-    n->best = index[i];
+    n->best = index[0];
     return true;
 }
 
@@ -423,6 +441,7 @@ void incode_search_from(struct incode_make *n, struct incode_search *s)
     memcpy(q->rb, n->rb, sizeof q->rb);
     memcpy(q->rc, n->rc, sizeof q->rc);
     q->best = INCODE_NONE;
+    q->empties = &n->t->empties;
     s->radius = g->radius > DBL_MIN ? g->radius : DBL_MIN;
     s->looked = g->near;
     s->final = false;
@@ -583,6 +602,7 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
             incode_query_support(&s->query, n.pv, n.sphere.n, g->scale);
         return INCODE_NEAR_SEARCH;
     }
+    incode_search_learn(t, &s->query);
     *apex = incode_gather_find(g, s->query.best);
     if (*apex == INCODE_GATHER_NONE)
         *apex = incode_gather_append(g, s->query.best, s->query.best_p);

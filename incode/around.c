@@ -135,6 +135,7 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     q->scale = g->scale;
     q->best = INCODE_NONE;
     q->boxed = q->round = q->timid = q->done = q->shrinking = false;
+    q->ceiling.set = false;
     q->pages_max = 0;
     memcpy(q->sphere.n, n->sphere.n, sizeof q->sphere.n);
     memcpy(q->sphere.pn, n->sphere.pn, sizeof q->sphere.pn);

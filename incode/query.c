@@ -104,16 +104,37 @@ void incode_query_shrink(struct incode_query *q)
     bound_sphere(q);
 }
 
+/* Where many points are in doubt. */
+static void raise_ceiling(struct incode_query *q)
+{
+    if (q->best == INCODE_NONE)
+        return;
+    const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
+    if (q->empties != NULL)
+        incode_ceiling_set(&q->ceiling, q->empties, p, q->scale, q->sphere.n);
+}
+
+void incode_query_doubt(struct incode_query *q, uint32_t points)
+{
+    bool few = q->doubts < INCODE_QUERY_CROWD;
+    q->doubts += points;
+    if (few && q->doubts >= INCODE_QUERY_CROWD)
+        raise_ceiling(q);
+}
+
 void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
 {
     double half = 0.5 / q->sphere.det;
     q->best = id;
     q->flat.spread = 0;
+    q->ceiling.set = false;
     memcpy(q->best_p, p, sizeof q->best_p);
     for (int d = 0; d < 3; d++)
         q->peak[d] = q->sphere.m[d] * half;
     if (q->shrinking)
         bound_sphere(q);
+    if (q->doubts >= INCODE_QUERY_CROWD)
+        raise_ceiling(q);
 }
 
 enum { CONTESTS = 8 }; /* by the predicates, before twice the precision */
@@ -256,6 +277,23 @@ INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
     return ~(square > incode_vd_all(q->limit));
 }
 
+/* Not certainly above the ceiling. */
+INCODE_INLINE incode_vl below_ceiling(const struct incode_query *q,
+                                      const struct boxes *boxes, unsigned i)
+{
+    const struct incode_ceiling *c = &q->ceiling;
+    incode_vd least = incode_vd_all(0), far = least;
+    for (int d = 0; d < 3; d++) {
+        incode_vd v = incode_vd_all(q->pv[d]), g = incode_vd_all(c->g[d]);
+        incode_vd scale = incode_vd_all(q->scale);
+        incode_vd lo = (incode_vd_load(boxes->lo[d] + i) - v) * scale;
+        incode_vd hi = (incode_vd_load(boxes->hi[d] + i) - v) * scale;
+        least += incode_vd_min(g * lo, g * hi);
+        far += incode_vd_max(incode_vd_abs(lo), incode_vd_abs(hi));
+    }
+    return ~(least - far * incode_vd_all(c->slack) > incode_vd_all(c->level));
+}
+
 /* May reach higher than the support so far. */
 INCODE_INLINE incode_vl may_rise(const struct incode_query *q,
                                  const struct boxes *boxes, unsigned i)
@@ -293,6 +331,8 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
                 in &= meets_ball(q, boxes, i);
             if (!q->round || q->large)
                 in &= may_hold_apex(q, boxes, i);
+            if (q->ceiling.set)
+                in &= below_ceiling(q, boxes, i);
         } else if (q->question == INCODE_QUERY_SUPPORT)
             in &= may_rise(q, boxes, i);
         else if (q->question != INCODE_QUERY_BOX)

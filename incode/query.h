@@ -14,6 +14,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "empty.h"
 #include "pager.h"
 #include "predicates.h"
 #include "sphere.h"
@@ -49,6 +50,8 @@ struct incode_query {
     double rb[3], rc[3];         /* b and c, relative */
     struct incode_sphere sphere; /* SUPPORT: its plane's normal alone */
     struct incode_flat flat; /* APEX: bounds the box of a best without a ball */
+    const struct incode_empties *empties; /* APEX, or NULL */
+    struct incode_ceiling ceiling;        /* by these, of the best */
     struct incode_support support; /* SUPPORT: what holds all points so far */
     double peak[3];     /* centre of the sphere, where its value peaks */
     double centre[3];   /* of the ball */
@@ -56,7 +59,8 @@ struct incode_query {
     double plane_slack; /* of n . p within the ball */
     double t; /* where in a pencil the ball is, of the first candidate so far */
     double limit;      /* NEAREST, CIRCLE: squared, relative */
-    uint32_t contests; /* APEX: points in doubt so far */
+    uint32_t contests; /* APEX: points in doubt that were compared so far */
+    uint32_t doubts;   /* APEX: points that doubles did not rule out so far */
     uint32_t best;     /* vertex number, or INCODE_NONE */
     double best_p[3];
     uint32_t pages, pages_max; /* needed so far; a walk stops at more than that,
@@ -127,6 +131,12 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3]);
 
 /* From now on only what meets the sphere of the best so far matters. */
 void incode_query_shrink(struct incode_query *q);
+
+enum { INCODE_QUERY_CROWD = 256 }; /* so many points in doubt are many */
+
+/* Counts points in doubt; where they are many, a ceiling may rule out others.
+ */
+void incode_query_doubt(struct incode_query *q, uint32_t points);
 
 /* A candidate for the apex: takes it if it is strictly on the unknown side and
  * inside the sphere of the best so far.  Exact. */

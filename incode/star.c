@@ -368,6 +368,7 @@ static enum incode_outcome use_found(struct incode_triangulator *t,
     task->kind = INCODE_TASK_GATHER;
     if (q->question == INCODE_QUERY_SUPPORT)
         return INCODE_OK; /* the face is tried again with it */
+    incode_search_learn(t, q);
     bool open = remove_face(star, q->b, q->c);
     if (!open && star->more) {
         /* It may be among those that did not fit at hand. */

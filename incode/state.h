@@ -129,6 +129,7 @@ struct incode_triangulator {
     uint32_t plane_count, plane_next;
     struct incode_support supports[INCODE_SUPPORTS];
     uint32_t support_count, support_next;
+    struct incode_empties empties;
     struct incode_star star;
     struct incode_vicinity vicinity;
     struct incode_gather gather;
@@ -207,6 +208,9 @@ void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,
  * INCODE_WAIT for query.missing. */
 enum incode_outcome incode_search_run(struct incode_triangulator *t,
                                       struct incode_search *s);
+/* Learns from the search of the apex of an open face that is over. */
+void incode_search_learn(struct incode_triangulator *t,
+                         const struct incode_query *q);
 enum incode_near {
     INCODE_NEAR_FOUND, /* *apex is certain */
     INCODE_NEAR_HULL,  /* no point lies beyond the face */

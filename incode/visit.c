@@ -55,6 +55,19 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     return ~incode_vd_mask(out) & INCODE_VD_ALL;
 }
 
+/* Points that are certainly above the ceiling. */
+INCODE_INLINE uint32_t above_lanes(const struct incode_query *q,
+                                   const struct lane_points *p)
+{
+    incode_vd value = incode_vd_all(0), far = value;
+    for (int d = 0; d < 3; d++) {
+        value += incode_vd_all(q->ceiling.g[d]) * p->r[d];
+        far += incode_vd_abs(p->r[d]);
+    }
+    return incode_vd_mask(value - far * incode_vd_all(q->ceiling.slack) >
+                          incode_vd_all(q->ceiling.level));
+}
+
 /* Points that lie in the ball and not certainly on the known side of the plane:
  * a coarser test, and a cheaper one. */
 INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
@@ -198,7 +211,7 @@ static bool is_done(const struct incode_query *q, const double p[3])
 }
 
 /* The points of a leaf that an APEX query must consider, one bit each. */
-static uint32_t apex_leaf(const struct incode_query *q,
+static uint32_t apex_leaf(struct incode_query *q,
                           const struct incode_frame *frame, unsigned first,
                           uint32_t lanes)
 {
@@ -211,8 +224,12 @@ static uint32_t apex_leaf(const struct incode_query *q,
             here &= ball_lanes(q, &points);
         if (here != 0)
             here &= apex_lanes(q, &points);
+        if (here != 0 && q->ceiling.set)
+            here &= ~above_lanes(q, &points);
         in |= here << i;
     }
+    if (in != 0)
+        incode_query_doubt(q, (uint32_t)__builtin_popcount(in));
     if ((in & (in - 1)) == 0 || q->flat.spread == 0)
         return in;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES)
@@ -372,5 +389,5 @@ bool incode_visit_pencil(struct incode_walker *walker, struct incode_query *q,
         if (id != q->v && id != q->b && id != q->c && id != q->best)
             incode_hit_add(q, hits, id, p);
     }
-    return true;
+    return q->boxed || !hits->full;
 }

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "../../incode/empty.h"
 #include "../../incode/finals.h"
 #include "../../incode/gather.h"
 #include "../../incode/predicates.h"
@@ -350,12 +351,91 @@ static void finals_of_a_rough_lattice(void **unused)
     assert_true(alone > 1000 && certain > 20000);
 }
 
+/* A tetrahedron of n points on a facet of their hull: its sphere is empty. */
+static void draw_empty(const double *t[4], double (*p)[3], size_t n,
+                       struct incode_tally *tally)
+{
+    const double *others[64];
+    size_t count;
+    do {
+        for (int i = 0; i < 3; i++) {
+            t[i] = p[below(n)];
+        }
+        count = 0;
+        for (size_t i = 0; i < n; i++) {
+            if (t[0] != t[1] && t[0] != t[2] && t[1] != t[2] &&
+                incode_orient3d(tally, t[0], t[1], t[2], p[i]) > 0) {
+                others[count++] = p[i];
+            }
+        }
+    } while (count < n - 3);
+    t[3] = first_of(t, others, count, tally);
+}
+
+/* Points on a sphere up to rounding: what a ceiling rules out is outside. */
+static void ceilings_on_a_rough_sphere(void **unused)
+{
+    enum { POINTS = 24 };
+    static double p[POINTS][3];
+    struct incode_tally tally = {0};
+    size_t set = 0, out = 0;
+    (void)unused;
+    for (int k = 0; k < 300; k++) {
+        struct incode_empties empties = {.count = 0};
+        double size = ldexp(1, (int)below(40) - 20), scale = 1 / size;
+        double at = k % 3 == 0 ? 0 : size * ldexp(1, (int)below(6));
+        for (size_t i = 0; i < POINTS; i++) {
+            double length = 0;
+            for (int d = 0; d < 3; d++) {
+                p[i][d] = draw() + draw() + draw() - 1.5;
+                length += p[i][d] * p[i][d];
+            }
+            for (int d = 0; d < 3; d++) {
+                p[i][d] = at + size * p[i][d] / sqrt(length);
+            }
+        }
+        const double *t[4], *f[4];
+        for (int i = 0; i < 3; i++) {
+            draw_empty(t, p, POINTS, &tally);
+            incode_empties_add(&empties, t, scale);
+        }
+        for (int m = 0; m < 20; m++) {
+            if (!draw_face(f, p, POINTS, POINTS - 1, &tally)) {
+                continue;
+            }
+            struct incode_ceiling c;
+            double b[3], d[3], n[3], r[3];
+            for (int i = 0; i < 3; i++) {
+                b[i] = (f[1][i] - f[0][i]) * scale;
+                d[i] = (f[2][i] - f[0][i]) * scale;
+            }
+            incode_cross(n, b, d);
+            incode_ceiling_set(&c, &empties, f, scale, n);
+            set += c.set;
+            for (size_t i = 0; i < POINTS && c.set; i++) {
+                double far = 0;
+                for (int j = 0; j < 3; j++) {
+                    r[j] = (p[i][j] - f[0][j]) * scale;
+                    far += fabs(r[j]);
+                }
+                if (incode_dot(c.g, r) - far * c.slack > c.level) {
+                    out++;
+                    assert_true(incode_in_sphere(&tally, f[0], f[1], f[2], f[3],
+                                                 p[i]) < 0);
+                }
+            }
+        }
+    }
+    assert_true(set > 500 && out > 2000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ball_on_a_rough_plane),
         cmocka_unit_test(spheres_of_rough_squares),
         cmocka_unit_test(finals_of_a_rough_lattice),
+        cmocka_unit_test(ceilings_on_a_rough_sphere),
         cmocka_unit_test(places_in_a_pencil),
         cmocka_unit_test(first_of_the_gathered),
     };

@@ -255,6 +255,20 @@ static void rough_sides(void **unused)
     host_points_free(&points);
 }
 
+/* Points on a sphere up to rounding: not every search that goes through the
+ * sphere may look at every point. */
+static void rough_sphere(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    made("sphere", 6000, &points);
+    struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 4 << 20};
+    solo_run(&s, points.xyz, points.count);
+    assert_in_range(s.far_calls, 1, 1000);
+    solo_close(&s);
+    host_points_free(&points);
+}
+
 /* A front at one vertex that is far longer than what is kept at hand. */
 static void hub(void **unused)
 {
@@ -424,17 +438,12 @@ static void refusals(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(degenerate_sets),
-        cmocka_unit_test(scaled_sets),
-        cmocka_unit_test(both_ends),
-        cmocka_unit_test(mixed_scales),
-        cmocka_unit_test(made_sets),
-        cmocka_unit_test(rough_sides),
-        cmocka_unit_test(hub),
-        cmocka_unit_test(real_sets),
-        cmocka_unit_test(smallest_memory),
-        cmocka_unit_test(too_little_memory),
-        cmocka_unit_test(refusals),
+        cmocka_unit_test(degenerate_sets),   cmocka_unit_test(scaled_sets),
+        cmocka_unit_test(both_ends),         cmocka_unit_test(mixed_scales),
+        cmocka_unit_test(made_sets),         cmocka_unit_test(rough_sides),
+        cmocka_unit_test(rough_sphere),      cmocka_unit_test(hub),
+        cmocka_unit_test(real_sets),         cmocka_unit_test(smallest_memory),
+        cmocka_unit_test(too_little_memory), cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
