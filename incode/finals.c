@@ -128,7 +128,7 @@ uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
                              struct incode_tally *tally)
 {
     struct face face;
-    struct places at;
+    struct places at = {{0}, {0}, {0}};
     uint32_t best = INCODE_FINALS_NONE;
     if (f->count == 0 || !set_face(&face, v, b, c, scale))
         return best;

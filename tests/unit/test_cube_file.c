@@ -45,7 +45,7 @@ static const char *const good =
     "dimension = 1; memory = \"512K\"; key = \"lab.key\"; start = [1];\n"
     "links = (\n"
     "  { node = 0; to = \"host\"; tcp = \"10.0.0.1:7000\"; },\n"
-    "  { node = 1; to = \"host\"; tcp = \"localhost:7001\"; },\n"
+    "  { node = 1; to = \"host\"; tcp = \"127.0.0.1:7001\"; },\n"
     "  { node = 1; to = 0; serial = [\"/dev/ttyS1\", \"/dev/ttyUSB0\"];\n"
     "    baud = 921600; rtscts = true; }\n"
     ");\n";
@@ -123,7 +123,7 @@ static void mistakes_are_named(void **unused)
          ":5: ", "two devices", 3},
         {"tcp = \"10.0.0.1:7000\"", "tcp = \"10.0.0.1\"", ":3: ", "port", 3},
         {"tcp = \"10.0.0.1:7000\";", "", ":3: ", "neither or both", 3},
-        {"localhost:7001", "no.such.host.invalid:7001",
+        {"127.0.0.1:7001", "no.such.host.invalid:7001",
          ":4: ", "no.such.host.invalid", 4},
     };
     static struct host_cube_file file;

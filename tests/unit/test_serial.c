@@ -158,7 +158,11 @@ static void ports_that_are_not_there(void **unused)
         struct serial_port_settings settings = {.baud = 115200};
         snprintf(settings.name, sizeof settings.name, "%s", names[i]);
         assert_int_equal(serial_port_open(&port, &settings), -1);
-        assert_true(strstr(port.fault, "plugged") != NULL);
+        /* Without /sys there is no list of ports to look a number up in. */
+        const char *what = i < 2 && access("/sys/class/tty", F_OK) != 0
+                               ? "is /sys mounted?"
+                               : "plugged";
+        assert_non_null(strstr(port.fault, what));
         serial_port_close(&port);
     }
 }
