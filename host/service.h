@@ -124,7 +124,8 @@ struct host_service {
     unsigned call_turn;   /* to be called next */
     uint64_t call_us, check_us, began_us, wire_down_us;
     uint64_t in_use_us; /* since when another host has the nodes; 0: none */
-    uint32_t in_use;    /* times that they said so */
+    uint64_t in_use_told_us; /* and when they said so last */
+    uint32_t in_use;         /* times that they said so */
 };
 
 /* Brings up the cube on the machine's wire, and waits until every node has

@@ -15,7 +15,9 @@ enum {
     PROBE_US = 3000000,
     WIRE_DOWN_US_MAX = 8000000,
     BRING_UP_US_MAX = 9000000,
-    IN_USE_US_MAX = 5000000, /* longer than a link keeps to a silent host */
+    IN_USE_US_MAX = 5000000,  /* longer than a link keeps to a silent host, */
+    IN_USE_US_LAST = 9000000, /* whether it was told so again or not */
+    IN_USE_TOLD_US = 2000000, /* it is told so more often as long as it is so */
     IN_USE_REST_US = 1000000
 };
 
@@ -268,11 +270,24 @@ static bool in_use(struct host_service *s, uint64_t now_us)
     if (s->in_use_us == 0) {
         s->in_use_us = now_us;
     }
-    if (s->machine->rest != NULL && s->in_use != peer->in_use) {
-        s->machine->rest(s->machine->context, IN_USE_REST_US);
+    if (s->in_use != peer->in_use) {
+        s->in_use_told_us = now_us;
+        if (s->machine->rest != NULL) {
+            s->machine->rest(s->machine->context, IN_USE_REST_US);
+        }
     }
     s->in_use = peer->in_use;
     return true;
+}
+
+/* Whether the other host goes on.  If not, its node says so no more, and lets
+ * this one in a moment later. */
+static bool stays_in_use(const struct host_service *s, uint64_t now_us)
+{
+    uint64_t passed = now_us - s->in_use_us;
+    return passed > IN_USE_US_LAST ||
+           (passed > IN_USE_US_MAX &&
+            now_us - s->in_use_told_us <= IN_USE_TOLD_US);
 }
 
 static int check_wire(struct host_service *s, uint64_t now_us,
@@ -282,7 +297,7 @@ static int check_wire(struct host_service *s, uint64_t now_us,
     enum link_state state = cube_link_state(s->cube, wire);
     uint16_t gate = cube_wiring(s->cube)->gate;
     if (in_use(s, now_us)) {
-        return now_us - s->in_use_us <= IN_USE_US_MAX
+        return !stays_in_use(s, now_us)
                    ? 0
                    : host_fail(error, HOST_CUBE,
                                "node %u link %u: the cube is in use by another "

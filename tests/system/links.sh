@@ -205,6 +205,12 @@ END
     check 'links/the first host goes on' \
         "exit $status: $(last "$scratch/one.errors")" \
         cmp -s "$first" "$scratch/one.npy"
+    "$INCODE" run "$points" -q --cube "$scratch/two.cube" \
+        --host-rate 200000 --host-rate-time 3 2> /dev/null &
+    host=$!
+    sleep 1
+    same 'a second host that sees the first end' --cube "$scratch/two.cube"
+    wait $host
     # shellcheck disable=SC2086
     "$INCODE" run "$points" -q --cube "$scratch/two.cube" $slow 2> /dev/null &
     host=$!
