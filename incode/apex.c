@@ -130,13 +130,13 @@ void incode_count_candidates(struct incode_triangulator *t, uint64_t looked)
     t->stats.candidates_histogram[half < last ? half : last]++;
 }
 
-/* Where many points were in doubt, the sphere found helps the next search. */
+/* Where many points were looked at, the sphere found helps the next search. */
 void incode_search_learn(struct incode_triangulator *t,
                          const struct incode_query *q)
 {
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
     if (q->best != INCODE_NONE && q->shrinking &&
-        q->doubts >= INCODE_QUERY_CROWD)
+        q->looked >= INCODE_QUERY_CROWD)
         incode_empties_add(&t->empties, p, q->scale);
 }
 

@@ -104,7 +104,7 @@ void incode_query_shrink(struct incode_query *q)
     bound_sphere(q);
 }
 
-/* Where many points are in doubt. */
+/* Where many points are to be looked at. */
 static void raise_ceiling(struct incode_query *q)
 {
     if (q->best == INCODE_NONE)
@@ -114,11 +114,9 @@ static void raise_ceiling(struct incode_query *q)
         incode_ceiling_set(&q->ceiling, q->empties, p, q->scale, q->sphere.n);
 }
 
-void incode_query_doubt(struct incode_query *q, uint32_t points)
+void incode_query_look(struct incode_query *q)
 {
-    bool few = q->doubts < INCODE_QUERY_CROWD;
-    q->doubts += points;
-    if (few && q->doubts >= INCODE_QUERY_CROWD)
+    if (++q->looked == INCODE_QUERY_CROWD)
         raise_ceiling(q);
 }
 
@@ -133,7 +131,7 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
         q->peak[d] = q->sphere.m[d] * half;
     if (q->shrinking)
         bound_sphere(q);
-    if (q->doubts >= INCODE_QUERY_CROWD)
+    if (q->looked >= INCODE_QUERY_CROWD)
         raise_ceiling(q);
 }
 

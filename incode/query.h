@@ -59,8 +59,8 @@ struct incode_query {
     double plane_slack; /* of n . p within the ball */
     double t; /* where in a pencil the ball is, of the first candidate so far */
     double limit;      /* NEAREST, CIRCLE: squared, relative */
-    uint32_t contests; /* APEX: points in doubt that were compared so far */
-    uint32_t doubts;   /* APEX: points that doubles did not rule out so far */
+    uint32_t contests; /* APEX: points in doubt so far */
+    uint32_t looked;   /* APEX: leaves so far */
     uint32_t best;     /* vertex number, or INCODE_NONE */
     double best_p[3];
     uint32_t pages, pages_max; /* needed so far; a walk stops at more than that,
@@ -132,11 +132,10 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3]);
 /* From now on only what meets the sphere of the best so far matters. */
 void incode_query_shrink(struct incode_query *q);
 
-enum { INCODE_QUERY_CROWD = 256 }; /* so many points in doubt are many */
+enum { INCODE_QUERY_CROWD = 64 }; /* so many leaves are many */
 
-/* Counts points in doubt; where they are many, a ceiling may rule out others.
- */
-void incode_query_doubt(struct incode_query *q, uint32_t points);
+/* Counts a leaf; where they are many, a ceiling may rule out others. */
+void incode_query_look(struct incode_query *q);
 
 /* A candidate for the apex: takes it if it is strictly on the unknown side and
  * inside the sphere of the best so far.  Exact. */

@@ -211,7 +211,7 @@ static bool is_done(const struct incode_query *q, const double p[3])
 }
 
 /* The points of a leaf that an APEX query must consider, one bit each. */
-static uint32_t apex_leaf(struct incode_query *q,
+static uint32_t apex_leaf(const struct incode_query *q,
                           const struct incode_frame *frame, unsigned first,
                           uint32_t lanes)
 {
@@ -228,8 +228,6 @@ static uint32_t apex_leaf(struct incode_query *q,
             here &= ~above_lanes(q, &points);
         in |= here << i;
     }
-    if (in != 0)
-        incode_query_doubt(q, (uint32_t)__builtin_popcount(in));
     if ((in & (in - 1)) == 0 || q->flat.spread == 0)
         return in;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES)
@@ -245,8 +243,10 @@ static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
     unsigned count = frame->count - first;
     uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
     *walker->candidates += (unsigned)__builtin_popcount(lanes);
-    if (q->question == INCODE_QUERY_APEX)
+    if (q->question == INCODE_QUERY_APEX) {
+        incode_query_look(q);
         lanes = apex_leaf(q, frame, first, lanes);
+    }
     for (; lanes != 0; lanes &= lanes - 1) {
         unsigned slot = first + (unsigned)__builtin_ctz(lanes);
         uint32_t id = brick * INCODE_BRICK_POINTS + slot;
