@@ -326,8 +326,11 @@ static bool rank_first(struct incode_make *n, const uint16_t *first,
                        uint32_t count)
 {
     const struct incode_gather *g = &n->t->gather;
-    struct incode_finals finals = {.count = 0};
+    struct incode_finals finals;
     uint16_t index[INCODE_FINALISTS];
+    if (!incode_finals_may_tell(n->rb, n->rc))
+        return false;
+    finals.count = 0;
     for (uint32_t i = 0; i <= count; i++) {
         double p[3];
         if (i < count) {

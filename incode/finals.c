@@ -48,16 +48,25 @@ static double length_of(const struct incode_dd a[3])
     return incode_max_norm(hi);
 }
 
-/* False: the products have so few digits that ties are likely. */
-static bool set_face(struct face *f, const double v[3], const double pb[3],
+bool incode_finals_may_tell(const double b[3], const double c[3])
+{
+    bool exact = true;
+    for (int k = 0; k < 3; k++) {
+        double e, f;
+        (void)incode_two_product(b[k], c[(k + 1) % 3], &e);
+        (void)incode_two_product(b[(k + 1) % 3], c[k], &f);
+        exact = exact && e == 0 && f == 0;
+    }
+    return !exact;
+}
+
+static void set_face(struct face *f, const double v[3], const double pb[3],
                      const double pc[3], double scale)
 {
     struct incode_dd_vector b = incode_dd_relative(pb, v, scale);
     struct incode_dd_vector c = incode_dd_relative(pc, v, scale);
     struct incode_dd w[3];
     cross(f->n, b.d, c.d);
-    if (f->n[0].lo == 0 && f->n[1].lo == 0 && f->n[2].lo == 0)
-        return false;
     struct incode_dd bb = incode_dd_dot(b.d, b.d);
     struct incode_dd cc = incode_dd_dot(c.d, c.d);
     for (int k = 0; k < 3; k++)
@@ -68,7 +77,6 @@ static bool set_face(struct face *f, const double v[3], const double pb[3],
     f->denominator = FINE * area;
     f->numerator[0] = FINE * area * area * (lb + lc);
     f->numerator[1] = FINE * area * area;
-    return true;
 }
 
 /* Places of a vector of candidates in the pencil: hi + lo, and its error; 0 for
@@ -130,8 +138,9 @@ uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
     struct face face;
     struct places at = {{0}, {0}, {0}};
     uint32_t best = INCODE_FINALS_NONE;
-    if (f->count == 0 || !set_face(&face, v, b, c, scale))
+    if (f->count == 0)
         return best;
+    set_face(&face, v, b, c, scale);
     for (uint32_t i = f->count; i % INCODE_VD_LANES != 0; i++)
         for (int d = 0; d < 3; d++)
             f->p[d][i] = f->p[d][0];

@@ -28,6 +28,10 @@ struct incode_finals {
 /* False: there is no room. */
 bool incode_finals_add(struct incode_finals *f, const double p[3]);
 
+/* False: products of the face's edges, relative, have so few digits that its
+ * ties are likely to be true ones, which the predicates settle sooner. */
+bool incode_finals_may_tell(const double b[3], const double c[3]);
+
 /* Index of the candidate that is strictly first in Delaunay distance from the
  * face (v, b, c), of those strictly beyond it; INCODE_FINALS_NONE where that is
  * not certain.  scale: a power of two by which the face is of size 1 about.
