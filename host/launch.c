@@ -16,6 +16,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "../transport/drivers/mpi_environment.h"
 #include "arguments.h"
 
 #define SOCKET_NAME "INCODE_LAUNCHER"
@@ -268,6 +269,7 @@ static _Noreturn void become_mpirun(pid_t parent, char **argv, unsigned nodes,
         _exit(127);
     }
     self[length] = '\0';
+    mpi_environment();
     dup2(null, STDIN_FILENO);
     dup2(said, STDOUT_FILENO);
     dup2(said, STDERR_FILENO);

@@ -21,6 +21,7 @@
 
 #include "../../node/node.h"
 #include "../../transport/drivers/mpi.h"
+#include "../../transport/drivers/mpi_environment.h"
 #include "../process.h"
 
 enum {
@@ -202,6 +203,7 @@ int main(int argc, char **argv)
     struct sigaction action = {.sa_handler = stay_a_moment};
     prctl(PR_SET_PDEATHSIG, SIGKILL); /* gone with the launcher's daemon */
     (void)sigaction(SIGTERM, &action, NULL);
+    mpi_environment();
     MPI_Init(&argc, &argv);
     if (mpi_place_open(&board.place) == 0) {
         listen_for_order(&board);

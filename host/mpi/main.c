@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "../../incode/predicates.h"
+#include "../../transport/drivers/mpi_environment.h"
 #include "../arguments.h"
 #include "../launch.h"
 #include "../run.h"
@@ -61,6 +62,7 @@ int main(int argc, char **argv)
     argp_err_exit_status = HOST_USAGE;
     (void)signal(SIGPIPE, SIG_IGN);
     prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
+    mpi_environment();
     MPI_Init(&argc, &argv);
     if (argc == 2 && strcmp(argv[1], HOST_MPI_BENCH) == 0) {
         return host_mpi_bench();
