@@ -105,7 +105,8 @@ static bool ceiling_of(struct incode_ceiling *c, const struct incode_circum *b,
     /* |d|^2 - N . d = d . (d - N) */
     c->level = incode_dd_dot(d.d, negative).hi * (1 + 1e-15) +
                (3 * error + FINE * far) * far;
-    c->level = c->level > 0 ? c->level : 0;
+    /* What overflows is not a number, and stays so. */
+    c->level = c->level < 0 ? 0 : c->level;
     c->set = c->level < 1e300 && c->slack < 1e300;
     return c->set;
 }

@@ -307,8 +307,9 @@ INCODE_INLINE incode_vl may_rise(const struct incode_query *q,
         top += incode_vd_max(a, b);
         error += incode_vd_max(incode_vd_abs(a), incode_vd_abs(b));
     }
-    return top + error * incode_vd_all(INCODE_SPHERE_EPS) >=
-           incode_vd_all(q->limit);
+    /* Not a number where a difference overflows, which tells nothing. */
+    return ~(top + error * incode_vd_all(INCODE_SPHERE_EPS) <
+             incode_vd_all(q->limit));
 }
 
 static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,

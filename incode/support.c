@@ -47,8 +47,8 @@ static void cross(double c[3], const struct incode_dd a[3], const double b[3])
     }
 }
 
-/* How far every point lies below the support, seen from v, at least; 0 or
- * more. */
+/* How far above v, in the support's direction, a point can be; not a number if
+ * that overflows. */
 static double depth_of(const struct incode_support *support, const double pv[3],
                        double scale)
 {
@@ -60,7 +60,7 @@ static double depth_of(const struct incode_support *support, const double pv[3],
     double depth = incode_dd_minus(top, height).hi * ratio /
                        length_of(support->n) * (1 + SPARE) +
                    FINE * far * ratio;
-    return depth > 0 ? depth : 0;
+    return depth < 0 ? 0 : depth;
 }
 
 /* Of a vast sphere through v with its centre outside the support: a point x

@@ -195,7 +195,10 @@ static void consider_height(struct incode_query *q, const double p[3])
     if (incode_dot(r, s->n) + error * INCODE_SPHERE_EPS < q->limit)
         return;
     struct incode_dd height = incode_support_height(s, p);
-    if (incode_dd_minus(height, top).hi > 0) {
+    /* What overflows may be anywhere: such a support tells nothing. */
+    if (!(error < 1e300))
+        height = (struct incode_dd){__builtin_inf(), 0};
+    if (incode_dd_minus(height, top).hi > 0 || !(height.hi < 1e300)) {
         s->most[0] = height.hi;
         s->most[1] = height.lo;
         q->limit = height.hi;

@@ -429,6 +429,46 @@ static void ceilings_on_a_rough_sphere(void **unused)
     assert_true(set > 500 && out > 2000);
 }
 
+/* A sphere of vastly larger scale: what a ceiling by it rules out is outside,
+ * and where the products leave the range of doubles there is none. */
+static void ceilings_across_scales(void **unused)
+{
+    struct incode_tally tally = {0};
+    size_t set = 0, out = 0;
+    (void)unused;
+    for (int power = 0; power < 1020; power += 4) {
+        double big = ldexp(1, power / 2), small = ldexp(1, -power / 2);
+        double large[4][3] = {
+            {big, 0, 0}, {2 * big, 0, big}, {2 * big, big, 0}, {3 * big, 0, 0}};
+        double face[4][3] = {
+            {0, 0, 0}, {0, small, 0}, {small, 0, 0}, {0, 0, small}};
+        const double *const t[4] = {large[0], large[1], large[2], large[3]};
+        const double *const f[4] = {face[0], face[2], face[1], face[3]};
+        struct incode_empties empties = {.count = 0};
+        struct incode_ceiling c;
+        const double n[3] = {1, 1, 1};
+        if (incode_orient3d(&tally, t[0], t[1], t[2], t[3]) > 0) {
+            incode_empties_add(&empties, t, 1 / big);
+        } else {
+            const double *const u[4] = {t[0], t[2], t[1], t[3]};
+            incode_empties_add(&empties, u, 1 / big);
+        }
+        assert_int_equal(empties.count, 1);
+        assert_true(incode_orient3d(&tally, f[0], f[1], f[2], f[3]) > 0);
+        incode_ceiling_set(&c, &empties, f, 1 / small, n);
+        set += c.set;
+        for (int i = 0; i < 64 && c.set; i++) {
+            const double r[3] = {0.25 * (i % 4), 0.25 * (i / 4 % 4),
+                                 0.25 * (i / 16)};
+            const double p[3] = {small * r[0], small * r[1], small * r[2]};
+            if (incode_dot(c.g, r) - c.slack * (r[0] + r[1] + r[2]) > c.level) {
+                out += incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p) >= 0;
+            }
+        }
+    }
+    assert_true(set > 100 && out == 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -436,6 +476,7 @@ int main(void)
         cmocka_unit_test(spheres_of_rough_squares),
         cmocka_unit_test(finals_of_a_rough_lattice),
         cmocka_unit_test(ceilings_on_a_rough_sphere),
+        cmocka_unit_test(ceilings_across_scales),
         cmocka_unit_test(places_in_a_pencil),
         cmocka_unit_test(first_of_the_gathered),
     };
