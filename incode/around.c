@@ -154,6 +154,7 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
             return false;
         hits.count = 0;
         hits.full = false;
+        hits.thinned = __builtin_inf();
         q->t = incode_pencil_later(&n->pencil, q->t);
     }
     if (!q->round) /* the best is too flat */

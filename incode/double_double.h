@@ -96,6 +96,19 @@ incode_dd_relative(const double p[3], const double v[3], double scale)
     return r;
 }
 
+/* a x b, each component as above. */
+static inline struct incode_dd_vector
+incode_dd_vector_product(const struct incode_dd a[3],
+                         const struct incode_dd b[3])
+{
+    struct incode_dd_vector r;
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        r.d[k] = incode_dd_cross(a[i], b[j], a[j], b[i]);
+    }
+    return r;
+}
+
 /* Error at most 33 * 2^-106 of the sum of the terms' sizes, as above. */
 static inline struct incode_dd incode_dd_dot(const struct incode_dd a[3],
                                              const struct incode_dd b[3])

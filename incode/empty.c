@@ -7,12 +7,6 @@
 /* Relative error of a sum of some numbers of twice the precision. */
 #define FINE 1e-29
 
-static double size_of(const struct incode_dd a[3])
-{
-    const double hi[3] = {a[0].hi, a[1].hi, a[2].hi};
-    return incode_max_norm(hi);
-}
-
 static struct incode_dd ratio(struct incode_dd a, struct incode_dd b)
 {
     struct incode_dd q = {a.hi / b.hi, 0}, r;
@@ -37,7 +31,7 @@ static bool circum_of(struct incode_circum *c, const double *const p[4],
     c->scale = scale;
     for (int k = 0; k < 3; k++)
         c->twice[k] = ratio(flat.sphere.m[k], det);
-    double size = size_of(c->twice);
+    double size = incode_dd_max_norm(c->twice);
     c->error = 2 * flat.spread * (1 + size) / det.hi + FINE * size;
     double longest = 0, r[3];
     for (int i = 1; i < 4; i++) {
@@ -54,7 +48,7 @@ static bool circum_of(struct incode_circum *c, const double *const p[4],
 static bool is_same(const struct incode_circum *a,
                     const struct incode_circum *b)
 {
-    double gap[3], size = size_of(a->twice) / a->scale;
+    double gap[3], size = incode_dd_max_norm(a->twice) / a->scale;
     for (int k = 0; k < 3; k++)
         gap[k] = a->p[k] * 2 + a->twice[k].hi / a->scale - b->p[k] * 2 -
                  b->twice[k].hi / b->scale;
@@ -88,7 +82,7 @@ static bool ceiling_of(struct incode_ceiling *c, const struct incode_circum *b,
     struct incode_dd_vector d = incode_dd_relative(b->p, empty->p, b->scale);
     struct incode_dd there[3], negative[3];
     double share = b->scale / empty->scale, size = 0;
-    double far = 2 * size_of(d.d) + size_of(b->twice);
+    double far = 2 * incode_dd_max_norm(d.d) + incode_dd_max_norm(b->twice);
     for (int k = 0; k < 3; k++) {
         there[k].hi = empty->twice[k].hi * share;
         there[k].lo = empty->twice[k].lo * share;
@@ -99,7 +93,7 @@ static bool ceiling_of(struct incode_ceiling *c, const struct incode_circum *b,
         size += __builtin_fabs(g.hi);
         negative[k] = incode_dd_minus(d.d[k], there[k]);
     }
-    far += size_of(there);
+    far += incode_dd_max_norm(there);
     double error = empty->error * share;
     c->slack = error + b->error + FINE * far + 1e-15 * size;
     /* |d|^2 - N . d = d . (d - N) */

@@ -28,25 +28,11 @@ bool incode_finals_add(struct incode_finals *f, const double p[3])
 }
 
 struct face {
-    struct incode_dd n[3], m[3], nn;
+    struct incode_dd_vector n, m;
+    struct incode_dd nn;
     double numerator[2]; /* errors over |r| and |r|^2 */
     double denominator;  /* over |r| */
 };
-
-static void cross(struct incode_dd r[3], const struct incode_dd a[3],
-                  const struct incode_dd b[3])
-{
-    for (int k = 0; k < 3; k++) {
-        int i = (k + 1) % 3, j = (k + 2) % 3;
-        r[k] = incode_dd_cross(a[i], b[j], a[j], b[i]);
-    }
-}
-
-static double length_of(const struct incode_dd a[3])
-{
-    const double hi[3] = {a[0].hi, a[1].hi, a[2].hi};
-    return incode_max_norm(hi);
-}
 
 bool incode_finals_may_tell(const double b[3], const double c[3])
 {
@@ -66,14 +52,15 @@ static void set_face(struct face *f, const double v[3], const double pb[3],
     struct incode_dd_vector b = incode_dd_relative(pb, v, scale);
     struct incode_dd_vector c = incode_dd_relative(pc, v, scale);
     struct incode_dd w[3];
-    cross(f->n, b.d, c.d);
+    f->n = incode_dd_vector_product(b.d, c.d);
     struct incode_dd bb = incode_dd_dot(b.d, b.d);
     struct incode_dd cc = incode_dd_dot(c.d, c.d);
     for (int k = 0; k < 3; k++)
         w[k] = incode_dd_cross(bb, c.d[k], cc, b.d[k]);
-    cross(f->m, w, f->n);
-    f->nn = incode_dd_dot(f->n, f->n);
-    double lb = length_of(b.d), lc = length_of(c.d), area = lb * lc;
+    f->m = incode_dd_vector_product(w, f->n.d);
+    f->nn = incode_dd_dot(f->n.d, f->n.d);
+    double lb = incode_dd_max_norm(b.d), lc = incode_dd_max_norm(c.d),
+           area = lb * lc;
     f->denominator = FINE * area;
     f->numerator[0] = FINE * area * area * (lb + lc);
     f->numerator[1] = FINE * area * area;
@@ -96,8 +83,8 @@ INCODE_INLINE void place(struct places *out, uint32_t i, const struct face *f,
     for (int d = 0; d < 3; d++) {
         r[d] = incode_lanes_difference(incode_vd_load(finals->p[d] + i), v[d],
                                        scale);
-        n[d] = incode_lanes_all(f->n[d]);
-        m[d] = incode_lanes_all(f->m[d]);
+        n[d] = incode_lanes_all(f->n.d[d]);
+        m[d] = incode_lanes_all(f->m.d[d]);
         size = incode_vd_max(size, incode_vd_abs(r[d].hi));
     }
     struct incode_lanes above = incode_lanes_dot(n, r),

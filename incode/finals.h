@@ -3,11 +3,11 @@
  * spheres, all at once.  Where the points are exact and spheres shared, as in a
  * grid, that does not tell either, and the predicates must.
  *
- * Memory: the struct; 1 KB of stack.  Work: some 250 operations, and 150 a
+ * Memory: the struct; 2 KB of stack.  Work: some 250 operations, and 150 a
  * vector of candidates.
  *
  *     incode_finals_add(&finals, p);
- *     first = incode_finals_first(&finals, pv, pb, pc, scale);
+ *     first = incode_finals_first(&finals, pv, pb, pc, scale, &tally);
  */
 #ifndef INCODE_FINALS_H
 #define INCODE_FINALS_H

@@ -3,9 +3,9 @@
 #include "double_double.h"
 #include "scale.h"
 
-/* Bounds of the error, in units of the products of the largest entries: as
- * for plain doubles, 46 (orient3d) or 1,104 (in_sphere) times that of one
- * operation, 11 * 2^-106; rounded up.  What underflows is below the other term,
+/* Bounds of the error, in units of the products of the largest entries: 210
+ * (orient3d) and 6,100 (in_sphere) times 2^-106 by those of double_double.h,
+ * rounded up.  What underflows is below the other term,
  * since every factor is below 2^61. */
 #define ORIENT3D_BOUND 0x1p-96
 #define IN_SPHERE_BOUND 0x1p-92

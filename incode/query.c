@@ -67,6 +67,8 @@ static bool set_ball(struct incode_query *q, const double centre[3],
 /* Where the sphere says nothing, the points' half-space may. */
 static void bound_flat(struct incode_query *q)
 {
+    if (q->best == INCODE_NONE)
+        return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
     incode_flat_lessen(&q->flat, p, q->scale);
     const struct incode_ball *ball = &q->flat.ball;

@@ -39,7 +39,7 @@ struct incode_query {
     bool shrinking;      /* APEX: the box is that of the best's sphere */
     bool round;          /* APEX: what matters lies in the ball below */
     bool lens;           /* round: it is less than the sphere (support.h) */
-    bool large;          /* round, and the sphere itself tells more */
+    bool large;          /* round, and the sphere itself tells of boxes, too */
     bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
     bool done;           /* not what lies within [done_lo, done_hi] */
     double lo[3], hi[3]; /* absolute coordinates */

@@ -39,17 +39,6 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
 
 /* ---- twice the precision ---- */
 
-static struct incode_dd_vector cross(const struct incode_dd_vector *a,
-                                     const struct incode_dd_vector *b)
-{
-    struct incode_dd_vector r;
-    for (int k = 0; k < 3; k++) {
-        int i = (k + 1) % 3, j = (k + 2) % 3;
-        r.d[k] = incode_dd_cross(a->d[i], b->d[j], a->d[j], b->d[i]);
-    }
-    return r;
-}
-
 /* What is left: the roundings of the evaluation, at most 7 units on a term with
  * m or n, 8 on that with det, and 2^-100 of the old bounds.  As large as the
  * value itself, so that a bound overflows where a product does. */
@@ -64,12 +53,13 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
 {
     struct incode_dd_vector rb = incode_dd_relative(b, v, scale),
                             rc = incode_dd_relative(c, v, scale);
-    struct incode_dd_vector n = cross(&rb, &rc);
+    struct incode_dd_vector n = incode_dd_vector_product(rb.d, rc.d);
     memcpy(f->n, n.d, sizeof f->n);
     if (a == NULL)
         return;
     struct incode_dd_vector ra = incode_dd_relative(a, v, scale);
-    struct incode_dd_vector ca = cross(&rc, &ra), ab = cross(&ra, &rb);
+    struct incode_dd_vector ca = incode_dd_vector_product(rc.d, ra.d),
+                            ab = incode_dd_vector_product(ra.d, rb.d);
     struct incode_dd squares[3] = {incode_dd_dot(rb.d, rb.d),
                                    incode_dd_dot(rc.d, rc.d),
                                    incode_dd_dot(ra.d, ra.d)};
@@ -88,7 +78,7 @@ void incode_sphere_refine(struct incode_sphere *s, const double v[3],
     incode_sphere_fine(&fine, v, b, c, a, scale);
     for (int k = 0; k < 3; k++) {
         s->n[k] = fine.n[k].hi;
-        s->pn[k] = refined(s->n[k], 2 * s->lb * s->lc);
+        s->pn[k] = refined(s->n[k], 2 * s->lb * s->lc + LOST);
     }
     if (a == NULL)
         return;

@@ -64,6 +64,12 @@ static inline double incode_max_norm(const double a[3])
     return l > z ? l : z;
 }
 
+static inline double incode_dd_max_norm(const struct incode_dd a[3])
+{
+    const double hi[3] = {a[0].hi, a[1].hi, a[2].hi};
+    return incode_max_norm(hi);
+}
+
 /* Where in the pencil a point lies; false: it is not clearly beyond the face.
  */
 static inline bool incode_pencil_place(const struct incode_pencil *pencil,

@@ -37,16 +37,6 @@ bool incode_support_faces(const struct incode_support *support,
     return sine(support->n, n) * SLOPES < 1;
 }
 
-/* a x b of a in twice the precision and b exact. */
-static void cross(double c[3], const struct incode_dd a[3], const double b[3])
-{
-    for (int k = 0; k < 3; k++) {
-        int i = (k + 1) % 3, j = (k + 2) % 3;
-        struct incode_dd bi = {b[i], 0}, bj = {b[j], 0};
-        c[k] = incode_dd_cross(a[i], bj, a[j], bi).hi;
-    }
-}
-
 /* How far above v, in the support's direction, a point can be; not a number if
  * that overflows. */
 static double depth_of(const struct incode_support *support, const double pv[3],
@@ -76,9 +66,12 @@ static struct incode_ball ball_under(const struct incode_support *support,
     if (!incode_support_faces(support, m))
         return ball;
     const double *n = support->n;
-    double tilt[3], foot[3], half = 0.5 / sphere->det.hi;
-    cross(tilt, sphere->m, n);
-    incode_cross(foot, n, tilt);
+    const struct incode_dd direction[3] = {{n[0], 0}, {n[1], 0}, {n[2], 0}};
+    struct incode_dd_vector tilt =
+        incode_dd_vector_product(sphere->m, direction);
+    const double across[3] = {tilt.d[0].hi, tilt.d[1].hi, tilt.d[2].hi};
+    double foot[3], half = 0.5 / sphere->det.hi;
+    incode_cross(foot, n, across);
     for (int k = 0; k < 3; k++)
         ball.centre[k] = foot[k] * half / incode_dot(n, n);
     double radius = length_of(m) * half * (1 + SPARE);
@@ -87,6 +80,7 @@ static struct incode_ball ball_under(const struct incode_support *support,
     doubt += radius * FINE * 1e9;
     off += doubt;
     double disc = __builtin_sqrt(off * off + 2 * radius * depth);
+    /* The foot's own error, of 2e-9 of the sphere's face, is within 1e-6. */
     ball.radius = disc * (1 + 1e-6) + depth + 2 * doubt;
     return ball;
 }
@@ -104,7 +98,9 @@ void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
         longest = length > longest ? length : longest;
     }
     flat->lengths = lengths;
-    flat->spread = FINE * 1e2 * lengths * longest;
+    /* Where products underflow, nothing is known. */
+    flat->spread =
+        lengths > 1e-250 ? FINE * 1e2 * lengths * longest : __builtin_inf();
 }
 
 /* The least ball that is known to hold what comes before p[3]. */

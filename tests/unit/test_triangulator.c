@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "../../host/gen.h"
+#include "../../host/verify.h"
 #include "emulated.h"
 #include "reference.h"
 #include "solo.h"
@@ -269,6 +270,31 @@ static void rough_sphere(void **unused)
     host_points_free(&points);
 }
 
+/* Two grids up to rounding, the large one 2^1100 times the small one: what is
+ * learned of one overflows where it is asked for the other. */
+static void rough_at_both_ends(void **unused)
+{
+    (void)unused;
+    struct host_points small = {0}, both = {0};
+    struct host_error error = {0};
+    made("rotated", 512, &small);
+    made("rotated", 512, &both);
+    for (uint64_t i = 0; i < 3 * small.count; i++) {
+        both.xyz[i] = ldexp(both.xyz[i], 500);
+        small.xyz[i] = ldexp(small.xyz[i], -600);
+    }
+    assert_int_equal(host_points_append(&both, small.xyz, small.count, &error),
+                     0);
+    struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 4 << 20};
+    struct host_verify_report report;
+    solo_run(&s, both.xyz, both.count);
+    if (host_verify(&both, &s.tets, &report, &error) != 0)
+        fail_msg("%s", report.text);
+    solo_close(&s);
+    host_points_free(&small);
+    host_points_free(&both);
+}
+
 /* A front at one vertex that is far longer than what is kept at hand. */
 static void hub(void **unused)
 {
@@ -438,12 +464,19 @@ static void refusals(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(degenerate_sets),   cmocka_unit_test(scaled_sets),
-        cmocka_unit_test(both_ends),         cmocka_unit_test(mixed_scales),
-        cmocka_unit_test(made_sets),         cmocka_unit_test(rough_sides),
-        cmocka_unit_test(rough_sphere),      cmocka_unit_test(hub),
-        cmocka_unit_test(real_sets),         cmocka_unit_test(smallest_memory),
-        cmocka_unit_test(too_little_memory), cmocka_unit_test(refusals),
+        cmocka_unit_test(degenerate_sets),
+        cmocka_unit_test(scaled_sets),
+        cmocka_unit_test(both_ends),
+        cmocka_unit_test(mixed_scales),
+        cmocka_unit_test(made_sets),
+        cmocka_unit_test(rough_sides),
+        cmocka_unit_test(rough_sphere),
+        cmocka_unit_test(rough_at_both_ends),
+        cmocka_unit_test(hub),
+        cmocka_unit_test(real_sets),
+        cmocka_unit_test(smallest_memory),
+        cmocka_unit_test(too_little_memory),
+        cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
