@@ -458,8 +458,9 @@ static void ceilings_across_scales(void **unused)
         incode_ceiling_set(&c, &empties, f, 1 / small, n);
         set += c.set;
         for (int i = 0; i < 64 && c.set; i++) {
-            const double r[3] = {0.25 * (i % 4), 0.25 * (i / 4 % 4),
-                                 0.25 * (i / 16)};
+            int place[3] = {i % 4, i / 4 % 4, i / 16};
+            const double r[3] = {0.25 * place[0], 0.25 * place[1],
+                                 0.25 * place[2]};
             const double p[3] = {small * r[0], small * r[1], small * r[2]};
             if (incode_dot(c.g, r) - c.slack * (r[0] + r[1] + r[2]) > c.level) {
                 out += incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p) >= 0;
