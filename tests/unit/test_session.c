@@ -120,16 +120,23 @@ static void greet_only(struct pair *p)
     }
 }
 
-/* Three ends: a third one in the place of the second. */
-static void an_end_may_keep_to_its_peer(void **unused)
+/* One end keeps to its peer, and both are up. */
+static struct pair *new_loyal_pair(void)
 {
-    (void)unused;
     struct link_config loyal = small;
     loyal.keeps_peer = true;
     struct pair *p = new_pair(&small, &perfect, 3);
     p->ends[0].config = loyal;
     start(p, 0, 77);
     run(p, 50, 100, 1000000000);
+    return p;
+}
+
+/* Three ends: a third one in the place of the second. */
+static void an_end_may_keep_to_its_peer(void **unused)
+{
+    (void)unused;
+    struct pair *p = new_loyal_pair();
     struct end other = p->ends[1];
     p->ends[1].memory = NULL;
     /* Another start of that end: it is told, again and again, and the session
@@ -172,12 +179,7 @@ static void an_end_may_keep_to_its_peer(void **unused)
 static void who_is_sent_away_waits_for_the_other(void **unused)
 {
     (void)unused;
-    struct link_config loyal = small;
-    loyal.keeps_peer = true;
-    struct pair *p = new_pair(&small, &perfect, 3);
-    p->ends[0].config = loyal;
-    start(p, 0, 77);
-    run(p, 50, 100, 1000000000);
+    struct pair *p = new_loyal_pair();
     struct end first = p->ends[1];
     p->ends[1].memory = NULL;
     start(p, 1, 99);

@@ -242,18 +242,25 @@ static void made_sets(void **unused)
     }
 }
 
+/* What a made set takes with all of its memory. */
+static struct solo taken_by(const char *kind, uint64_t n)
+{
+    struct host_points points = {0};
+    struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 4 << 20};
+    made(kind, n, &points);
+    solo_run(&s, points.xyz, points.count);
+    solo_close(&s);
+    host_points_free(&points);
+    return s;
+}
+
 /* Sides that are flat up to rounding, where every point is in doubt about every
  * face: hardly more than the facets of the hull may have to look at all. */
 static void rough_sides(void **unused)
 {
     (void)unused;
-    struct host_points points = {0};
-    made("rotated", 27000, &points);
-    struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 4 << 20};
-    solo_run(&s, points.xyz, points.count);
+    struct solo s = taken_by("rotated", 27000);
     assert_in_range(s.far_calls, 1, s.hulls);
-    solo_close(&s);
-    host_points_free(&points);
 }
 
 /* Points on a sphere up to rounding: not every search that goes through the
@@ -261,13 +268,8 @@ static void rough_sides(void **unused)
 static void rough_sphere(void **unused)
 {
     (void)unused;
-    struct host_points points = {0};
-    made("sphere", 6000, &points);
-    struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 4 << 20};
-    solo_run(&s, points.xyz, points.count);
+    struct solo s = taken_by("sphere", 6000);
     assert_in_range(s.far_calls, 1, 1000);
-    solo_close(&s);
-    host_points_free(&points);
 }
 
 /* Two grids up to rounding, the large one 2^1100 times the small one: what is
