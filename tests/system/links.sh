@@ -224,28 +224,7 @@ END
     end_nodes
 }
 
-clean_line='^serial, paced to 115200 .* 0\.00 %$'
-bench_links() {
-    # A process that is starved for longer than any timeout sends again, and
-    # this machine may be busy: three times in a row it is not.
-    for _ in 1 2 3; do
-        timeout 60 "$INCODE" bench links > "$scratch/bench" 2> "$scratch/errors"
-        status=$?
-        grep -qE "$clean_line" "$scratch/bench" && break
-    done
-    check 'links/bench links' "exit $status: $(last "$scratch/errors")" \
-        test $status = 0
-    for driver in 'tcp, loopback' 'tcp, with a key' 'serial, pseudo-terminal' \
-        'serial, paced to 115200 baud'; do
-        check "links/bench links: $driver" "$(cat "$scratch/bench")" \
-            grep -qE "^$driver +[0-9.]+ +(-|[0-9.]+ %) +[0-9]+ +[0-9]+ " \
-            "$scratch/bench"
-    done
-    check 'links/bench links: a clean line resends nothing' \
-        "$(cat "$scratch/bench")" \
-        grep -qE "$clean_line" "$scratch/bench"
-}
-for part in wrong_keys missing_wire two_hosts bench_links; do
+for part in wrong_keys missing_wire two_hosts; do
     beside $part
 done
 
