@@ -4,6 +4,8 @@
 
 #include "check.h"
 
+enum { GROUP = 32 }; /* frames of which a least time of use is noted */
+
 static uint32_t hash_size(uint32_t frames)
 {
     uint32_t size = 64;
@@ -15,7 +17,10 @@ static uint32_t hash_size(uint32_t frames)
 size_t incode_pager_bytes(uint32_t frames)
 {
     size_t heads = hash_size(frames) * sizeof(uint16_t);
-    return frames * sizeof(struct incode_frame) + heads;
+    size_t groups = (frames + GROUP - 1) / GROUP * sizeof(uint64_t);
+    return frames * (sizeof(struct incode_frame) + sizeof(uint64_t) +
+                     sizeof(struct incode_slot)) +
+           groups + heads;
 }
 
 void incode_pager_init(struct incode_pager *pager, void *memory,
@@ -24,13 +29,17 @@ void incode_pager_init(struct incode_pager *pager, void *memory,
     INCODE_ASSERT(frames >= 1 && frames < INCODE_NO_FRAME);
     memset(pager, 0, sizeof *pager);
     pager->frames = memory;
-    pager->heads = (uint16_t *)(void *)(pager->frames + frames);
+    pager->used = (uint64_t *)(void *)(pager->frames + frames);
+    pager->oldest = pager->used + frames;
+    pager->group_count = (frames + GROUP - 1) / GROUP;
+    pager->slots =
+        (struct incode_slot *)(void *)(pager->oldest + pager->group_count);
+    pager->heads = (uint16_t *)(void *)(pager->slots + frames);
     pager->frame_count = frames;
     pager->hash_mask = hash_size(frames) - 1;
     pager->loading_max = frames / 4 < 1 ? 1 : frames / 4;
     pager->bricks = bricks;
-    pager->newest = pager->oldest = INCODE_NO_FRAME;
-    pager->free = 0;
+    memset(pager->oldest, 0, pager->group_count * sizeof pager->oldest[0]);
     for (uint32_t i = 0; i <= pager->hash_mask; i++)
         pager->heads[i] = INCODE_NO_FRAME;
 }
@@ -44,42 +53,56 @@ static uint16_t *head_of(const struct incode_pager *pager, uint32_t page)
 static uint16_t find(const struct incode_pager *pager, uint32_t page)
 {
     uint16_t i = *head_of(pager, page);
-    while (i != INCODE_NO_FRAME && pager->frames[i].number != page)
-        i = pager->frames[i].chain;
+    while (i != INCODE_NO_FRAME && pager->slots[i].number != page)
+        i = pager->slots[i].chain;
     return i;
 }
 
-static void ring_remove(struct incode_pager *pager, uint16_t i)
+static void set_state(struct incode_pager *pager, uint16_t i,
+                      enum incode_frame_state state)
 {
-    const struct incode_frame *f = &pager->frames[i];
-    if (f->newer == INCODE_NO_FRAME)
-        pager->newest = f->older;
-    else
-        pager->frames[f->newer].older = f->older;
-    if (f->older == INCODE_NO_FRAME)
-        pager->oldest = f->newer;
-    else
-        pager->frames[f->older].newer = f->newer;
+    uint64_t *oldest = &pager->oldest[i / GROUP];
+    pager->slots[i].state = (uint8_t)state;
+    pager->used[i] &= ~INCODE_FRAME_WAITING;
+    if (state != INCODE_FRAME_READY)
+        pager->used[i] |= INCODE_FRAME_WAITING;
+    *oldest = pager->used[i] < *oldest ? pager->used[i] : *oldest;
 }
 
-static void ring_push(struct incode_pager *pager, uint16_t i)
+/* Where the least of some times is. */
+static uint32_t least_of(const uint64_t *time, uint32_t count)
 {
-    struct incode_frame *f = &pager->frames[i];
-    f->newer = INCODE_NO_FRAME;
-    f->older = pager->newest;
-    if (pager->newest == INCODE_NO_FRAME)
-        pager->oldest = i;
-    else
-        pager->frames[pager->newest].newer = i;
-    pager->newest = i;
+    uint32_t at = 0;
+    for (uint32_t i = 1; i < count; i++)
+        at = time[i] < time[at] ? i : at;
+    return at;
+}
+
+/* The frame that is ready and was not used for longest.  Times only grow, so
+ * that what a group's least was is a lower bound: the group with the least of
+ * these has it if its bound still holds, else the bound is raised. */
+static uint16_t find_oldest(struct incode_pager *pager)
+{
+    for (;;) {
+        uint32_t group = least_of(pager->oldest, pager->group_count);
+        uint32_t first = group * GROUP, left = pager->frame_count - first;
+        uint32_t i =
+            first + least_of(pager->used + first, left < GROUP ? left : GROUP);
+        if (pager->used[i] >= INCODE_FRAME_WAITING &&
+            pager->oldest[group] >= INCODE_FRAME_WAITING)
+            return INCODE_NO_FRAME;
+        if (pager->used[i] == pager->oldest[group])
+            return (uint16_t)i;
+        pager->oldest[group] = pager->used[i];
+    }
 }
 
 static void unchain(struct incode_pager *pager, uint16_t i)
 {
-    uint16_t *link = head_of(pager, pager->frames[i].number);
+    uint16_t *link = head_of(pager, pager->slots[i].number);
     while (*link != i)
-        link = &pager->frames[*link].chain;
-    *link = pager->frames[i].chain;
+        link = &pager->slots[*link].chain;
+    *link = pager->slots[i].chain;
 }
 
 /* A frame to load into: never used, or the least recently used that is not
@@ -90,12 +113,9 @@ static uint16_t take_frame(struct incode_pager *pager)
         pager->frames_used++;
         return pager->free++;
     }
-    uint16_t i = pager->oldest;
-    while (i != INCODE_NO_FRAME && pager->frames[i].state != INCODE_FRAME_READY)
-        i = pager->frames[i].newer;
+    uint16_t i = find_oldest(pager);
     if (i == INCODE_NO_FRAME)
         return i;
-    ring_remove(pager, i);
     unchain(pager, i);
     pager->evictions++;
     return i;
@@ -108,13 +128,13 @@ static void ask(struct incode_pager *pager, uint32_t page)
         return;
     uint16_t i = take_frame(pager);
     INCODE_ASSERT(i != INCODE_NO_FRAME);
-    struct incode_frame *f = &pager->frames[i];
-    f->number = page;
-    f->state = INCODE_FRAME_LOADING;
+    struct incode_slot *slot = &pager->slots[i];
+    slot->number = pager->frames[i].number = page;
+    pager->used[i] = ++pager->time;
+    set_state(pager, i, INCODE_FRAME_LOADING);
     uint16_t *head = head_of(pager, page);
-    f->chain = *head;
+    slot->chain = *head;
     *head = i;
-    ring_push(pager, i);
     pager->loading++;
     pager->requests++;
 }
@@ -126,18 +146,17 @@ struct incode_frame *incode_pager_get(struct incode_pager *pager, uint32_t page)
         ask(pager, page);
         return NULL;
     }
-    struct incode_frame *f = &pager->frames[i];
-    if (pager->newest != i) {
-        ring_remove(pager, i);
-        ring_push(pager, i);
-    }
-    return f->state == INCODE_FRAME_READY ? f : NULL;
+    pager->used[i] = ++pager->time;
+    if (pager->slots[i].state == INCODE_FRAME_READY)
+        return &pager->frames[i];
+    pager->used[i] |= INCODE_FRAME_WAITING;
+    return NULL;
 }
 
 bool incode_pager_loading(const struct incode_pager *pager, uint32_t page)
 {
     uint16_t i = find(pager, page);
-    return i != INCODE_NO_FRAME && pager->frames[i].state != INCODE_FRAME_READY;
+    return i != INCODE_NO_FRAME && pager->slots[i].state != INCODE_FRAME_READY;
 }
 
 static void leaf_boxes(struct incode_frame *f)
@@ -178,7 +197,7 @@ int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
                          const void *data, size_t bytes)
 {
     uint16_t i = find(pager, page);
-    if (i == INCODE_NO_FRAME || pager->frames[i].state != INCODE_FRAME_LOADING)
+    if (i == INCODE_NO_FRAME || pager->slots[i].state != INCODE_FRAME_LOADING)
         return -1;
     struct incode_frame *f = &pager->frames[i];
     if (page < pager->bricks) {
@@ -194,11 +213,9 @@ int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
         f->count = 0;
     }
     pager->loading--;
-    f->state = INCODE_FRAME_READY;
-    if (pager->shuffle != 0) {
-        f->state = INCODE_FRAME_HELD;
-        pager->held++;
-    }
+    set_state(pager, i,
+              pager->shuffle != 0 ? INCODE_FRAME_HELD : INCODE_FRAME_READY);
+    pager->held += pager->shuffle != 0;
     return 0;
 }
 
@@ -212,11 +229,10 @@ bool incode_pager_release(struct incode_pager *pager, bool now)
     if (!now && (pager->shuffle >> 60 & 3) != 0)
         return false;
     uint32_t pick = (uint32_t)(pager->shuffle % pager->held);
-    for (uint16_t i = pager->newest; i != INCODE_NO_FRAME;
-         i = pager->frames[i].older) {
-        if (pager->frames[i].state != INCODE_FRAME_HELD || pick-- > 0)
+    for (uint16_t i = 0; i < pager->free; i++) {
+        if (pager->slots[i].state != INCODE_FRAME_HELD || pick-- > 0)
             continue;
-        pager->frames[i].state = INCODE_FRAME_READY;
+        set_state(pager, i, INCODE_FRAME_READY);
         pager->held--;
         return true;
     }

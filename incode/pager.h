@@ -1,8 +1,10 @@
 /* Pages in fixed frames, replaced least recently used first.  A frame is
  * reserved before its page is asked for, so that a reply always has room.
  *
- * Memory: incode_pager_bytes(frames).  Work: constant a call, but for a brick's
- * arrival, which computes the boxes of its 8 leaves.
+ * Memory: incode_pager_bytes(frames).  Work: constant for a page that is there;
+ * where one is replaced, a look at the times of use of one group of frames in
+ * 32, and of some groups as a rule; where a brick arrives, the boxes of its 8
+ * leaves.
  *
  *     struct incode_frame *f = incode_pager_get(&pager, page);
  *     if (f == NULL) wait: the page has been asked for, or will be;
@@ -29,11 +31,15 @@ struct incode_frame {
     alignas(64) union incode_page page;
     alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES];
     alignas(64) double leaf_hi[3][INCODE_BRICK_LEAVES];
-    uint32_t number;       /* the page */
-    uint16_t newer, older; /* the ring of use */
-    uint16_t chain;        /* next frame of the same hash */
+    uint32_t number; /* the page */
+    uint8_t count;   /* points of a brick */
+};
+
+/* What the pager looks at to find a frame, close together. */
+struct incode_slot {
+    uint32_t number;
+    uint16_t chain; /* next frame of the same hash */
     uint8_t state;
-    uint8_t count; /* points of a brick */
 };
 
 /* The tight box of a brick. */
@@ -53,11 +59,15 @@ static inline void incode_frame_box(const struct incode_frame *f, double lo[3],
 
 struct incode_pager {
     struct incode_frame *frames;
-    uint16_t *heads; /* hash of page numbers to frames */
-    uint32_t frame_count, hash_mask;
+    uint64_t *used; /* when each was last; WAITING more where it is not ready */
+    uint64_t *oldest; /* at most the least of these of each group of frames */
+    uint64_t time;
+    struct incode_slot *slots; /* of each frame */
+    uint16_t *heads;           /* hash of page numbers to frames */
+    uint32_t frame_count, group_count, hash_mask;
     uint32_t loading, loading_max, held;
-    uint32_t bricks; /* pages below this are bricks */
-    uint16_t newest, oldest, free;
+    uint32_t bricks;  /* pages below this are bricks */
+    uint16_t free;    /* frames from here on were never used */
     uint64_t shuffle; /* state of the test's shuffle; 0: none */
     bool (*request)(void *context, uint32_t page);
     void *context;
@@ -66,6 +76,7 @@ struct incode_pager {
 };
 
 #define INCODE_NO_FRAME UINT16_MAX
+#define INCODE_FRAME_WAITING (UINT64_C(1) << 63)
 
 size_t incode_pager_bytes(uint32_t frames);
 

@@ -209,7 +209,8 @@ static void release(struct incode_pager *pager, struct model *m)
     uint32_t found = 0;
     for (uint32_t i = 0; i < pager->frame_count; i++) {
         const struct incode_frame *f = &pager->frames[i];
-        if (f->state == INCODE_FRAME_READY && m->place[f->number] == HELD) {
+        if (pager->slots[i].state == INCODE_FRAME_READY &&
+            m->place[f->number] == HELD) {
             m->place[f->number] = READY;
             found++;
         }
@@ -230,14 +231,18 @@ static void compare(const struct incode_pager *pager, const struct model *m,
         bool waits = m->place[page] == LOADING || m->place[page] == HELD;
         assert_int_equal(incode_pager_loading(pager, page), waits);
     }
-    /* The ring is the model's list. */
-    uint16_t i = pager->newest;
+    /* Times of use fall along the model's list, and nothing else is used. */
+    uint64_t before = UINT64_MAX;
     for (uint32_t k = 0; k < m->count; k++) {
-        assert_int_not_equal(i, INCODE_NO_FRAME);
-        assert_int_equal(pager->frames[i].number, m->page[k]);
-        i = pager->frames[i].older;
+        uint32_t i = 0;
+        while (i < pager->frames_used && pager->frames[i].number != m->page[k])
+            i++;
+        assert_int_not_equal(i, pager->frames_used);
+        uint64_t used = pager->used[i] & ~INCODE_FRAME_WAITING;
+        assert_true(used < before);
+        before = used;
     }
-    assert_int_equal(i, INCODE_NO_FRAME);
+    assert_int_equal(pager->frames_used, m->count);
 }
 
 static void trace(uint32_t frames, uint32_t pages, bool shuffled)
