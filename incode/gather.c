@@ -290,6 +290,8 @@ void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
     g->self = incode_gather_find(g, vertex);
 }
 
+enum { NEAR_MOST = INCODE_NEAR_POINTS + INCODE_AROUND_EXTRA };
+
 /* Index of the first of n numbers that is `id`, or n. */
 static uint32_t find(const uint32_t *ids, uint32_t n, uint32_t id)
 {
@@ -304,26 +306,11 @@ static uint32_t find(const uint32_t *ids, uint32_t n, uint32_t id)
     return n;
 }
 
-uint32_t incode_gather_find(const struct incode_gather *g, uint32_t id)
+/* Scans see point i from now on. */
+static void see(struct incode_gather *g, uint32_t i)
 {
-    uint32_t near = find(g->near_id, g->near, id);
-    if (near < g->near)
-        return g->at[near];
-    uint32_t i = find(g->id, g->count, id);
-    return i < g->count ? i : INCODE_GATHER_NONE;
-}
-
-uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
-                              const double p[3])
-{
-    if (g->count == INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA ||
-        g->near == INCODE_NEAR_POINTS + INCODE_AROUND_EXTRA)
-        return INCODE_GATHER_NONE;
-    uint32_t i = g->count++, k = g->near++;
+    uint32_t k = g->near++;
     double r[3], square = 0, length = 0;
-    g->id[i] = id;
-    for (int d = 0; d < 3; d++)
-        g->p[d][i] = p[d];
     incode_gather_relative(g, i, r);
     for (int d = 0; d < 3; d++) {
         length += __builtin_fabs(r[d]);
@@ -338,12 +325,38 @@ uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
     g->e[k] = length < 0x1p60 ? (float)(length * FLOAT_SHARE + 2.1 * g->doubt)
                               : INFINITE;
     g->at[k] = i;
-    g->near_id[k] = id;
+    g->near_id[k] = g->id[i];
     /* What follows is padding. */
     for (uint32_t next = k + 1; next % INCODE_VF_LANES != 0; next++)
         g->x[next] = g->y[next] = g->z[next] = g->w[next] = 0;
     for (uint32_t next = k + 1; next % INCODE_VF_LANES != 0; next++)
         g->e[next] = INFINITE;
+}
+
+uint32_t incode_gather_find(struct incode_gather *g, uint32_t id)
+{
+    uint32_t near = find(g->near_id, g->near, id);
+    if (near < g->near)
+        return g->at[near];
+    uint32_t i = find(g->id, g->count, id);
+    if (i == g->count)
+        return INCODE_GATHER_NONE;
+    if (g->near < NEAR_MOST)
+        see(g, i);
+    return i;
+}
+
+uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
+                              const double p[3])
+{
+    if (g->count == INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA ||
+        g->near == NEAR_MOST)
+        return INCODE_GATHER_NONE;
+    uint32_t i = g->count++;
+    g->id[i] = id;
+    for (int d = 0; d < 3; d++)
+        g->p[d][i] = p[d];
+    see(g, i);
     return i;
 }
 

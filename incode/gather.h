@@ -84,8 +84,9 @@ void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
                           const double p[3], double radius,
                           const double domain_lo[3], const double domain_hi[3]);
 
-/* Index of a vertex among the points at hand, or INCODE_GATHER_NONE. */
-uint32_t incode_gather_find(const struct incode_gather *g, uint32_t id);
+/* Index of a vertex among the points at hand, or INCODE_GATHER_NONE.  It counts
+ * as one around the vertex from now on: it is likely an apex again. */
+uint32_t incode_gather_find(struct incode_gather *g, uint32_t id);
 
 /* Appends a far vertex; INCODE_GATHER_NONE: full. */
 uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
