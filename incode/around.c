@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "apex.h"
+#include "simd.h"
 
 /* MakeTetra among the bricks around, where the points at hand do not suffice.
  * For a regular face, points are ordered along its pencil of spheres: one pass
@@ -82,51 +83,302 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
 
 /* ---- a regular face: along its pencil ---- */
 
-/* What the pass has found: the first of them, ties and what is in doubt. */
-static bool settle(struct incode_make *n, struct incode_query *q,
-                   const struct incode_hits *hits)
+enum {
+    HITS = 64, /* kept at a time */
+    BATCH = 8  /* bricks looked at before the ball is drawn in */
+};
+
+/* Points in the ball, and where in the pencil: infinite where they are not
+ * clearly beyond the face. */
+struct hits {
+    alignas(64) double p[3][HITS];
+    alignas(64) double t[HITS];
+    uint32_t id[HITS], count;
+    uint32_t placed; /* so many of them, at least, have a place */
+};
+
+/* The ball as the points' own coordinates see it, times scale: it holds p only
+ * if |p * scale - centre|^2 <= square. */
+struct ball {
+    double scale, centre[3], square;
+};
+
+/* The ball of the pencil's sphere at t, widened by 1e-6 of its size. */
+static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
+                    double t)
 {
-    struct incode_tally *tally = &n->t->stats.tally;
-    const struct incode_hit *best = NULL;
-    double last = incode_pencil_later(&n->pencil, q->t);
-    for (uint32_t i = 0; i < hits->count; i++) {
-        const struct incode_hit *hit = &hits->hit[i];
-        if (hit->placed
-                ? hit->t > last
-                : !incode_query_holds(q, hit->p) ||
-                      incode_orient3d(tally, n->pv, n->pb, n->pc, hit->p) <= 0)
-            continue;
-        if (best == NULL ||
-            incode_in_sphere(tally, n->pv, n->pb, n->pc, best->p, hit->p) > 0)
-            best = hit;
+    double square = 0.25 * t * t;
+    for (int d = 0; d < 3; d++) {
+        q->centre[d] = pencil->c0[d] + 0.5 * t * pencil->n[d];
+        square += pencil->c0[d] * pencil->c0[d];
     }
-    if (best == NULL || !best->placed)
-        return false;
-    q->best = best->id;
-    memcpy(q->best_p, best->p, sizeof q->best_p);
+    q->t = t;
+    q->square = square * (1 + 4e-6);
+    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 *
+                                              q->sphere.pn[0] *
+                                              __builtin_sqrt(q->square);
+    q->round = true;
+}
+
+/* false: its numbers are out of range. */
+static bool set_ball(struct ball *ball, const struct incode_query *q)
+{
+    ball->scale = q->scale; /* a power of two: the sum alone is rounded */
+    for (int d = 0; d < 3; d++)
+        ball->centre[d] = q->pv[d] * q->scale + q->centre[d];
+    /* (r + e)^2 <= (1 + d) r^2 + (1 + 1 / d) e^2 */
+    double error = 1e-12 * incode_max_norm(ball->centre);
+    ball->square = (1 + 1e-6) * q->square + error * error;
+    return ball->square < 1e300;
+}
+
+INCODE_INLINE incode_vd dot(const double a[3], const incode_vd b[3])
+{
+    return incode_vd_all(a[0]) * b[0] + incode_vd_all(a[1]) * b[1] +
+           incode_vd_all(a[2]) * b[2];
+}
+
+/* incode_pencil_place for a vector of points at x, y and z; infinite where it
+ * is false. */
+INCODE_INLINE incode_vd places(const struct incode_query *q,
+                               const struct incode_pencil *pencil,
+                               const double *const xyz[3], uint32_t i)
+{
+    incode_vd r[3], far = incode_vd_all(0), square = far;
+    for (int d = 0; d < 3; d++) {
+        /* Scaled first: a difference of large numbers could overflow. */
+        r[d] = incode_vd_load(xyz[d] + i) * incode_vd_all(q->scale) -
+               incode_vd_all(q->pv[d] * q->scale);
+        far = incode_vd_max(incode_vd_abs(r[d]), far);
+        square += r[d] * r[d];
+    }
+    incode_vd beyond = dot(pencil->n, r);
+    incode_vd t = (square - incode_vd_all(2) * dot(pencil->c0, r)) / beyond;
+    return incode_vd_select(beyond > incode_vd_all(2e-3) * far, t,
+                            incode_vd_all(__builtin_inf()));
+}
+
+/* Sets the places that are missing, and draws the ball in to the first of them.
+ */
+static void place(struct incode_query *q, const struct incode_pencil *pencil,
+                  struct hits *hits)
+{
+    if (hits->placed == hits->count)
+        return;
+    const double *const xyz[3] = {hits->p[0], hits->p[1], hits->p[2]};
+    incode_vd infinite = incode_vd_all(__builtin_inf()), least = infinite;
+    incode_vd end = incode_vd_all(hits->count), lane = incode_vd_count();
+    for (uint32_t i = hits->placed / INCODE_VD_LANES * INCODE_VD_LANES;
+         i < hits->count; i += INCODE_VD_LANES) {
+        incode_vd t = places(q, pencil, xyz, i);
+        t = incode_vd_select(incode_vd_all(i) + lane < end, t, infinite);
+        *(incode_vd *)(hits->t + i) = t;
+        least = incode_vd_min(t, least);
+    }
+    hits->placed = hits->count;
+    double first = incode_vd_least_of(least);
+    if (first < q->t)
+        draw_in(q, pencil, first);
+}
+
+/* Draws the ball in to the first of the points of some leaves (context: the
+ * pencil); what repeats a brick's last point does no harm. */
+static bool visit_first(struct incode_walker *walker, struct incode_query *q,
+                        const struct incode_frame *frame, uint32_t brick,
+                        uint32_t leaves, void *context)
+{
+    const struct incode_pencil *pencil = context;
+    const struct incode_brick *b = &frame->page.brick;
+    const double *const xyz[3] = {b->x, b->y, b->z};
+    incode_vd least = incode_vd_all(__builtin_inf());
+    (void)brick;
+    *walker->candidates +=
+        (unsigned)__builtin_popcount(leaves) * INCODE_LEAF_POINTS;
+    for (; leaves != 0; leaves &= leaves - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
+        for (uint32_t i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES)
+            least = incode_vd_min(places(q, pencil, xyz, slot + i), least);
+    }
+    double first = incode_vd_least_of(least);
+    if (first < q->t)
+        draw_in(q, pencil, first);
     return true;
 }
 
-/* The best at hand goes first. */
-static void add_best(struct incode_make *n, struct incode_query *q,
-                     struct incode_hits *hits)
+/* Whether a hit may be the first, or tie with it. */
+static bool contends(const struct incode_query *q, const struct hits *hits,
+                     uint32_t i, double last)
 {
-    const struct incode_gather *g = &n->t->gather;
-    double p[3];
-    for (int d = 0; d < 3; d++)
-        p[d] = g->p[d][n->best];
-    q->best = g->id[n->best];
-    incode_hit_add(q, hits, q->best, p);
+    double square = 0;
+    if (hits->t[i] < __builtin_inf())
+        return hits->t[i] <= last;
+    for (int d = 0; d < 3; d++) {
+        double r = hits->p[d][i] * q->scale - q->pv[d] * q->scale;
+        square += (r - q->centre[d]) * (r - q->centre[d]);
+    }
+    return !(square > q->square);
 }
 
-static bool search_pencil(struct incode_make *n, struct incode_search *s)
+/* Drops what has fallen out of the ball. */
+static void thin_out(const struct incode_query *q,
+                     const struct incode_pencil *pencil, struct hits *hits)
 {
-    struct incode_triangulator *t = n->t;
-    const struct incode_gather *g = &t->gather;
-    const struct incode_vicinity *list = &t->vicinity;
-    struct incode_query *q = &s->query;
-    struct incode_hits hits;
-    alignas(64) double wall[8];
+    double last = incode_pencil_later(pencil, q->t);
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < hits->count; i++) {
+        if (!contends(q, hits, i, last))
+            continue;
+        for (int d = 0; d < 3; d++)
+            hits->p[d][kept] = hits->p[d][i];
+        hits->id[kept] = hits->id[i];
+        hits->t[kept++] = hits->t[i];
+    }
+    hits->count = hits->placed = kept;
+}
+
+/* The points of a brick in the ball, one bit each: all are looked at, without
+ * a branch on where they are. */
+INCODE_INLINE uint64_t in_ball(const struct ball *ball,
+                               const struct incode_frame *frame)
+{
+    const struct incode_brick *b = &frame->page.brick;
+    const double *const axis[3] = {b->x, b->y, b->z};
+    incode_vd scale = incode_vd_all(ball->scale);
+    incode_vd limit = incode_vd_all(ball->square);
+    uint64_t out = 0;
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES) {
+        incode_vd square = incode_vd_all(0);
+        for (int d = 0; d < 3; d++) {
+            incode_vd gap = incode_vd_fma(incode_vd_load(axis[d] + i), scale,
+                                          incode_vd_all(-ball->centre[d]));
+            square = incode_vd_fma(gap, gap, square);
+        }
+        out |= (uint64_t)incode_vdm_bits(incode_vd_less(limit, square)) << i;
+    }
+    uint64_t all = frame->count < INCODE_BRICK_POINTS
+                       ? (UINT64_C(1) << frame->count) - 1
+                       : UINT64_MAX;
+    return all & ~out;
+}
+
+/* The bit of a vertex in its brick, 0 in others. */
+static uint64_t bit_of(uint32_t id, uint32_t brick)
+{
+    return (uint64_t)(id / INCODE_BRICK_POINTS == brick)
+           << id % INCODE_BRICK_POINTS;
+}
+
+/* false: there are too many. */
+static bool add_hits(struct incode_make *n, struct incode_query *q,
+                     const struct incode_frame *frame, uint64_t in,
+                     struct hits *hits)
+{
+    const struct incode_brick *b = &frame->page.brick;
+    for (; in != 0; in &= in - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctzll(in);
+        if (hits->count == HITS) {
+            place(q, &n->pencil, hits);
+            thin_out(q, &n->pencil, hits);
+            if (hits->count == HITS)
+                return false;
+        }
+        uint32_t i = hits->count++;
+        hits->p[0][i] = b->x[slot];
+        hits->p[1][i] = b->y[slot];
+        hits->p[2][i] = b->z[slot];
+        hits->id[i] = frame->number * INCODE_BRICK_POINTS + slot;
+    }
+    return true;
+}
+
+/* Looks at some bricks.  False: one is missing, or too much lies in the ball.
+ */
+static bool look_at(struct incode_make *n, struct incode_query *q,
+                    const uint32_t *brick, uint32_t count, struct hits *hits)
+{
+    const struct incode_frame *frame[BATCH];
+    uint64_t in[BATCH];
+    struct ball ball;
+    if (!set_ball(&ball, q))
+        return false;
+    n->t->stats.candidates += (uint64_t)count * INCODE_BRICK_POINTS;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t b = brick[i];
+        frame[i] = incode_pager_get(&n->t->pager, b);
+        if (frame[i] == NULL)
+            return false;
+        in[i] =
+            in_ball(&ball, frame[i]) & ~(bit_of(q->v, b) | bit_of(q->b, b) |
+                                         bit_of(q->c, b) | bit_of(q->best, b));
+    }
+    for (uint32_t i = 0; i < count; i++)
+        if (in[i] != 0 && !add_hits(n, q, frame[i], in[i], hits))
+            return false;
+    place(q, &n->pencil, hits);
+    return true;
+}
+
+/* Looks at the bricks of the list that meet the ball.  Of many, those beside
+ * the vertex's own, by number, are near and go first: where they draw the ball
+ * in, the rest are chosen again. */
+static bool look_around(struct incode_make *n, struct incode_query *q,
+                        struct hits *hits)
+{
+    const struct incode_vicinity *list = &n->t->vicinity;
+    uint32_t brick[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING];
+    uint32_t count = incode_vicinity_in_ball(list, q, brick);
+    while (count > BATCH) {
+        double square = q->square;
+        uint32_t first = 0;
+        while (first + BATCH < count && brick[first + BATCH / 2] < list->centre)
+            first++;
+        hits->count = hits->placed = 0;
+        if (!look_at(n, q, brick + first, BATCH, hits))
+            return false;
+        if (q->square > 0.7 * square) {
+            memmove(brick + first, brick + first + BATCH,
+                    (count - first - BATCH) * sizeof brick[0]);
+            count -= BATCH;
+            break;
+        }
+        hits->count = hits->placed = 0;
+        count = incode_vicinity_in_ball(list, q, brick);
+    }
+    for (uint32_t i = 0; i < count; i += BATCH) {
+        uint32_t left = count - i;
+        if (!look_at(n, q, brick + i, left < BATCH ? left : BATCH, hits))
+            return false;
+    }
+    return true;
+}
+
+/* The first of the hits and of the best so far, at t; false: it is not clearly
+ * beyond the face. */
+static bool settle(struct incode_make *n, struct incode_query *q, double t,
+                   const struct hits *hits)
+{
+    struct incode_tally *tally = &n->t->stats.tally;
+    double last = incode_pencil_later(&n->pencil, q->t);
+    bool placed = t <= last, any = placed;
+    for (uint32_t i = 0; i < hits->count; i++) {
+        const double p[3] = {hits->p[0][i], hits->p[1][i], hits->p[2][i]};
+        bool beyond = hits->t[i] < __builtin_inf();
+        if (!contends(q, hits, i, last) ||
+            (!beyond && incode_orient3d(tally, n->pv, n->pb, n->pc, p) <= 0) ||
+            (any &&
+             incode_in_sphere(tally, n->pv, n->pb, n->pc, q->best_p, p) <= 0))
+            continue;
+        any = true;
+        placed = beyond;
+        q->best = hits->id[i];
+        memcpy(q->best_p, p, sizeof q->best_p);
+    }
+    return placed;
+}
+
+static void set_query(struct incode_make *n, struct incode_query *q)
+{
+    const struct incode_gather *g = &n->t->gather;
     memcpy(q->pv, n->pv, sizeof q->pv);
     q->question = INCODE_QUERY_APEX;
     q->v = g->vertex;
@@ -139,33 +391,38 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     q->pages_max = 0;
     memcpy(q->sphere.n, n->sphere.n, sizeof q->sphere.n);
     memcpy(q->sphere.pn, n->sphere.pn, sizeof q->sphere.pn);
-    q->sphere.has_apex = false;
-    hits.pencil = &n->pencil;
-    hits.count = 0;
-    hits.full = false;
-    hits.thinned = q->t = __builtin_inf();
-    s->radius = g->radius > 0x1p-1022 ? g->radius : 0x1p-1022;
-    if (n->best != INCODE_GATHER_NONE) {
-        add_best(n, q, &hits);
-        memcpy(q->done_lo, g->lo, sizeof g->lo);
-        memcpy(q->done_hi, g->hi, sizeof g->hi);
-    } else {
-        if (find_first(t, s, incode_visit_pencil, &hits) != INCODE_WALK_DONE)
+    q->sphere.has_apex = q->large = false;
+    q->t = __builtin_inf();
+}
+
+static bool search_pencil(struct incode_make *n, struct incode_search *s)
+{
+    struct incode_triangulator *t = n->t;
+    struct incode_query *q = &s->query;
+    struct hits hits;
+    alignas(64) double wall[8];
+    double at = __builtin_inf();
+    set_query(n, q);
+    if (n->best == INCODE_GATHER_NONE) {
+        double radius = t->gather.radius;
+        s->radius = radius > DBL_MIN ? radius : DBL_MIN;
+        if (find_first(t, s, visit_first, &n->pencil) != INCODE_WALK_DONE)
             return false;
-        hits.count = 0;
-        hits.full = false;
-        hits.thinned = __builtin_inf();
-        q->t = incode_pencil_later(&n->pencil, q->t);
+        draw_in(q, &n->pencil, incode_pencil_later(&n->pencil, q->t));
+    } else {
+        double r[3];
+        for (int d = 0; d < 3; d++)
+            q->best_p[d] = t->gather.p[d][n->best];
+        q->best = t->gather.id[n->best];
+        incode_query_relative(r, q, q->best_p);
+        if (!incode_pencil_place(&n->pencil, r, &at))
+            return false; /* too flat */
+        draw_in(q, &n->pencil, at);
     }
-    if (!q->round) /* the best is too flat */
+    hits.count = hits.placed = 0;
+    if (!look_around(n, q, &hits) || !settle(n, q, at, &hits))
         return false;
-    q->boxed = false;
-    q->done = n->best != INCODE_GATHER_NONE;
-    if (incode_vicinity_visit(list, &t->walker, q, incode_visit_pencil,
-                              &hits) != INCODE_WALK_DONE ||
-        hits.full || !settle(n, q, &hits))
-        return false;
-    set_walls(wall, list, q->pv, q->scale);
+    set_walls(wall, &t->vicinity, q->pv, q->scale);
     return incode_cap_fits(wall, &n->pencil,
                            incode_pencil_later(&n->pencil, q->t));
 }

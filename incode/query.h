@@ -78,23 +78,6 @@ static inline void incode_query_relative(double out[3],
         out[d] = (p[d] - q->pv[d]) * q->scale;
 }
 
-/* Candidates for the apex of a regular face, by their place in its pencil. */
-struct incode_hit {
-    uint32_t id;
-    bool placed; /* clearly beyond the face */
-    double t, p[3];
-};
-
-enum { INCODE_HITS = 48 };
-
-struct incode_hits {
-    const struct incode_pencil *pencil;
-    struct incode_hit hit[INCODE_HITS];
-    uint32_t count;
-    bool full;      /* some are missing */
-    double thinned; /* the query's t when those out of the ball last went */
-};
-
 /* What a walk runs on. */
 struct incode_walker {
     struct incode_pager *pager;
@@ -155,18 +138,6 @@ uint32_t incode_query_lanes(const struct incode_query *q,
 
 /* Visits the points of the leaves for all but BOX. */
 incode_visit incode_visit_points;
-
-/* Whether a point lies in the ball. */
-bool incode_query_holds(const struct incode_query *q, const double p[3]);
-
-/* Adds a candidate, and draws the ball in to its sphere if it is clearly beyond
- * the face and the first in the pencil so far. */
-void incode_hit_add(struct incode_query *q, struct incode_hits *hits,
-                    uint32_t id, const double p[3]);
-
-/* Adds the points of the leaves (context: struct incode_hits) that lie in the
- * ball; while there is none, only points clearly beyond the face. */
-incode_visit incode_visit_pencil;
 
 /* 2^k with k such that 2^k * extent is about 1; exact, never 0 or infinite. */
 double incode_scale_for(double extent);

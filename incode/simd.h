@@ -102,6 +102,13 @@ INCODE_INLINE incode_vi incode_vi_count(void)
     return incode_vi_load(count);
 }
 
+INCODE_INLINE incode_vd incode_vd_count(void)
+{
+    static const double count[8]
+        __attribute__((aligned(64))) = {0, 1, 2, 3, 4, 5, 6, 7};
+    return incode_vd_load(count);
+}
+
 /* ---- masks ---- */
 
 /* One bit a lane, from a comparison's result (0 or -1 a lane). */
@@ -137,8 +144,10 @@ INCODE_INLINE uint32_t incode_vf_mask(incode_vi m)
 /* Masks of lanes as the processor likes them: bits, or lanes of 0 and -1. */
 #ifdef INCODE_AVX512
 typedef __mmask16 incode_vm;
+typedef __mmask8 incode_vdm;
 #else
 typedef incode_vi incode_vm;
+typedef incode_vl incode_vdm;
 #endif
 
 INCODE_INLINE incode_vm incode_vf_less(incode_vf a, incode_vf b)
@@ -147,6 +156,24 @@ INCODE_INLINE incode_vm incode_vf_less(incode_vf a, incode_vf b)
     return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ);
 #else
     return a < b;
+#endif
+}
+
+INCODE_INLINE incode_vdm incode_vd_less(incode_vd a, incode_vd b)
+{
+#ifdef INCODE_AVX512
+    return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
+#else
+    return a < b;
+#endif
+}
+
+INCODE_INLINE uint32_t incode_vdm_bits(incode_vdm m)
+{
+#ifdef INCODE_AVX512
+    return m;
+#else
+    return incode_vd_mask(m);
 #endif
 }
 
@@ -255,6 +282,18 @@ INCODE_INLINE float incode_vf_least_of(incode_vf a)
 #endif
 }
 
+INCODE_INLINE double incode_vd_least_of(incode_vd a)
+{
+#ifdef INCODE_AVX512
+    return _mm512_reduce_min_pd((__m512d)a);
+#else
+    double least = a[0];
+    for (int i = 1; i < INCODE_VD_LANES; i++)
+        least = a[i] < least ? a[i] : least;
+    return least;
+#endif
+}
+
 INCODE_INLINE incode_vf incode_vf_abs(incode_vf a)
 {
     return (incode_vf)((incode_vi)a & incode_vi_all(INT32_MAX));
@@ -284,6 +323,19 @@ INCODE_INLINE incode_vf incode_vf_fma(incode_vf a, incode_vf b, incode_vf c)
     return (incode_vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
 #elif defined(INCODE_NEON)
     return (incode_vf)vfmaq_f32((float32x4_t)c, (float32x4_t)a, (float32x4_t)b);
+#else
+    return a * b + c;
+#endif
+}
+
+INCODE_INLINE incode_vd incode_vd_fma(incode_vd a, incode_vd b, incode_vd c)
+{
+#if defined(INCODE_AVX512)
+    return (incode_vd)_mm512_fmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
+#elif defined(INCODE_AVX2)
+    return (incode_vd)_mm256_fmadd_pd((__m256d)a, (__m256d)b, (__m256d)c);
+#elif defined(INCODE_NEON)
+    return (incode_vd)vfmaq_f64((float64x2_t)c, (float64x2_t)a, (float64x2_t)b);
 #else
     return a * b + c;
 #endif

@@ -126,10 +126,10 @@ static void in_box(const struct incode_vicinity *v,
 static void in_ball(const struct incode_vicinity *v,
                     const struct incode_query *q, struct chosen *chosen)
 {
+    const float *corner[3]; /* the farthest beyond the face */
     incode_vf c[3], n[3], zero = incode_vf_all(0);
     double ratio = v->scale / q->scale, most = 1, level = 0;
     double extent = incode_max_norm(q->sphere.n);
-    double radius = __builtin_sqrt(q->square) * ratio;
     for (int d = 0; d < 3; d++) {
         double at = (q->pv[d] - v->origin[d]) * v->scale;
         double centre = at + q->centre[d] * ratio;
@@ -138,10 +138,13 @@ static void in_ball(const struct incode_vicinity *v,
         most = far > most ? far : most;
         c[d] = all_of(centre);
         n[d] = all_of(normal);
+        corner[d] = normal > 0 ? v->hi[d] : v->lo[d];
         level += normal * at;
     }
-    radius += (radius + most) * OUTWARD;
-    incode_vf square = all_of(radius * radius * (1 + 0x1p-18));
+    /* (r + e)^2 <= (1 + d) r^2 + (1 + 1 / d) e^2, where d is 2^-12. */
+    double error = most * (OUTWARD * 65);
+    incode_vf square =
+        all_of(q->square * ratio * ratio * (1 + 0x1p-11) + error * error);
     incode_vf floor = all_of(level - 0x1p-17);
     for (uint32_t i = 0; i < v->count; i += INCODE_VF_LANES) {
         incode_vf sum = zero, top = zero;
@@ -151,13 +154,31 @@ static void in_ball(const struct incode_vicinity *v,
             incode_vf gap =
                 incode_vf_max(incode_vf_max(lo - c[d], c[d] - hi), zero);
             sum = incode_vf_fma(gap, gap, sum);
-            top += incode_vf_max(n[d] * lo, n[d] * hi);
+            top = incode_vf_fma(n[d], incode_vf_load(corner[d] + i), top);
         }
         note(chosen, i,
              ~incode_vm_bits(incode_vf_less(square, sum) |
                              incode_vf_less(top, floor)) &
                  INCODE_VF_ALL);
     }
+}
+
+uint32_t incode_vicinity_in_ball(
+    const struct incode_vicinity *v, const struct incode_query *q,
+    uint32_t brick[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING])
+{
+    struct chosen chosen;
+    uint32_t count = 0;
+    in_ball(v, q, &chosen);
+    for (uint32_t i = 0; i < v->count; i += INCODE_VF_LANES) {
+        uint32_t in =
+            (uint32_t)(chosen.word[i / 64] >> (i % 64)) & INCODE_VF_ALL;
+        if (v->count - i < INCODE_VF_LANES)
+            in &= (UINT32_C(1) << (v->count - i)) - 1;
+        incode_vi_pack(brick + count, in, incode_vi_load(v->brick + i));
+        count += (uint32_t)__builtin_popcount(in);
+    }
+    return count;
 }
 
 /* The next chosen brick from i on, taken out; count where there is none. */

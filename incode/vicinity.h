@@ -16,13 +16,13 @@
 
 #include "query.h"
 
-enum { INCODE_VICINITY_BRICKS = 192 };
+enum { INCODE_VICINITY_BRICKS = 192, INCODE_VICINITY_PADDING = 16 };
 
 struct incode_vicinity {
     /* Relative to origin and scaled, rounded outward. */
     alignas(64) float lo[3][INCODE_VICINITY_BRICKS];
     alignas(64) float hi[3][INCODE_VICINITY_BRICKS];
-    uint32_t brick[INCODE_VICINITY_BRICKS];
+    alignas(64) uint32_t brick[INCODE_VICINITY_BRICKS];
     uint32_t count;
     uint32_t centre; /* brick, or INCODE_NONE */
     uint32_t self;   /* its index, where it is in the list */
@@ -49,6 +49,13 @@ enum incode_walk incode_vicinity_visit(const struct incode_vicinity *vicinity,
                                        struct incode_walker *walker,
                                        struct incode_query *q,
                                        incode_visit *visit, void *context);
+
+/* Bricks of the list that meet the ball of a round query and are not certainly
+ * on the known side of its face; returns how many.  Room for a vector more is
+ * needed. */
+uint32_t incode_vicinity_in_ball(
+    const struct incode_vicinity *vicinity, const struct incode_query *q,
+    uint32_t brick[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING]);
 
 /* Whether a box lies in that of the list. */
 static inline bool incode_vicinity_holds(const struct incode_vicinity *vicinity,
