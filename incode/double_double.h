@@ -43,7 +43,8 @@ static inline struct incode_dd incode_dd_times(struct incode_dd a,
 {
     struct incode_dd r;
     double e, x = incode_two_product(a.hi, b.hi, &e);
-    r.hi = incode_fast_two_sum(x, e + (a.hi * b.lo + a.lo * b.hi), &r.lo);
+    e = incode_multiply_add(a.lo, b.hi, e);
+    r.hi = incode_fast_two_sum(x, incode_multiply_add(a.hi, b.lo, e), &r.lo);
     return r;
 }
 
@@ -52,7 +53,8 @@ static inline double incode_dd_product(struct incode_dd a, struct incode_dd b,
                                        double *rest)
 {
     double e, p = incode_two_product(a.hi, b.hi, &e);
-    *rest = e + (a.hi * b.lo + a.lo * b.hi);
+    e = incode_multiply_add(a.lo, b.hi, e);
+    *rest = incode_multiply_add(a.hi, b.lo, e);
     return p;
 }
 

@@ -66,8 +66,9 @@ static void set_face(struct face *f, const double v[3], const double pb[3],
     f->numerator[1] = FINE * area * area;
 }
 
-/* Places of a vector of candidates in the pencil: hi + lo, and its error; 0 for
- * one that is certainly not beyond the face, infinite for one in doubt. */
+/* Places of a vector of candidates in the pencil: hi + lo, and its error,
+ * infinite for one in doubt about the face; hi is infinite for one that is not
+ * beyond it. */
 struct places {
     alignas(64) double hi[INCODE_FINALISTS];
     alignas(64) double lo[INCODE_FINALISTS];
@@ -102,12 +103,15 @@ INCODE_INLINE void place(struct places *out, uint32_t i, const struct face *f,
         ((power.hi - back) - rest + power.lo - hi * above.lo) / above.hi;
     error = (error + incode_vd_abs(hi) * level) / above.hi +
             incode_vd_abs(hi) * incode_vd_all(FINE);
-    error = incode_vd_select(above.hi > level + level, error,
-                             incode_vd_all(__builtin_inf()));
-    error = incode_vd_select(above.hi < -level, incode_vd_all(0), error);
-    *(incode_vd *)(out->hi + i) = hi;
-    *(incode_vd *)(out->lo + i) = lo;
-    *(incode_vd *)(out->error + i) = error;
+    incode_vd zero = incode_vd_all(0),
+              infinite = incode_vd_all(__builtin_inf());
+    incode_vl none =
+        (above.hi < -level) |
+        (incode_vd_all(i) + incode_vd_count() >= incode_vd_all(finals->count));
+    error = incode_vd_select(above.hi > level + level, error, infinite);
+    *(incode_vd *)(out->hi + i) = incode_vd_select(none, infinite, hi);
+    *(incode_vd *)(out->lo + i) = incode_vd_select(none, zero, lo);
+    *(incode_vd *)(out->error + i) = incode_vd_select(none, zero, error);
 }
 
 static bool is_beyond(const struct incode_finals *f, uint32_t i,
@@ -118,15 +122,45 @@ static bool is_beyond(const struct incode_finals *f, uint32_t i,
     return incode_orient3d(tally, v, b, c, p) > 0;
 }
 
+/* The first of them, if it is certain, without a branch on which it is. */
+static uint32_t first_of(const struct places *at, uint32_t count)
+{
+    incode_vd infinite = incode_vd_all(__builtin_inf()), least = infinite;
+    alignas(64) double gap[INCODE_FINALISTS];
+    uint32_t best = 0, near = 0;
+    for (uint32_t i = 0; i < count; i += INCODE_VD_LANES)
+        least = incode_vd_min(incode_vd_load(at->hi + i), least);
+    incode_vd hi = incode_vd_all(incode_vd_least_of(least));
+    least = infinite;
+    for (uint32_t i = 0; i < count; i += INCODE_VD_LANES) {
+        incode_vd g =
+            (incode_vd_load(at->hi + i) - hi) + incode_vd_load(at->lo + i);
+        *(incode_vd *)(gap + i) = g;
+        least = incode_vd_min(g, least);
+    }
+    incode_vd first = incode_vd_all(incode_vd_least_of(least));
+    for (uint32_t i = 0; i < count; i += INCODE_VD_LANES)
+        best |= incode_vd_mask(incode_vd_load(gap + i) == first) << i;
+    if (best == 0)
+        return INCODE_FINALS_NONE;
+    best = (uint32_t)__builtin_ctz(best);
+    incode_vd error = incode_vd_all(at->error[best]);
+    for (uint32_t i = 0; i < count; i += INCODE_VD_LANES) {
+        incode_vd sum = incode_vd_load(at->error + i) + error;
+        incode_vl far = incode_vd_load(gap + i) - first > sum + sum;
+        near |= (~incode_vd_mask(far) & INCODE_VD_ALL) << i;
+    }
+    return (near & (near - 1)) == 0 ? best : INCODE_FINALS_NONE;
+}
+
 uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
                              const double b[3], const double c[3], double scale,
                              struct incode_tally *tally)
 {
     struct face face;
     struct places at = {{0}, {0}, {0}};
-    uint32_t best = INCODE_FINALS_NONE;
     if (f->count == 0)
-        return best;
+        return INCODE_FINALS_NONE;
     set_face(&face, v, b, c, scale);
     for (uint32_t i = f->count; i % INCODE_VD_LANES != 0; i++)
         for (int d = 0; d < 3; d++)
@@ -134,18 +168,12 @@ uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
     for (uint32_t i = 0; i < f->count; i += INCODE_VD_LANES)
         place(&at, i, &face, f, v, scale);
     for (uint32_t i = 0; i < f->count; i++) {
-        if (at.error[i] > DBL_MAX && !is_beyond(f, i, v, b, c, tally))
-            at.error[i] = 0;
-        if (at.error[i] != 0 &&
-            (best == INCODE_FINALS_NONE ||
-             (at.hi[i] - at.hi[best]) + (at.lo[i] - at.lo[best]) < 0))
-            best = i;
+        if (!(at.error[i] > DBL_MAX))
+            continue;
+        if (is_beyond(f, i, v, b, c, tally))
+            return INCODE_FINALS_NONE;
+        at.hi[i] = __builtin_inf();
+        at.lo[i] = at.error[i] = 0;
     }
-    for (uint32_t i = 0; i < f->count && best != INCODE_FINALS_NONE; i++) {
-        double gap = (at.hi[i] - at.hi[best]) + (at.lo[i] - at.lo[best]);
-        if (i != best && at.error[i] != 0 &&
-            !(gap > 2 * (at.error[i] + at.error[best])))
-            best = INCODE_FINALS_NONE;
-    }
-    return best;
+    return first_of(&at, f->count);
 }

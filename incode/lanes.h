@@ -59,7 +59,8 @@ INCODE_INLINE struct incode_lanes incode_lanes_times(struct incode_lanes a,
 {
     struct incode_lanes r;
     incode_vd e, p = incode_vd_two_product(a.hi, b.hi, &e);
-    r.hi = incode_lanes_fast_two_sum(p, e + (a.hi * b.lo + a.lo * b.hi), &r.lo);
+    e = incode_vd_fma(a.lo, b.hi, e);
+    r.hi = incode_lanes_fast_two_sum(p, incode_vd_fma(a.hi, b.lo, e), &r.lo);
     return r;
 }
 
@@ -68,7 +69,8 @@ INCODE_INLINE incode_vd incode_lanes_product(struct incode_lanes a,
                                              incode_vd *rest)
 {
     incode_vd e, p = incode_vd_two_product(a.hi, b.hi, &e);
-    *rest = e + (a.hi * b.lo + a.lo * b.hi);
+    e = incode_vd_fma(a.lo, b.hi, e);
+    *rest = incode_vd_fma(a.hi, b.lo, e);
     return p;
 }
 

@@ -62,4 +62,15 @@ static inline double incode_two_product(double a, double b, double *error)
 #endif
 }
 
+/* About a b + c, rounded once or twice: for terms that an error bound covers.
+ */
+static inline double incode_multiply_add(double a, double b, double c)
+{
+#if INCODE_HAS_FMA
+    return __builtin_fma(a, b, c);
+#else
+    return a * b + c;
+#endif
+}
+
 #endif
