@@ -127,8 +127,8 @@ static bool set_ball(struct ball *ball, const struct incode_query *q)
     for (int d = 0; d < 3; d++)
         ball->centre[d] = q->pv[d] * q->scale + q->centre[d];
     /* (r + e)^2 <= (1 + d) r^2 + (1 + 1 / d) e^2 */
-    double error = 1e-12 * incode_max_norm(ball->centre);
-    ball->square = (1 + 1e-6) * q->square + error * error;
+    double error = 6.4e-14 * incode_max_norm(ball->centre); /* d is 1e-4 */
+    ball->square = (1 + 1e-4) * q->square + error * error;
     return ball->square < 1e300;
 }
 
@@ -144,7 +144,8 @@ INCODE_INLINE incode_vd places(const struct incode_query *q,
                                const struct incode_pencil *pencil,
                                const double *const xyz[3], uint32_t i)
 {
-    incode_vd r[3], far = incode_vd_all(0), square = far;
+    incode_vd r[3], square = incode_vd_all(0);
+    incode_vd far = incode_vd_all(INCODE_PENCIL_LEAST);
     for (int d = 0; d < 3; d++) {
         /* Scaled first: a difference of large numbers could overflow. */
         r[d] = incode_vd_load(xyz[d] + i) * incode_vd_all(q->scale) -
@@ -352,8 +353,9 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
     return true;
 }
 
-/* The first of the hits and of the best so far, at t; false: it is not clearly
- * beyond the face. */
+/* The first of the hits and of the best so far, at t, which does not count if a
+ * hit's place is certainly before; false: it is not clearly beyond the face.
+ */
 static bool settle(struct incode_make *n, struct incode_query *q, double t,
                    const struct hits *hits)
 {

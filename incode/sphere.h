@@ -70,13 +70,17 @@ static inline double incode_dd_max_norm(const struct incode_dd a[3])
     return incode_max_norm(hi);
 }
 
+/* Of a nearer point, underflow may have left no direction. */
+#define INCODE_PENCIL_LEAST 1e-240
+
 /* Where in the pencil a point lies; false: it is not clearly beyond the face.
  */
 static inline bool incode_pencil_place(const struct incode_pencil *pencil,
                                        const double r[3], double *t)
 {
-    double beyond = incode_dot(pencil->n, r);
-    if (!(beyond > 2e-3 * incode_max_norm(r)))
+    double beyond = incode_dot(pencil->n, r), far = incode_max_norm(r);
+    if (!(beyond >
+          2e-3 * (far > INCODE_PENCIL_LEAST ? far : INCODE_PENCIL_LEAST)))
         return false;
     *t = (incode_dot(r, r) - 2 * incode_dot(pencil->c0, r)) / beyond;
     return true;
