@@ -328,12 +328,12 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
     const struct incode_vicinity *list = &n->t->vicinity;
     uint32_t brick[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING];
     uint32_t count = incode_vicinity_in_ball(list, q, brick);
+    hits->count = hits->placed = 0;
     while (count > BATCH) {
         double square = q->square;
         uint32_t first = 0;
         while (first + BATCH < count && brick[first + BATCH / 2] < list->centre)
             first++;
-        hits->count = hits->placed = 0;
         if (!look_at(n, q, brick + first, BATCH, hits))
             return false;
         if (q->square > 0.7 * square) {
@@ -421,7 +421,6 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
             return false; /* too flat */
         draw_in(q, &n->pencil, at);
     }
-    hits.count = hits.placed = 0;
     if (!look_around(n, q, &hits) || !settle(n, q, at, &hits))
         return false;
     set_walls(wall, &t->vicinity, q->pv, q->scale);
