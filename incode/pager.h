@@ -21,7 +21,6 @@
 #include "pages.h"
 
 enum incode_frame_state {
-    INCODE_FRAME_FREE,
     INCODE_FRAME_LOADING, /* reserved, the page is on its way */
     INCODE_FRAME_HELD,    /* arrived, kept back by the test's shuffle */
     INCODE_FRAME_READY
