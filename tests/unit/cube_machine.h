@@ -154,8 +154,11 @@ static inline unsigned content(const struct machine *m, uint8_t *bytes,
 {
     uint32_t h = (number + 1) * 2654435761u ^ from * 40503u;
     unsigned size = h >> 8 & 1 ? m->size_max : 5 + h % (m->size_max - 4);
-    for (unsigned i = 0; i < size; i++) {
-        bytes[i] = (uint8_t)(h >> i % 25);
+    for (unsigned i = 0; i < size && i < 25; i++) {
+        bytes[i] = (uint8_t)(h >> i);
+    }
+    for (unsigned i = 25; i < size; i += 25) {
+        memcpy(bytes + i, bytes, size - i < 25 ? size - i : 25);
     }
     for (unsigned i = 0; i < 4; i++) {
         bytes[i] = (uint8_t)(number >> 8 * i);

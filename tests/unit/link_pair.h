@@ -65,9 +65,12 @@ static inline void fill(uint8_t *bytes, size_t size, unsigned who,
                         uint32_t number)
 {
     uint32_t m = mix(number * 2 + who);
-    for (size_t i = 0; i < size; i++) {
-        uint8_t byte = (uint8_t)((m >> i % 24) + i * (m & 7));
-        bytes[i] = m % 3 == 0 && i % (1 + m % 9) == 0 ? 0 : byte;
+    for (size_t i = 0, shift = 0; i < size; i++) {
+        bytes[i] = (uint8_t)((m >> shift) + i * (m & 7));
+        shift = shift < 23 ? shift + 1 : 0;
+    }
+    for (size_t i = 0; m % 3 == 0 && i < size; i += 1 + m % 9) {
+        bytes[i] = 0;
     }
     for (size_t i = 0; i < 4 && i < size; i++) {
         bytes[i] = (uint8_t)(number >> 8 * i);
@@ -115,11 +118,13 @@ static inline void free_pair(struct pair *p)
 
 static inline void write_some(struct end *end, unsigned who)
 {
-    uint8_t bytes[LINK_MESSAGE_MAX];
+    uint8_t bytes[LINK_MESSAGE_MAX] = {0};
     while (end->written < end->most) {
         size_t size = size_of(end, who, end->written), head = size % 9;
-        fill(bytes, size, who, end->written);
         unsigned room = link_room(end->link, size);
+        if (room > 0) {
+            fill(bytes, size, who, end->written);
+        }
         int status =
             link_write(end->link, bytes, head, bytes + head, size - head);
         assert_int_equal(status, room > 0 ? 0 : LINK_AGAIN);
