@@ -73,6 +73,13 @@ static bool reap(struct host_process *process, int flags)
     return true;
 }
 
+bool host_child_any_died(void)
+{
+    siginfo_t who = {0};
+    return waitid(P_ALL, 0, &who, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+           who.si_pid != 0;
+}
+
 bool host_child_died(struct host_process *process)
 {
     return reap(process, WNOHANG);

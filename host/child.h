@@ -44,6 +44,9 @@ struct host_child {
 int host_child_start(struct host_process *process,
                      const struct host_child *child, struct host_error *error);
 
+/* Whether any child has ended that nobody has asked for. */
+bool host_child_any_died(void);
+
 /* Whether it ran and has ended. */
 bool host_child_died(struct host_process *process);
 

@@ -181,6 +181,9 @@ int host_cluster_start(struct host_cluster *cluster,
 
 int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
 {
+    if (!host_child_any_died()) {
+        return 0;
+    }
     for (unsigned i = 0; i < cluster->nodes; i++) {
         struct host_process *process = &cluster->process[i];
         unsigned link = host_link_to(i, 0, cluster->dimension);

@@ -118,6 +118,9 @@ static void machine_idle(void *context, uint64_t wait_us)
 static int machine_check(void *context, struct host_error *error)
 {
     struct host_remote *r = context;
+    if (!host_child_any_died()) {
+        return 0;
+    }
     for (unsigned i = 0; i < r->file->nodes; i++) {
         unsigned link = host_link_to(i, 0, r->file->dimension);
         if (!host_child_died(&r->process[i])) {

@@ -147,18 +147,33 @@ static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds)
     return fds->events != 0 ? 1 : 0;
 }
 
+static void hear(struct linux_wire *wire, const struct pollfd *fds,
+                 unsigned count)
+{
+    if (wire->kind == LINUX_NET) {
+        tcp_wire_heard(wire->net, fds, count);
+    } else if (wire->kind == LINUX_SOCKET && count > 0) {
+        tcp_heard(&wire->tcp, fds->revents);
+    }
+}
+
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
                       uint64_t wait_us, uint64_t watch_us)
 {
     struct pollfd fds[CUBE_LINKS_MAX * TCP_WIRE_FDS_MAX];
-    nfds_t used = 0;
+    unsigned first[CUBE_LINKS_MAX + 1], used = 0;
     for (unsigned i = 0; i < count; i++) {
         const struct linux_wire *wire = &wires[i];
         if (wire->kind == LINUX_TERMINAL &&
             serial_wait_us(&wire->line) < wait_us) {
             wait_us = serial_wait_us(&wire->line);
         }
+        first[i] = used;
         used += add_events(wire, fds + used);
     }
+    first[count] = used;
     wait_files(fds, used, wait_us, watch_us);
+    for (unsigned i = 0; i < count; i++) {
+        hear(&wires[i], fds + first[i], first[i + 1] - first[i]);
+    }
 }

@@ -159,11 +159,41 @@ static void a_link_over_tcp(void **unused)
     }
 }
 
+/* What poll has found spares one call, and no more: bytes and an end that come
+ * after it are not missed. */
+static void what_was_heard_spares_one_call(void **unused)
+{
+    uint8_t byte = 0;
+    int fds[2];
+    struct tcp_pipe pipe;
+    (void)unused;
+    assert_int_equal(tcp_pair(fds), 0);
+    tcp_pipe_init(&pipe, fds[1]);
+    struct link_pipe to = tcp_link_pipe(&pipe);
+    struct pollfd wait = {fds[1], tcp_events(&pipe), 0};
+    assert_int_equal(poll(&wait, 1, 0), 0);
+    tcp_heard(&pipe, wait.revents);
+    assert_int_equal(write(fds[0], "x", 1), 1);
+    assert_int_equal(poll(&wait, 1, 1000), 1);
+    assert_int_equal(to.receive(to.context, &byte, 1), 0);
+    assert_int_equal(to.receive(to.context, &byte, 1), 1);
+    assert_int_equal(byte, 'x');
+    close(fds[0]);
+    wait.revents = 0;
+    assert_int_equal(poll(&wait, 1, 1000), 1);
+    tcp_heard(&pipe, wait.revents);
+    assert_int_equal(to.receive(to.context, &byte, 1), LINK_PIPE_CLOSED);
+    tcp_heard(&pipe, 0);
+    assert_int_equal(to.receive(to.context, &byte, 1), LINK_PIPE_CLOSED);
+    close(fds[1]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_pair_is_connected_and_set_up),
         cmocka_unit_test(a_pipe_tells_room_and_end),
+        cmocka_unit_test(what_was_heard_spares_one_call),
         cmocka_unit_test(a_link_over_tcp),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -44,7 +44,9 @@ static int tcp_receive(void *context, uint8_t *bytes, size_t size)
     if (pipe->closed) {
         return LINK_PIPE_CLOSED;
     }
-    if (size == 0) {
+    bool quiet = pipe->quiet;
+    pipe->quiet = false;
+    if (quiet || size == 0) {
         return 0;
     }
     ssize_t got = recv(pipe->fd, bytes, size, MSG_DONTWAIT);
@@ -57,7 +59,7 @@ static int tcp_receive(void *context, uint8_t *bytes, size_t size)
 
 void tcp_pipe_init(struct tcp_pipe *pipe, int fd)
 {
-    *pipe = (struct tcp_pipe){.fd = fd, .blocked = false, .closed = fd < 0};
+    *pipe = (struct tcp_pipe){.fd = fd, .closed = fd < 0};
 }
 
 struct link_pipe tcp_link_pipe(struct tcp_pipe *pipe)
@@ -71,6 +73,11 @@ short tcp_events(const struct tcp_pipe *pipe)
         return 0;
     }
     return pipe->blocked ? POLLIN | POLLOUT : POLLIN;
+}
+
+void tcp_heard(struct tcp_pipe *pipe, short revents)
+{
+    pipe->quiet = (revents & ~POLLOUT) == 0;
 }
 
 /* --- sockets ------------------------------------------------------------- */

@@ -23,6 +23,7 @@ struct tcp_pipe {
     int fd;       /* connected; -1: none */
     bool blocked; /* had no room for all bytes at the last send */
     bool closed;  /* the other end is gone */
+    bool quiet;   /* nothing had come when it was last waited for */
 };
 
 /* Two connected sockets on 127.0.0.1, without delay, non-blocking, closed on
@@ -42,5 +43,9 @@ struct link_pipe tcp_link_pipe(struct tcp_pipe *pipe);
 /* What to wait for with poll(2): POLLIN, with POLLOUT while bytes wait for
  * room; 0 when the other end is gone. */
 short tcp_events(const struct tcp_pipe *pipe);
+
+/* What poll(2) has found: where nothing has come, the next call to receive need
+ * not ask the system again. */
+void tcp_heard(struct tcp_pipe *pipe, short revents);
 
 #endif

@@ -226,8 +226,12 @@ static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
 static void tick(struct tcp_wire *wire)
 {
     uint64_t now_us = clock_us();
+    bool quiet = wire->quiet;
+    wire->quiet = false;
     if (wire->listener >= 0) {
-        accept_some(wire, now_us);
+        if (!quiet) {
+            accept_some(wire, now_us);
+        }
     } else if (wire->tcp.fd < 0 && wire->candidate[0].fd < 0 &&
                now_us >= wire->call_us) {
         call(wire, now_us);
@@ -366,4 +370,16 @@ unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
         }
     }
     return used;
+}
+
+void tcp_wire_heard(struct tcp_wire *wire, const struct pollfd *fds,
+                    unsigned count)
+{
+    for (unsigned i = 0; i < count; i++) {
+        if (fds[i].fd == wire->tcp.fd) {
+            tcp_heard(&wire->tcp, fds[i].revents);
+        } else if (fds[i].fd == wire->listener) {
+            wire->quiet = fds[i].revents == 0;
+        }
+    }
 }

@@ -16,6 +16,8 @@
  *     if (tcp_wire_open(&wire, &config) != 0) perror("wire");
  *     pipe = tcp_wire_pipe(&wire);
  *     count = tcp_wire_events(&wire, fds);
+ *     poll(fds, count, 100);
+ *     tcp_wire_heard(&wire, fds, count);
  */
 #ifndef TRANSPORT_DRIVERS_TCP_WIRE_H
 #define TRANSPORT_DRIVERS_TCP_WIRE_H
@@ -74,6 +76,7 @@ struct tcp_wire {
     int listener;        /* -1: none */
     struct tcp_pipe tcp; /* the connection; fd -1: none */
     bool replaced;       /* by a newer one: the link hears of a break */
+    bool quiet;          /* nobody called when it was last waited for */
     uint64_t call_us, pause_us;
     struct tcp_candidate candidate[TCP_CANDIDATES_MAX];
     struct secure_channel channel;
@@ -95,5 +98,9 @@ struct link_pipe tcp_wire_pipe(struct tcp_wire *wire);
 /* What to wait for with poll(2): fills fds[TCP_WIRE_FDS_MAX], returns how
  * many. */
 unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds);
+
+/* What poll(2) has found of it, as tcp_heard. */
+void tcp_wire_heard(struct tcp_wire *wire, const struct pollfd *fds,
+                    unsigned count);
 
 #endif
