@@ -257,9 +257,9 @@ INCODE_INLINE incode_vl meets_ball(const struct incode_query *q,
         square += gap * gap;
     }
     /* A difference that overflows tells nothing. */
-    incode_vl far = (square > incode_vd_all(q->square)) &
-                    (square < incode_vd_all(__builtin_inf()));
-    return ~((plane < zero) | far);
+    incode_vd infinite = incode_vd_all(__builtin_inf());
+    incode_vl far = (square > incode_vd_all(q->square)) & (square < infinite);
+    return ~(((plane < zero) & (plane > -infinite)) | far);
 }
 
 INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,

@@ -1,5 +1,6 @@
 #include "vicinity.h"
 
+#include <float.h>
 #include <string.h>
 
 #include "simd.h"
@@ -61,8 +62,11 @@ enum incode_listed incode_vicinity_make(struct incode_vicinity *v,
     v->centre = brick;
     v->self = 0;
     for (int d = 0; d < 3; d++) {
-        double half = hi[d] * 0.5 - lo[d] * 0.5;
-        v->origin[d] = lo[d] * 0.5 + hi[d] * 0.5;
+        /* A box that overflows ends where doubles do. */
+        double from = lo[d] > -DBL_MAX ? lo[d] : -DBL_MAX;
+        double to = hi[d] < DBL_MAX ? hi[d] : DBL_MAX;
+        double half = to * 0.5 - from * 0.5;
+        v->origin[d] = from * 0.5 + to * 0.5;
         extent = half > extent ? half : extent;
         q.lo[d] = lo[d];
         q.hi[d] = hi[d];

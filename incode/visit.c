@@ -80,9 +80,10 @@ INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
         plane += incode_vd_all(q->sphere.n[d]) * p->r[d];
     }
     /* A difference that overflows tells nothing. */
-    incode_vl far = (square > incode_vd_all(q->square)) &
-                    (square < incode_vd_all(__builtin_inf()));
-    return INCODE_VD_ALL & ~incode_vd_mask(far | (plane < incode_vd_all(0)));
+    incode_vd infinite = incode_vd_all(__builtin_inf());
+    incode_vl far = (square > incode_vd_all(q->square)) & (square < infinite);
+    incode_vl below = (plane < incode_vd_all(0)) & (plane > -infinite);
+    return INCODE_VD_ALL & ~incode_vd_mask(far | below);
 }
 
 /* incode_flat_outside for some points, one bit each. */

@@ -1,6 +1,7 @@
 /* The triangulator, with every index, against the digests that came with the
  * data and against a plain reference: regions, partitions, rules, memories,
  * pages that come at random, spilled faces, hubs, extreme coordinates. */
+#include <float.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -159,6 +160,51 @@ static double draw(uint64_t *seed)
 {
     *seed = *seed * UINT64_C(6364136223846793005) + 1442695040888963;
     return (double)(*seed >> 11) * 0x1p-53;
+}
+
+/* One coordinate anywhere among doubles, each kind in its way. */
+static double anywhere(int kind, uint64_t *seed)
+{
+    double x = 2 * draw(seed) - 1;
+    return kind == 0   ? DBL_MAX * (x < 0 ? 0.7 * x - 0.3 : 0.7 * x + 0.3)
+           : kind == 1 ? DBL_MAX * 0.55 * x
+                       : ldexp(floor(7.5 * x + 0.5), 1020);
+}
+
+/* Points over the whole range of doubles, where differences, boxes and their
+ * sums overflow: they lie as the same points a little nearer. */
+static void whole_range(void **unused)
+{
+    (void)unused;
+    uint64_t seed = 5;
+    for (int round = 0; round < (SANITIZED ? 3 : 9); round++) {
+        struct host_points points = {0}, nearer = {0};
+        struct host_error error = {0};
+        struct host_digest digest;
+        int kind = round % 3, count = kind < 2 ? 120 + 15 * round : 500;
+        for (int i = 0; i < count; i++) {
+            double p[3], q[3];
+            for (int d = 0; d < 3; d++) {
+                p[d] = anywhere(kind, &seed);
+                q[d] = ldexp(p[d], -30);
+            }
+            (void)host_points_append(&points, p, 1, &error);
+            (void)host_points_append(&nearer, q, 1, &error);
+        }
+        struct solo right = {.index = INCODE_KD, .regions = 1};
+        solo_run(&right, nearer.xyz, nearer.count);
+        digest = right.digest;
+        solo_close(&right);
+        for (uint32_t k = 0; k < 4; k++) {
+            struct solo s = {.index = INCODE_KD,
+                             .regions = k & 1 ? 2 : 1,
+                             .memory = 4 << 20,
+                             .chance = k & 2 ? k : 0};
+            expect(&s, &points, digest.text, "whole range");
+        }
+        host_points_free(&points);
+        host_points_free(&nearer);
+    }
 }
 
 /* Clusters of sizes that have nothing to do with each other, and points so far
@@ -496,6 +542,7 @@ int main(void)
         cmocka_unit_test(degenerate_sets),
         cmocka_unit_test(scaled_sets),
         cmocka_unit_test(both_ends),
+        cmocka_unit_test(whole_range),
         cmocka_unit_test(mixed_scales),
         cmocka_unit_test(denormal_neighbours),
         cmocka_unit_test(made_sets),
