@@ -97,12 +97,6 @@ struct hits {
     uint32_t placed; /* so many of them, at least, have a place */
 };
 
-/* The ball as the points' own coordinates see it, times scale: it holds p only
- * if |p * scale - centre|^2 <= square. */
-struct ball {
-    double scale, centre[3], square;
-};
-
 /* The ball of the pencil's sphere at t, widened by 1e-6 of its size. */
 static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
                     double t)
@@ -114,22 +108,10 @@ static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
     }
     q->t = t;
     q->square = square * (1 + 4e-6);
-    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 *
-                                              q->sphere.pn[0] *
-                                              __builtin_sqrt(q->square);
+    double far = 2 * pencil->size + __builtin_fabs(t); /* above the radius */
+    q->plane_slack =
+        INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 * q->sphere.pn[0] * far;
     q->round = true;
-}
-
-/* false: its numbers are out of range. */
-static bool set_ball(struct ball *ball, const struct incode_query *q)
-{
-    ball->scale = q->scale; /* a power of two: the sum alone is rounded */
-    for (int d = 0; d < 3; d++)
-        ball->centre[d] = q->pv[d] * q->scale + q->centre[d];
-    /* (r + e)^2 <= (1 + d) r^2 + (1 + 1 / d) e^2 */
-    double error = 6.4e-14 * incode_max_norm(ball->centre); /* d is 1e-4 */
-    ball->square = (1 + 1e-4) * q->square + error * error;
-    return ball->square < 1e300;
 }
 
 INCODE_INLINE incode_vd dot(const double a[3], const incode_vd b[3])
@@ -237,31 +219,6 @@ static void thin_out(const struct incode_query *q,
     hits->count = hits->placed = kept;
 }
 
-/* The points of a brick in the ball, one bit each: all are looked at, without
- * a branch on where they are. */
-INCODE_INLINE uint64_t in_ball(const struct ball *ball,
-                               const struct incode_frame *frame)
-{
-    const struct incode_brick *b = &frame->page.brick;
-    const double *const axis[3] = {b->x, b->y, b->z};
-    incode_vd scale = incode_vd_all(ball->scale);
-    incode_vd limit = incode_vd_all(ball->square);
-    uint64_t out = 0;
-    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES) {
-        incode_vd square = incode_vd_all(0);
-        for (int d = 0; d < 3; d++) {
-            incode_vd gap = incode_vd_fma(incode_vd_load(axis[d] + i), scale,
-                                          incode_vd_all(-ball->centre[d]));
-            square = incode_vd_fma(gap, gap, square);
-        }
-        out |= (uint64_t)incode_vdm_bits(incode_vd_less(limit, square)) << i;
-    }
-    uint64_t all = frame->count < INCODE_BRICK_POINTS
-                       ? (UINT64_C(1) << frame->count) - 1
-                       : UINT64_MAX;
-    return all & ~out;
-}
-
 /* The bit of a vertex in its brick, 0 in others. */
 static uint64_t bit_of(uint32_t id, uint32_t brick)
 {
@@ -292,29 +249,47 @@ static bool add_hits(struct incode_make *n, struct incode_query *q,
     return true;
 }
 
-/* Looks at some bricks.  False: one is missing, or too much lies in the ball.
- */
-static bool look_at(struct incode_make *n, struct incode_query *q,
-                    const uint32_t *brick, uint32_t count, struct hits *hits)
+/* The bits of a brick's points, but for the face's and the best so far, which
+ * are in the ball. */
+static uint64_t others(const struct incode_query *q,
+                       const struct incode_frame *frame)
 {
-    const struct incode_frame *frame[BATCH];
+    uint32_t brick = frame->number;
+    uint64_t all = frame->count < INCODE_BRICK_POINTS
+                       ? (UINT64_C(1) << frame->count) - 1
+                       : UINT64_MAX;
+    return all & ~(bit_of(q->v, brick) | bit_of(q->b, brick) |
+                   bit_of(q->c, brick) | bit_of(q->best, brick));
+}
+
+/* Looks at some bricks of the list.  False: one is missing, or too much lies in
+ * the ball. */
+static bool look_at(struct incode_make *n, struct incode_query *q,
+                    const uint32_t *index, uint32_t count, struct hits *hits)
+{
+    struct incode_vicinity *list = &n->t->vicinity;
+    struct incode_pager *pager = &n->t->pager;
+    struct incode_vicinity_ball ball;
+    uint32_t brick[BATCH], met = 0;
     uint64_t in[BATCH];
-    struct ball ball;
-    if (!set_ball(&ball, q))
-        return false;
+    incode_vicinity_set_ball(list, q, &ball);
     n->t->stats.candidates += (uint64_t)count * INCODE_BRICK_POINTS;
     for (uint32_t i = 0; i < count; i++) {
-        uint32_t b = brick[i];
-        frame[i] = incode_pager_get(&n->t->pager, b);
-        if (frame[i] == NULL)
-            return false;
-        in[i] =
-            in_ball(&ball, frame[i]) & ~(bit_of(q->v, b) | bit_of(q->b, b) |
-                                         bit_of(q->c, b) | bit_of(q->best, b));
+        brick[met] = list->brick[index[i]];
+        if (list->copy[index[i]] == INCODE_NO_COPY) {
+            const struct incode_frame *f = incode_pager_get(pager, brick[met]);
+            if (f == NULL)
+                return false;
+            incode_vicinity_copy(list, index[i], f);
+        }
+        in[met] = incode_vicinity_points(list, index[i], &ball);
+        met += in[met] != 0;
     }
-    for (uint32_t i = 0; i < count; i++)
-        if (in[i] != 0 && !add_hits(n, q, frame[i], in[i], hits))
+    for (uint32_t i = 0; i < met; i++) {
+        const struct incode_frame *f = incode_pager_get(pager, brick[i]);
+        if (f == NULL || !add_hits(n, q, f, in[i] & others(q, f), hits))
             return false;
+    }
     place(q, &n->pencil, hits);
     return true;
 }
@@ -326,28 +301,29 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
                         struct hits *hits)
 {
     const struct incode_vicinity *list = &n->t->vicinity;
-    uint32_t brick[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING];
-    uint32_t count = incode_vicinity_in_ball(list, q, brick);
+    uint32_t index[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING];
+    uint32_t count = incode_vicinity_in_ball(list, q, index);
     hits->count = hits->placed = 0;
     while (count > BATCH) {
         double square = q->square;
         uint32_t first = 0;
-        while (first + BATCH < count && brick[first + BATCH / 2] < list->centre)
+        while (first + BATCH < count &&
+               list->brick[index[first + BATCH / 2]] < list->centre)
             first++;
-        if (!look_at(n, q, brick + first, BATCH, hits))
+        if (!look_at(n, q, index + first, BATCH, hits))
             return false;
         if (q->square > 0.7 * square) {
-            memmove(brick + first, brick + first + BATCH,
-                    (count - first - BATCH) * sizeof brick[0]);
+            memmove(index + first, index + first + BATCH,
+                    (count - first - BATCH) * sizeof index[0]);
             count -= BATCH;
             break;
         }
         hits->count = hits->placed = 0;
-        count = incode_vicinity_in_ball(list, q, brick);
+        count = incode_vicinity_in_ball(list, q, index);
     }
     for (uint32_t i = 0; i < count; i += BATCH) {
         uint32_t left = count - i;
-        if (!look_at(n, q, brick + i, left < BATCH ? left : BATCH, hits))
+        if (!look_at(n, q, index + i, left < BATCH ? left : BATCH, hits))
             return false;
     }
     return true;

@@ -388,6 +388,19 @@ INCODE_INLINE void incode_vd_cut(int32_t *out, incode_vd a)
 #endif
 }
 
+/* As single precision has them; beyond its range, infinite. */
+INCODE_INLINE void incode_vd_store_float(float *out, incode_vd a)
+{
+#if defined(INCODE_AVX512)
+    _mm256_store_ps(out, _mm512_cvtpd_ps((__m512d)a));
+#elif defined(INCODE_AVX2)
+    _mm_store_ps(out, _mm256_cvtpd_ps((__m256d)a));
+#else
+    for (uint32_t i = 0; i < INCODE_VD_LANES; i++)
+        out[i] = (float)a[i];
+#endif
+}
+
 /* ---- lanes whose bit is set, packed together ---- */
 
 #ifdef INCODE_AVX2

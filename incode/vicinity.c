@@ -41,7 +41,8 @@ static bool copy_boxes(struct incode_walker *walker, struct incode_query *q,
 
 static void set_empty(struct incode_vicinity *v)
 {
-    v->count = 0;
+    v->count = v->copies = v->next = 0;
+    memset(v->copy, INCODE_NO_COPY, sizeof v->copy);
     for (int d = 0; d < 3; d++) {
         v->box_lo[d] = __builtin_inf();
         v->box_hi[d] = -__builtin_inf();
@@ -126,29 +127,43 @@ static void in_box(const struct incode_vicinity *v,
     }
 }
 
+void incode_vicinity_set_ball(const struct incode_vicinity *v,
+                              const struct incode_query *q,
+                              struct incode_vicinity_ball *ball)
+{
+    double ratio = v->scale / q->scale, most = 1;
+    for (int d = 0; d < 3; d++) {
+        double at = (q->pv[d] - v->origin[d]) * v->scale;
+        double centre = at + q->centre[d] * ratio;
+        double far = __builtin_fabs(centre);
+        most = far > most ? far : most;
+        ball->centre[d] = (float)centre;
+    }
+    /* A point in the ball is no farther out than the centre and the radius.
+     * (r + e)^2 <= (1 + d) r^2 + (1 + 1 / d) e^2, where d is 2^-12. */
+    double error = most * (OUTWARD * 65);
+    ball->square =
+        (float)(q->square * ratio * ratio * (1 + 0x1p-11) + error * error);
+}
+
 /* What meets the ball and is not certainly on the known side of the face. */
 static void in_ball(const struct incode_vicinity *v,
                     const struct incode_query *q, struct chosen *chosen)
 {
     const float *corner[3]; /* the farthest beyond the face */
+    struct incode_vicinity_ball ball;
     incode_vf c[3], n[3], zero = incode_vf_all(0);
-    double ratio = v->scale / q->scale, most = 1, level = 0;
-    double extent = incode_max_norm(q->sphere.n);
+    double level = 0, extent = incode_max_norm(q->sphere.n);
+    incode_vicinity_set_ball(v, q, &ball);
     for (int d = 0; d < 3; d++) {
         double at = (q->pv[d] - v->origin[d]) * v->scale;
-        double centre = at + q->centre[d] * ratio;
         double normal = q->sphere.n[d] / extent;
-        double far = __builtin_fabs(centre);
-        most = far > most ? far : most;
-        c[d] = all_of(centre);
+        c[d] = incode_vf_all(ball.centre[d]);
         n[d] = all_of(normal);
         corner[d] = normal > 0 ? v->hi[d] : v->lo[d];
         level += normal * at;
     }
-    /* (r + e)^2 <= (1 + d) r^2 + (1 + 1 / d) e^2, where d is 2^-12. */
-    double error = most * (OUTWARD * 65);
-    incode_vf square =
-        all_of(q->square * ratio * ratio * (1 + 0x1p-11) + error * error);
+    incode_vf square = incode_vf_all(ball.square);
     incode_vf floor = all_of(level - 0x1p-17);
     for (uint32_t i = 0; i < v->count; i += INCODE_VF_LANES) {
         incode_vf sum = zero, top = zero;
@@ -169,7 +184,7 @@ static void in_ball(const struct incode_vicinity *v,
 
 uint32_t incode_vicinity_in_ball(
     const struct incode_vicinity *v, const struct incode_query *q,
-    uint32_t brick[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING])
+    uint32_t index[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING])
 {
     struct chosen chosen;
     uint32_t count = 0;
@@ -179,10 +194,54 @@ uint32_t incode_vicinity_in_ball(
             (uint32_t)(chosen.word[i / 64] >> (i % 64)) & INCODE_VF_ALL;
         if (v->count - i < INCODE_VF_LANES)
             in &= (UINT32_C(1) << (v->count - i)) - 1;
-        incode_vi_pack(brick + count, in, incode_vi_load(v->brick + i));
+        incode_vi_pack(index + count, in,
+                       incode_vi_count() + incode_vi_all((int32_t)i));
         count += (uint32_t)__builtin_popcount(in);
     }
     return count;
+}
+
+/* ---- copies ---- */
+
+void incode_vicinity_copy(struct incode_vicinity *v, uint32_t index,
+                          const struct incode_frame *frame)
+{
+    const struct incode_brick *b = &frame->page.brick;
+    const double *const axis[3] = {b->x, b->y, b->z};
+    uint32_t copy = v->next;
+    incode_vd scale = incode_vd_all(v->scale);
+    for (int d = 0; d < 3; d++) {
+        /* Scaled first: a difference of large numbers could overflow. */
+        incode_vd origin = incode_vd_all(v->origin[d] * v->scale);
+        for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES)
+            incode_vd_store_float(v->point[copy][d] + i,
+                                  incode_vd_load(axis[d] + i) * scale - origin);
+    }
+    if (v->copies < INCODE_VICINITY_COPIES)
+        v->copies++;
+    else
+        v->copy[v->owner[copy]] = INCODE_NO_COPY;
+    v->owner[copy] = (uint8_t)index;
+    v->copy[index] = (uint8_t)copy;
+    v->next = (copy + 1) % INCODE_VICINITY_COPIES;
+}
+
+uint64_t incode_vicinity_points(const struct incode_vicinity *v, uint32_t index,
+                                const struct incode_vicinity_ball *ball)
+{
+    const float(*point)[INCODE_BRICK_POINTS] = v->point[v->copy[index]];
+    incode_vf limit = incode_vf_all(ball->square);
+    uint64_t out = 0;
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VF_LANES) {
+        incode_vf square = incode_vf_all(0);
+        for (int d = 0; d < 3; d++) {
+            incode_vf gap =
+                incode_vf_load(point[d] + i) - incode_vf_all(ball->centre[d]);
+            square = incode_vf_fma(gap, gap, square);
+        }
+        out |= (uint64_t)incode_vm_bits(incode_vf_less(limit, square)) << i;
+    }
+    return ~out;
 }
 
 /* The next chosen brick from i on, taken out; count where there is none. */

@@ -1,9 +1,10 @@
-/* The bricks around one brick, by their boxes alone: most searches beyond the
- * points at hand end among them, without the tree.
+/* The bricks around one brick, by their boxes, and copies of the points of some
+ * in single precision: most searches beyond the points at hand end among them,
+ * without the tree, and read the points themselves only where they matter.
  *
- * Memory: struct incode_vicinity, about 6 KB.  Work: a walk of the box pages a
+ * Memory: struct incode_vicinity, about 30 KB.  Work: a walk of the box pages a
  * brick; a search looks at every box of the list, a vector at a time, and at
- * the leaves of those that it cannot rule out.
+ * the points of those that it cannot rule out.
  *
  *     incode_vicinity_make(&vicinity, &walker, brick, lo, hi, pages_max);
  *     r = incode_vicinity_visit(&vicinity, &walker, &query, visit, context);
@@ -16,7 +17,12 @@
 
 #include "query.h"
 
-enum { INCODE_VICINITY_BRICKS = 192, INCODE_VICINITY_PADDING = 16 };
+enum {
+    INCODE_VICINITY_BRICKS = 192,
+    INCODE_VICINITY_PADDING = 16,
+    INCODE_VICINITY_COPIES = 32,
+    INCODE_NO_COPY = 0xff
+};
 
 struct incode_vicinity {
     /* Relative to origin and scaled, rounded outward. */
@@ -28,6 +34,17 @@ struct incode_vicinity {
     uint32_t self;   /* its index, where it is in the list */
     double origin[3], scale;
     double box_lo[3], box_hi[3]; /* what meets this box is in the list */
+    /* The points of some of the bricks, in the boxes' units. */
+    alignas(64) float point[INCODE_VICINITY_COPIES][3][INCODE_BRICK_POINTS];
+    uint8_t copy[INCODE_VICINITY_BRICKS]; /* which, or INCODE_NO_COPY */
+    uint8_t owner[INCODE_VICINITY_COPIES];
+    uint32_t copies, next; /* how many, and which is given away next */
+};
+
+/* The ball of a round query in the list's units, widened by what rounding to
+ * single precision may move its centre, a point in it, or their distance. */
+struct incode_vicinity_ball {
+    float centre[3], square;
 };
 
 enum incode_listed {
@@ -50,12 +67,28 @@ enum incode_walk incode_vicinity_visit(const struct incode_vicinity *vicinity,
                                        struct incode_query *q,
                                        incode_visit *visit, void *context);
 
-/* Bricks of the list that meet the ball of a round query and are not certainly
- * on the known side of its face; returns how many.  Room for a vector more is
- * needed. */
+/* Indices, in the list, of the bricks that meet the ball of a round query and
+ * are not certainly on the known side of its face; returns how many.  Room for
+ * a vector more is needed. */
 uint32_t incode_vicinity_in_ball(
     const struct incode_vicinity *vicinity, const struct incode_query *q,
-    uint32_t brick[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING]);
+    uint32_t index[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING]);
+
+void incode_vicinity_set_ball(const struct incode_vicinity *vicinity,
+                              const struct incode_query *q,
+                              struct incode_vicinity_ball *ball);
+
+/* Copies the points of a listed brick, which is in the frame; the oldest copy
+ * gives way. */
+void incode_vicinity_copy(struct incode_vicinity *vicinity, uint32_t index,
+                          const struct incode_frame *frame);
+
+/* The points of a listed brick that has been copied, one bit each, that are not
+ * certainly outside the ball: all are looked at, without a branch on where they
+ * are.  The bits past the brick's last point mean nothing. */
+uint64_t incode_vicinity_points(const struct incode_vicinity *vicinity,
+                                uint32_t index,
+                                const struct incode_vicinity_ball *ball);
 
 /* Whether a box lies in that of the list. */
 static inline bool incode_vicinity_holds(const struct incode_vicinity *vicinity,
