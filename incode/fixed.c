@@ -27,9 +27,14 @@ static inline four_d load3(const double p[3])
 /* n = v * 2^k; lanes where that is no integer are not 0. */
 static inline four_i scaled(four_i *n, four_d v, const struct incode_scale *s)
 {
-    *n = __builtin_convertvector(v * all4(s->up1) * all4(s->up2), four_i);
-    four_d back = __builtin_convertvector(*n, four_d);
-    return back * all4(s->down1) * all4(s->down2) != v;
+    four_i lost = {0};
+    four_d u = v * all4(s->up1);
+    if (!s->plain) {
+        u *= all4(s->up2);
+        lost = u * all4(s->down1) * all4(s->down2) != v;
+    }
+    *n = __builtin_convertvector(u, four_i);
+    return lost | (__builtin_convertvector(*n, four_d) != u);
 }
 
 static inline bool any4(four_i a)
@@ -52,12 +57,14 @@ bool incode_fixed_differences(int64_t d[][3], const double *const p[],
         bad |= scaled(&n[i], x, &s);
         inexact |= tail[i] != all4(0);
     }
-    bool again = any4(inexact);
-    for (int i = 0; i < count; i++) {
-        four_i rest = {0};
-        if (again)
+    if (any4(inexact)) {
+        for (int i = 0; i < count; i++) {
+            four_i rest;
             bad |= scaled(&rest, tail[i], &s);
-        n[i] += rest;
+            n[i] += rest;
+        }
+    }
+    for (int i = 0; i < count; i++) {
         for (int k = 0; k < 3; k++)
             d[i][k] = n[i][k];
     }

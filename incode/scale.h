@@ -14,9 +14,11 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Two factors each way, since their product may leave the range of doubles. */
+/* Two factors each way, since their product may leave the range of doubles:
+ * the second is 1 where it does not.  plain: up1 alone scales, and exactly. */
 struct incode_scale {
     double up1, up2, down1, down2;
+    bool plain;
 };
 
 static inline double incode_power_of_two(int32_t e)
@@ -37,7 +39,8 @@ static inline bool incode_scale_init(struct incode_scale *s, double most)
     if (e > 2044)
         return false;
     /* most < 2^(e-1022); denormals (e = 0) are below 2^-1022. */
-    int32_t k = 1082 - (e == 0 ? 1 : e), half = k / 2;
+    int32_t k = 1082 - (e == 0 ? 1 : e), half = k > 1022 ? k / 2 : k;
+    s->plain = k >= 0 && k == half;
     s->up1 = incode_power_of_two(half);
     s->up2 = incode_power_of_two(k - half);
     s->down1 = incode_power_of_two(-half);
