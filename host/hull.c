@@ -1,5 +1,6 @@
 #include "hull.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -198,6 +199,8 @@ static void blend(const struct check *c, const uint32_t *v, int n,
         for (int i = 0; i < n; i++) {
             p[d] += weight[i] / sum * at(c, v[i])[d];
         }
+        /* The weights' rounding may lead beyond the largest double. */
+        p[d] = fmax(fmin(p[d], DBL_MAX), -DBL_MAX);
     }
 }
 

@@ -124,13 +124,12 @@ void incode_query_look(struct incode_query *q)
 
 void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
 {
-    double half = 0.5 / q->sphere.det;
     q->best = id;
     q->flat.spread = 0;
     q->ceiling.set = false;
     memcpy(q->best_p, p, sizeof q->best_p);
     for (int d = 0; d < 3; d++)
-        q->peak[d] = q->sphere.m[d] * half;
+        q->peak[d] = 0.5 * q->sphere.m[d] / q->sphere.det; /* either may be 0 */
     if (q->shrinking)
         bound_sphere(q);
     if (q->looked >= INCODE_QUERY_CROWD)

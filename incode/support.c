@@ -6,6 +6,8 @@
 #define SPARE 1e-9
 /* Twice the precision, relative to its terms. */
 #define FINE 1e-29
+/* Below this, what is left of a length or a product tells nothing. */
+#define VANISHED 1e-250
 
 static double length_of(const double a[3])
 {
@@ -98,9 +100,8 @@ void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
         longest = length > longest ? length : longest;
     }
     flat->lengths = lengths;
-    /* Where products underflow, nothing is known. */
     flat->spread =
-        lengths > 1e-250 ? FINE * 1e2 * lengths * longest : __builtin_inf();
+        lengths > VANISHED ? FINE * 1e2 * lengths * longest : __builtin_inf();
 }
 
 /* The least ball that is known to hold what comes before p[3]. */
@@ -115,7 +116,7 @@ static struct incode_ball ball_of(struct incode_flat *flat,
     flat->spread = 0;
     /* What comes before a place of zero or less in the pencil lies in the ball
      * over the face's circle. */
-    if (flat->regular) {
+    if (flat->regular && far > VANISHED) {
         double circle = length_of(flat->c0) * (1 + 1e-8);
         double above = far * far - 2 * incode_dot(flat->c0, r) +
                        1e-8 * far * (far + 2 * circle);

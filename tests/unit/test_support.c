@@ -1,4 +1,5 @@
 #include <setjmp.h>
+#include <stdalign.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -11,6 +12,7 @@
 #include "../../incode/finals.h"
 #include "../../incode/gather.h"
 #include "../../incode/predicates.h"
+#include "../../incode/query.h"
 #include "../../incode/support.h"
 
 /* The shortcuts of the search against the predicates: what they rule out must
@@ -470,6 +472,49 @@ static void ceilings_across_scales(void **unused)
     assert_true(set > 100 && out == 0);
 }
 
+/* A point so near the vertex that their difference is lost when it is scaled:
+ * where it lies in the pencil is not known, so it lessens nothing. */
+static void a_difference_that_vanishes(void **unused)
+{
+    (void)unused;
+    const double v[3] = {0, 0, 0}, b[3] = {0x1p60, 0, 0}, c[3] = {0, 0x1p60, 0};
+    const double near[3] = {0, 0, 0x1p-1060}, within[3] = {0x1p58, 0x1p58, 1};
+    struct incode_flat flat = {
+        .known = true, .regular = true, .c0 = {0.5, 0.5, 0}};
+    flat.ball.radius = INFINITY;
+    incode_flat_lessen(&flat, (const double *[]){v, b, c, near}, 0x1p-60);
+    assert_true(isinf(flat.ball.radius));
+    incode_flat_lessen(&flat, (const double *[]){v, b, c, within}, 0x1p-60);
+    assert_true(flat.ball.radius < 0.8);
+}
+
+/* A face so small beside its units that products vanish: the sphere's centre is
+ * lost, and a box that holds the sphere may hold the apex. */
+static void a_sphere_that_vanishes(void **unused)
+{
+    (void)unused;
+    for (int power = -1074; power < 0; power++) {
+        double size = ldexp(1, power);
+        const double b[3] = {size, 0, 0}, c[3] = {0, size, 0};
+        const double apex[3] = {0, 0, size};
+        alignas(64) double lo[3][32], hi[3][32];
+        struct incode_query q = {.question = INCODE_QUERY_APEX, .scale = 1};
+        incode_sphere_plane(&q.sphere, b, c);
+        incode_sphere_apex(&q.sphere, b, c, apex);
+        incode_sphere_refine(&q.sphere, q.pv, b, c, apex, 1);
+        incode_query_start(&q, 3, apex);
+        for (int i = 0; i < 32; i++) {
+            for (int d = 0; d < 3; d++) {
+                lo[d][i] = i < 16 ? ldexp(-size, 60 * i) : 0;
+                hi[d][i] = ldexp(size, 60 * (i % 16));
+            }
+        }
+        const double *const low[3] = {lo[0], lo[1], lo[2]};
+        const double *const high[3] = {hi[0], hi[1], hi[2]};
+        assert_int_equal(incode_query_boxes(&q, low, high, 32), UINT32_MAX);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -478,6 +523,8 @@ int main(void)
         cmocka_unit_test(finals_of_a_rough_lattice),
         cmocka_unit_test(ceilings_on_a_rough_sphere),
         cmocka_unit_test(ceilings_across_scales),
+        cmocka_unit_test(a_difference_that_vanishes),
+        cmocka_unit_test(a_sphere_that_vanishes),
         cmocka_unit_test(places_in_a_pencil),
         cmocka_unit_test(first_of_the_gathered),
     };

@@ -1,6 +1,7 @@
 /* The check of a triangulation: right ones pass, every planted fault is found.
  * The reference that makes them agrees with the digests that came with the
  * data. */
+#include <float.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -153,6 +154,24 @@ static void range_beyond_scaling(void **unused)
         f.points.xyz[i] = ldexp(f.points.xyz[i] - 0.5, power);
     }
     reference_delaunay(f.points.xyz, 60, &f.tets);
+    struct host_verify_report r;
+    assert_int_equal(verify(&f, &r), 0);
+    close_fixture(&f);
+}
+
+/* Corners as far away as doubles go. */
+static void ends_of_the_range(void **unused)
+{
+    (void)unused;
+    struct fixture f = {0};
+    struct host_error error = {0};
+    for (int i = 0; i < 8; i++) {
+        const double p[3] = {i & 1 ? DBL_MAX : -DBL_MAX,
+                             i & 2 ? DBL_MAX : -DBL_MAX,
+                             i & 4 ? DBL_MAX : -DBL_MAX};
+        assert_int_equal(host_points_append(&f.points, p, 1, &error), 0);
+    }
+    reference_delaunay(f.points.xyz, 8, &f.tets);
     struct host_verify_report r;
     assert_int_equal(verify(&f, &r), 0);
     close_fixture(&f);
@@ -446,6 +465,7 @@ int main(void)
         cmocka_unit_test(data_agrees),
         cmocka_unit_test(right_ones_pass),
         cmocka_unit_test(range_beyond_scaling),
+        cmocka_unit_test(ends_of_the_range),
         cmocka_unit_test(each_turned_one_is_found),
         cmocka_unit_test(each_missing_one_is_found),
         cmocka_unit_test(each_doubled_one_is_found),
