@@ -5,14 +5,26 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "claims.h"
 #include "points.h"
 #include "source.h"
 #include "tetrahedra.h"
 #include "write.h"
 
+/* Whether `out` leaves `in`, which is read, as it is. */
+static int check_claims(const char *in, const char *out,
+                        struct host_error *error)
+{
+    struct host_claims claims = {0};
+    host_claims_read(&claims, in, error);
+    host_claims_write(&claims, "", out, error);
+    host_claims_free(&claims);
+    return error->code;
+}
+
 /* The points of a file of tetrahedra that holds none: the .node beside it. */
-static int points_beside(const char *in, struct host_points *points,
-                         struct host_error *error)
+static int points_beside(const char *in, const char *out,
+                         struct host_points *points, struct host_error *error)
 {
     size_t n = strlen(in);
     char *name = malloc(n + 8);
@@ -27,7 +39,7 @@ static int points_beside(const char *in, struct host_points *points,
                   "%s: it holds no points and there is no %s; put the points "
                   "there",
                   in, name);
-    } else {
+    } else if (check_claims(name, out, error) == 0) {
         host_points_read(name, points, error);
     }
     free(name);
@@ -62,7 +74,7 @@ static int convert_tetrahedra(const char *in, const char *out,
     }
     bool needed = host_format_of(out) != HOST_NPY && strcmp(out, "-") != 0;
     if (needed && points.count == 0) {
-        points_beside(in, &points, error);
+        points_beside(in, out, &points, error);
     }
     if (error->code == 0 &&
         (!needed || check_rows(in, &tets, &points, error) == 0)) {
@@ -100,6 +112,9 @@ int host_convert(const char *in, const char *out, struct host_error *error)
 {
     enum host_format to = host_format_of(out);
     bool either = to == HOST_VTU || to == HOST_VTK || to == HOST_NPY;
+    if (check_claims(in, out, error) != 0) {
+        return error->code;
+    }
     if (holds_tetrahedra(in) || holds_tetrahedra(out) ||
         (either && has_tetrahedra(in))) {
         return convert_tetrahedra(in, out, error);

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "../node/node.h"
+#include "claims.h"
 #include "facets.h"
 #include "output.h"
 #include "report.h"
@@ -303,33 +304,17 @@ static bool stdout_is_data(const struct host_run_options *options)
     return data;
 }
 
-/* File k of those that an output makes; NULL: there is none. */
-static const char *output_file(const char *path, unsigned k, char *name,
-                               size_t size)
-{
-    static const char *const beside[] = {".node", ".neigh", ".face"};
-    size_t length = strlen(path);
-    bool ele = length > 4 && strcmp(path + length - 4, ".ele") == 0;
-    if (strcmp(path, "-") == 0 || length + 8 > size || k > (ele ? 3 : 0)) {
-        return NULL;
-    }
-    if (k == 0) {
-        return path;
-    }
-    snprintf(name, size, "%.*s%s", (int)length - 4, path, beside[k - 1]);
-    return name;
-}
-
 /* Outputs that were whole before a later one failed: a failed run leaves
  * none. */
 static void remove_outputs(const struct host_run_options *options,
                            unsigned count)
 {
-    char name[4096];
+    char name[HOST_PATH_MAX];
     const char *file;
     for (unsigned i = 0; i < count; i++) {
-        for (unsigned k = 0; (file = output_file(options->output[i], k, name,
-                                                 sizeof name)) != NULL;
+        for (unsigned k = 0;
+             (file = host_write_file(options->output[i], k, name,
+                                     sizeof name)) != NULL;
              k++) {
             (void)unlink(file);
         }
@@ -339,11 +324,12 @@ static void remove_outputs(const struct host_run_options *options,
 void host_run_clean(const struct host_run_options *options, pid_t writer,
                     uint64_t since_ns)
 {
-    char name[4096];
+    char name[HOST_PATH_MAX];
     const char *file;
     for (unsigned i = 0; i < options->outputs; i++) {
-        for (unsigned k = 0; (file = output_file(options->output[i], k, name,
-                                                 sizeof name)) != NULL;
+        for (unsigned k = 0;
+             (file = host_write_file(options->output[i], k, name,
+                                     sizeof name)) != NULL;
              k++) {
             host_output_clean(file, writer, since_ns);
         }
@@ -353,9 +339,31 @@ void host_run_clean(const struct host_run_options *options, pid_t writer,
     }
 }
 
+/* No output may be a file that is read, nor be another output. */
+static int check_claims(const struct host_run_options *options,
+                        struct host_error *error)
+{
+    struct host_claims claims = {0};
+    host_claims_read(&claims, options->input, error);
+    if (options->cube != NULL) {
+        host_claims_read(&claims, options->cube, error);
+    }
+    for (unsigned i = 0; i < options->outputs; i++) {
+        host_claims_write(&claims, "-o ", options->output[i], error);
+    }
+    if (options->stats != NULL) {
+        host_claims_write(&claims, "--stats ", options->stats, error);
+    }
+    host_claims_free(&claims);
+    return error->code;
+}
+
 static int check_outputs(const struct host_run_options *options,
                          struct host_error *error)
 {
+    if (check_claims(options, error) != 0) {
+        return error->code;
+    }
     if (options->stats != NULL && strcmp(options->stats, "-") != 0 &&
         host_write_probe(options->stats, error) != 0) {
         return error->code;

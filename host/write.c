@@ -194,36 +194,52 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
     return error->code;
 }
 
+static const char *const beside[] = {".node", ".neigh", ".face"};
+enum { BESIDE = sizeof beside / sizeof beside[0] };
+
+const char *host_write_file(const char *path, unsigned k, char *name,
+                            size_t size)
+{
+    size_t length = strlen(path);
+    if (strcmp(path, "-") == 0 || length + 8 > size ||
+        k > (host_format_of(path) == HOST_ELE ? BESIDE : 0)) {
+        return NULL;
+    }
+    if (k == 0) {
+        return path;
+    }
+    size_t stem = length - strlen(".ele");
+    memcpy(name, path, stem);
+    strcpy(name + stem, beside[k - 1]);
+    return name;
+}
+
 static int write_tetgen(const char *path, const struct host_points *points,
                         const struct host_tetrahedra *tets,
                         struct host_error *error)
 {
-    static const char *const extensions[] = {"node", "neigh", "face", "ele"};
-    struct host_output out[4];
-    char *names[4] = {NULL};
-    size_t stem = strlen(path) - 3, opened = 0;
-    for (; opened < 4 && error->code == 0; opened++) {
-        names[opened] = malloc(stem + 8);
-        if (names[opened] == NULL) {
-            host_fail_memory(error, "a name");
+    struct host_output out[BESIDE + 1];
+    char names[BESIDE + 1][HOST_PATH_MAX];
+    size_t opened = 0;
+    for (; opened <= BESIDE && error->code == 0; opened++) {
+        unsigned k = opened < BESIDE ? (unsigned)opened + 1 : 0; /* it last */
+        const char *file =
+            host_write_file(path, k, names[opened], sizeof names[opened]);
+        if (file == NULL) {
+            host_fail(error, HOST_INPUT, "%s: too long a name; shorten it",
+                      path);
             break;
         }
-        memcpy(names[opened], path, stem);
-        strcpy(names[opened] + stem, extensions[opened]);
-        if (host_output_open(&out[opened], names[opened], error) != 0) {
+        if (host_output_open(&out[opened], file, error) != 0) {
             break;
         }
     }
     if (error->code == 0) {
         write_node(&out[0], points);
         write_topology(&out[1], &out[2], points, tets, error);
-        write_ele(&out[3], points, tets);
+        write_ele(&out[BESIDE], points, tets);
     }
-    host_output_close(out, opened, error);
-    for (int i = 0; i < 4; i++) {
-        free(names[i]);
-    }
-    return error->code;
+    return host_output_close(out, opened, error);
 }
 
 /* --- VTK -------------------------------------------------------------- */
@@ -458,10 +474,15 @@ int host_write_check(const char *path, struct host_error *error)
 
 int host_write_probe(const char *path, struct host_error *error)
 {
-    struct host_output out;
-    if (host_output_open(&out, path, error) == 0) {
+    char name[HOST_PATH_MAX];
+    const char *file = path;
+    for (unsigned k = 0; file != NULL && error->code == 0; k++) {
+        struct host_output out;
         struct host_error dropped = {.code = HOST_BROKEN}; /* remove it */
-        (void)host_output_close(&out, 1, &dropped);
+        file = k == 0 ? path : host_write_file(path, k, name, sizeof name);
+        if (file != NULL && host_output_open(&out, file, error) == 0) {
+            (void)host_output_close(&out, 1, &dropped);
+        }
     }
     return error->code;
 }

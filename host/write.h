@@ -18,6 +18,13 @@
  * the list of those that are allowed.  For checking before the work starts. */
 int host_write_check(const char *path, struct host_error *error);
 
+enum { HOST_PATH_MAX = 4096 }; /* bytes of a file's name, by the kernel */
+
+/* File k of those that the output `path` makes, 0 being itself; NULL: there is
+ * none, or its name is too long for `size` bytes.  "-" makes none. */
+const char *host_write_file(const char *path, unsigned k, char *name,
+                            size_t size);
+
 /* 0 where a file can be made beside `path`, else HOST_INPUT. */
 int host_write_probe(const char *path, struct host_error *error);
 

@@ -57,6 +57,56 @@ wrong 'no gzip' 'notgzip.xyz.gz' "$in/notgzip.xyz.gz"
 wrong 'unknown input format' 'points.dat' "$in/points.dat"
 wrong 'empty standard input' 'standard input|stdin|-' - < /dev/null
 
+# --- nothing is written over what is read, nor twice --------------------------
+
+# spares NAME PATTERN FILE COMMAND...: refused, and FILE is what it was.
+spares() {
+    local name=$1 file=$3 before
+    before=$(cksum < "$file")
+    refuses "errors/$name" 2 "$2" "${@:4}"
+    check "errors/$name: the input is as it was" "$file has changed" \
+        test "$(cksum < "$file")" = "$before"
+}
+over=$in/over
+mkdir "$over"
+"$INCODE" convert "$good" "$over/a.node"
+"$INCODE" convert "$good" "$over/a.npy"
+"$INCODE" convert "$good" "$over/a.vtu"
+ln -s a.npy "$over/link.npy"
+ln "$over/a.npy" "$over/hard.npy"
+ln -s . "$over/again"
+spares 'output beside another is the input' \
+    '-o .*a.ele: .*a.node, beside it, would overwrite the input .*a.node; ' \
+    "$over/a.node" run "$over/a.node" -q -o "$over/a.ele"
+for as in a link hard again/a; do
+    spares "output is the input, as $as.npy" "$as.npy: it would overwrite" \
+        "$over/a.npy" run "$over/a.npy" -q -o "$left/o.vtu" -o "$over/$as.npy"
+done
+spares 'output is the input, .vtu' 'overwrite the input' "$over/a.vtu" \
+    run "$over/a.vtu" -q -o "$over/a.vtu"
+spares 'statistics are the input' '--stats .*overwrite the input' \
+    "$over/a.npy" run "$over/a.npy" -q --stats "$over/link.npy"
+spares 'output is standard input' 'overwrite the input on standard input' \
+    "$good" bash -c "'$INCODE' run - -q --stats '$good' < '$good'"
+spares 'convert to the input' '^incode: .*hard.npy: it would overwrite' "$over/a.npy" \
+    "$INCODE" convert "$over/a.npy" "$over/hard.npy"
+"$INCODE" run "$over/a.node" -q -o "$over/b.npy"
+cp "$over/a.node" "$over/b.node"
+spares 'convert over the points it takes' 'b.node' "$over/b.node" \
+    "$INCODE" convert "$over/b.npy" "$over/b.ele"
+twice() { # NAME PATTERN OPTION...
+    refuses "errors/twice, $1" 2 "$2" run "$good" -q "${@:3}"
+}
+twice 'one output' 'o.vtu: .*already written for -o ' -o "$left/o.vtu" \
+    -o "$left/../left/o.vtu"
+twice 'statistics and output' '--stats .*already' -o "$left/o.npy" \
+    --stats "$left/o.npy"
+twice 'statistics and a file beside' 'already written beside -o .*o.ele; ' \
+    -o "$left/o.ele" --stats "$left/o.face"
+twice 'standard output' 'standard output is already' -o - --stats -
+check 'errors/two outputs to nowhere' 'refused' run "$good" -q -o - \
+    --stats /dev/null > /dev/null
+
 refuses 'errors/output in no directory' 3 'absent' run "$good" -q --nodes 2 \
     -o "$left/absent/o.vtu"
 refuses 'errors/output is a directory' 3 'o.vtu' \
