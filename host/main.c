@@ -1,7 +1,6 @@
 /* The host program.  Nothing here but its commands and their arguments. */
 #include <argp.h>
 #include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +11,7 @@
 #include "convert.h"
 #include "gen.h"
 #include "launch.h"
+#include "output.h"
 #include "remote.h"
 #include "report.h"
 #include "run.h"
@@ -315,7 +315,7 @@ int main(int argc, char **argv)
     struct host_error error = {0};
     int command = 0;
     argp_err_exit_status = HOST_USAGE;
-    (void)signal(SIGPIPE, SIG_IGN);
+    host_output_guard();
     (void)argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &command);
     const char *fault = incode_arithmetic_fault();
     if (fault != NULL) {

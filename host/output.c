@@ -3,6 +3,8 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <pthread.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +12,67 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { BUFFER_BYTES = 1 << 20 };
+enum { BUFFER_BYTES = 1 << 20, PARTS_MAX = 8 };
+
+/* The names of parts that a signal has to remove; NULL: none. */
+static char *volatile parts[PARTS_MAX];
+
+static const int endings[] = {SIGINT, SIGTERM, SIGHUP};
+enum { ENDINGS = sizeof endings / sizeof endings[0] };
+
+/* With its default action back, the signal ends the program on return. */
+static void on_ending(int number)
+{
+    for (int i = 0; i < PARTS_MAX; i++) {
+        if (parts[i] != NULL) {
+            (void)unlink(parts[i]);
+        }
+    }
+    (void)raise(number);
+}
+
+void host_output_guard(void)
+{
+    struct sigaction action = {.sa_handler = on_ending,
+                               .sa_flags = (int)SA_RESETHAND};
+    struct sigaction before;
+    for (int i = 0; i < ENDINGS; i++) {
+        if (sigaction(endings[i], NULL, &before) == 0 &&
+            before.sa_handler == SIG_DFL) { /* nohup has it ignored */
+            (void)sigaction(endings[i], &action, NULL);
+        }
+    }
+    (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGXFSZ, SIG_IGN);
+}
+
+/* Holds signals off while names and files change together.  No other thread
+ * lives while outputs are open. */
+static void hold(sigset_t *before)
+{
+    sigset_t set;
+    (void)sigemptyset(&set);
+    for (int i = 0; i < ENDINGS; i++) {
+        (void)sigaddset(&set, endings[i]);
+    }
+    (void)pthread_sigmask(SIG_BLOCK, &set, before);
+}
+
+static void release(const sigset_t *before)
+{
+    (void)pthread_sigmask(SIG_SETMASK, before, NULL);
+}
+
+/* Replaces `old` in the list by `new`. */
+static void note(const char *old, char *new)
+{
+    for (int i = 0; i < PARTS_MAX; i++) {
+        if (parts[i] == old) {
+            parts[i] = new;
+            return;
+        }
+    }
+}
 
 static int cannot_make(const char *path, int reason, struct host_error *error)
 {
@@ -46,6 +108,7 @@ void host_output_clean(const char *path, pid_t writer, uint64_t since_ns)
 static int open_file(struct host_output *out, struct host_error *error)
 {
     struct stat status;
+    sigset_t signals;
     out->target = realpath(out->path, NULL);
     if (out->target == NULL) {
         out->target = strdup(out->path); /* it is not there yet */
@@ -70,10 +133,15 @@ static int open_file(struct host_output *out, struct host_error *error)
         return host_fail_memory(error, "an output");
     }
     part_name(out->temporary, size, out->target, getpid());
+    hold(&signals);
     out->file =
         open(out->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    int reason = errno;
+    if (out->file >= 0) {
+        note(NULL, out->temporary);
+    }
+    release(&signals);
     if (out->file < 0) {
-        int reason = errno;
         free(out->temporary);
         out->temporary = NULL; /* not ours to remove */
         return cannot_make(out->path, reason, error);
@@ -178,14 +246,17 @@ static void finish(struct host_output *out, struct host_error *error)
 int host_output_close(struct host_output *out, size_t n,
                       struct host_error *error)
 {
+    sigset_t signals;
     for (size_t i = 0; i < n; i++) {
         finish(&out[i], error);
     }
+    hold(&signals); /* all of them get their names, or none */
     for (size_t i = 0; i < n; i++) {
         if (out[i].temporary != NULL && error->code == 0 &&
             rename(out[i].temporary, out[i].target) != 0) {
             cannot_make(out[i].path, errno, error);
         } else if (out[i].temporary != NULL && error->code == 0) {
+            note(out[i].temporary, NULL);
             free(out[i].temporary);
             out[i].temporary = NULL;
         }
@@ -193,11 +264,13 @@ int host_output_close(struct host_output *out, size_t n,
     for (size_t i = 0; i < n; i++) {
         if (out[i].temporary != NULL) {
             (void)unlink(out[i].temporary);
+            note(out[i].temporary, NULL);
         }
         free(out[i].temporary);
         free(out[i].target);
         free(out[i].buffer);
         out[i] = (struct host_output){.file = -1};
     }
+    release(&signals);
     return error->code;
 }

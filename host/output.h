@@ -26,6 +26,11 @@ struct host_output {
     char *buffer;
 };
 
+/* Lets a signal that ends the program (interrupt, termination, hang-up) remove
+ * the parts of outputs first, and makes errors of those that writing raises
+ * (a pipe without a reader, a file beyond the limit).  Once, at the start. */
+void host_output_guard(void);
+
 /* Removes what a process that was ended has left of this output: its parts, and
  * the whole where it is no older than since_ns of the clock. */
 void host_output_clean(const char *path, pid_t writer, uint64_t since_ns);

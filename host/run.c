@@ -469,6 +469,7 @@ int host_run(const struct host_run_options *options,
     result->time_total_s = seconds_since(start);
     if (status == 0 && options->stats != NULL) {
         status = host_stats_write(options->stats, result, error);
+        remove_outputs(options, status != 0 ? options->outputs : 0);
     }
     if (status == 0 && !options->quiet) {
         host_report_run(stdout_is_data(options) ? stderr : stdout, options,

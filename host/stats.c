@@ -1,9 +1,10 @@
 #include "stats.h"
 
-#include <errno.h>
 #include <jansson.h>
 #include <math.h>
 #include <string.h>
+
+#include "output.h"
 
 double host_candidates_mean(const struct host_run_result *result)
 {
@@ -139,26 +140,25 @@ static json_t *run_object(const struct host_run_result *r)
     return o;
 }
 
+static int put_bytes(const char *bytes, size_t n, void *out)
+{
+    host_output_bytes(out, bytes, n);
+    return 0;
+}
+
 int host_stats_write(const char *path, const struct host_run_result *result,
                      struct host_error *error)
 {
-    json_t *object = run_object(result);
     size_t flags = JSON_INDENT(2) | JSON_REAL_PRECISION(9);
-    bool to_stdout = strcmp(path, "-") == 0;
-    FILE *file = to_stdout ? stdout : fopen(path, "w");
-    int status = -1;
-    if (file != NULL) {
-        status = json_dumpf(object, file, flags);
-        status |= fputc('\n', file) == EOF ? -1 : 0;
-        status |= (to_stdout ? fflush(file) : fclose(file)) != 0 ? -1 : 0;
+    json_t *object = run_object(result);
+    struct host_output out;
+    if (host_output_open(&out, path, error) == 0) {
+        if (json_dump_callback(object, put_bytes, &out, flags) != 0) {
+            host_fail_memory(error, "the statistics");
+        }
+        host_output_text(&out, "\n");
+        host_output_close(&out, 1, error);
     }
     json_decref(object);
-    if (status != 0 && !to_stdout) {
-        (void)remove(path);
-    }
-    return status == 0
-               ? 0
-               : host_fail(error, HOST_INPUT,
-                           "%s: %s; give --stats a file that can be written",
-                           path, strerror(errno));
+    return error->code;
 }

@@ -14,6 +14,7 @@
 #include "../../transport/drivers/mpi_environment.h"
 #include "../arguments.h"
 #include "../launch.h"
+#include "../output.h"
 #include "../run.h"
 #include "bench.h"
 #include "ranks.h"
@@ -60,7 +61,7 @@ int main(int argc, char **argv)
     struct host_error error = {0};
     static char name[] = "incode run";
     argp_err_exit_status = HOST_USAGE;
-    (void)signal(SIGPIPE, SIG_IGN);
+    host_output_guard();
     prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
     mpi_environment();
     MPI_Init(&argc, &argv);

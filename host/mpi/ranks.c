@@ -61,7 +61,7 @@ int host_ranks_open(struct host_ranks *ranks, struct host_error *error)
                          count);
     }
     ranks->open = true;
-    (void)sigaction(SIGTERM, &action, NULL);
+    (void)sigaction(SIGTERM, &action, &ranks->before);
     return 0;
 }
 
@@ -185,7 +185,7 @@ static void leave(struct host_ranks *r)
     r->open = false;
     if (!r->left) {
         MPI_Finalize();
-        (void)signal(SIGTERM, SIG_DFL);
+        (void)sigaction(SIGTERM, &r->before, NULL);
     }
     r->left = true;
 }

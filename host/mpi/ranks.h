@@ -17,6 +17,8 @@
 #ifndef HOST_MPI_RANKS_H
 #define HOST_MPI_RANKS_H
 
+#include <signal.h>
+
 #include "../../transport/drivers/mpi.h"
 #include "../machine.h"
 
@@ -31,6 +33,7 @@ struct host_ranks {
     bool terminated;          /* the job is ended from outside */
     bool stuck;               /* a rank does not answer */
     int lost;                 /* rank; 0: none */
+    struct sigaction before;  /* on SIGTERM, once MPI has ended */
 };
 
 /* All ranks together.  HOST_USAGE where their number makes no cube. */

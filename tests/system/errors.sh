@@ -116,6 +116,8 @@ refuses 'errors/standard output is full' 3 '-: .*space' \
     bash -c "'$INCODE' run '$good' -q --nodes 2 -o - > /dev/full"
 refuses 'errors/statistics cannot be written' 3 'absent' run "$good" -q \
     --nodes 2 -o "$left/o.vtu" --stats "$left/absent/s.json"
+refuses 'errors/statistics fill the disk' 3 '/dev/full: .*space' run "$good" \
+    -q --nodes 2 -o "$left/o.vtu" --stats /dev/full
 # Root may write anywhere: nobody tries.
 name='errors/output in a directory without permission'
 nobody=
@@ -150,6 +152,39 @@ for format in vtu ele npy vtk msh mesh; do
     fi
     refuses "$name" 3 "o.$format|space" full_disk "$user" $format
 done
+
+for outputs in '-o o.vtu' '-o o.ele' '--stats o.json'; do
+    # shellcheck disable=SC2016
+    refuses "errors/limit of a file's size, $outputs" 3 \
+        'o.* writing failed \(File too large\)' bash -c \
+        'ulimit -f 1; cd "$1" && "$2" run "$3" -q $4' - "$left" \
+        "$(realpath "$INCODE")" "$good" "$outputs"
+done
+
+# Ended while it writes into a pipe, which nobody empties, beside three parts.
+interrupted() { # SIGNAL
+    local pipe=$left/o.neigh parts status
+    rm -rf "$left"
+    mkdir "$left"
+    mkfifo "$pipe"
+    exec 7<> "$pipe"
+    "$INCODE" run "$in/many.xyz" -q -o "$left/o.ele" &
+    for _ in $(seq 300); do
+        [ "$(find "$left" -name '*.part-*' | wc -l)" = 3 ] && break
+        sleep 0.05
+    done
+    # shellcheck disable=SC2012
+    parts=$(ls "$left" | wc -l)
+    kill -s "$1" $!
+    wait $! 2> /dev/null
+    status=$?
+    exec 7>&-
+    check "errors/$1 while it writes" \
+        "$parts files, then status $status and $(ls "$left" | tr '\n' ' ')" \
+        test "$parts $status $(ls "$left")" = "4 $(($(kill -l "$1") + 128)) o.neigh"
+}
+interrupted TERM
+interrupted HUP
 
 # --- usage -------------------------------------------------------------------
 
