@@ -1,7 +1,8 @@
 #include "memory.h"
 
-#include <stdint.h>
+#include <stdio.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 /* Huge pages need their own alignment; below this size they do not matter. */
 static const size_t huge = (size_t)2 << 20;
@@ -74,4 +75,23 @@ void host_unmap(void *array, size_t bytes)
     if (array != NULL) {
         (void)munmap(array, bytes == 0 ? 1 : bytes);
     }
+}
+
+uint64_t host_memory_peak(void)
+{
+    char line[128];
+    unsigned long long kib = 0;
+    struct rusage usage;
+    FILE *status = fopen("/proc/self/status", "re");
+    while (status != NULL && kib == 0 &&
+           fgets(line, sizeof line, status) != NULL) {
+        (void)sscanf(line, "VmHWM: %llu kB", &kib);
+    }
+    if (status != NULL) {
+        (void)fclose(status);
+    }
+    if (kib == 0 && getrusage(RUSAGE_SELF, &usage) == 0) {
+        kib = (unsigned long long)usage.ru_maxrss; /* survives exec */
+    }
+    return kib * 1024;
 }

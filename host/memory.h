@@ -11,6 +11,7 @@
 #define HOST_MEMORY_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 /* NULL where there is no memory; 0 bytes are taken as 1. */
 void *host_map(size_t bytes);
@@ -20,5 +21,9 @@ void *host_remap(void *old, size_t old_bytes, size_t bytes);
 
 /* NULL is allowed. */
 void host_unmap(void *array, size_t bytes);
+
+/* The most bytes of memory that this program ever had: its own, not those of
+ * the process that became it. */
+uint64_t host_memory_peak(void);
 
 #endif

@@ -3,12 +3,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include "../node/node.h"
 #include "claims.h"
 #include "facets.h"
+#include "memory.h"
 #include "output.h"
 #include "report.h"
 #include "stats.h"
@@ -88,13 +88,6 @@ static void settle(const struct host_run_options *options,
     if (result->strategy == HOST_AUTO) {
         result->strategy = result->nodes > 1 ? HOST_SPATIAL : HOST_SEQUENTIAL;
     }
-}
-
-static uint64_t peak_bytes(void)
-{
-    struct rusage usage;
-    getrusage(RUSAGE_SELF, &usage);
-    return (uint64_t)usage.ru_maxrss * 1024;
 }
 
 /* Sums over the nodes. */
@@ -465,7 +458,7 @@ int host_run(const struct host_run_options *options,
         status = run_on(options, &points, result, &alone, error);
     }
     host_points_free(&points);
-    result->host_peak_bytes = peak_bytes();
+    result->host_peak_bytes = host_memory_peak();
     result->time_total_s = seconds_since(start);
     if (status == 0 && options->stats != NULL) {
         status = host_stats_write(options->stats, result, error);

@@ -10,7 +10,9 @@
 
 #include <cmocka.h>
 #include <jansson.h>
+#include <sys/wait.h>
 
+#include "../../host/memory.h"
 #include "../../host/stats.h"
 
 static const char *const names[] = {"points",
@@ -138,12 +140,49 @@ static void test_unwritable(void **unused)
     assert_non_null(strstr(error.text, "/nowhere/at/all/s.json: "));
 }
 
-int main(void)
+/* In a process that a large one became, as a shell or a script starts it. */
+static char *self;
+
+static void test_peak_is_its_own(void **unused)
 {
+    (void)unused;
+    const size_t large = (size_t)192 << 20;
+    int pair[2], status = -1;
+    uint64_t peak = 0;
+    char *bytes = host_map(large);
+    assert_non_null(bytes);
+    memset(bytes, 1, large);
+    assert_true(host_memory_peak() >= large);
+    assert_int_equal(pipe(pair), 0);
+    pid_t child = fork();
+    if (child == 0) {
+        char argument[] = "peak";
+        char *const again[] = {self, argument, NULL};
+        dup2(pair[1], STDOUT_FILENO);
+        execv(self, again);
+        _exit(127);
+    }
+    close(pair[1]);
+    assert_int_equal(read(pair[0], &peak, sizeof peak), sizeof peak);
+    close(pair[0]);
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(status, 0);
+    assert_in_range(peak, 65536, large - 1);
+    host_unmap(bytes, large);
+}
+
+int main(int argc, char **argv)
+{
+    self = argv[0];
+    if (argc > 1 && strcmp(argv[1], "peak") == 0) {
+        uint64_t peak = host_memory_peak();
+        return write(STDOUT_FILENO, &peak, sizeof peak) == sizeof peak ? 0 : 1;
+    }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_names),
         cmocka_unit_test(test_candidates),
         cmocka_unit_test(test_unwritable),
+        cmocka_unit_test(test_peak_is_its_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
