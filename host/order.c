@@ -381,6 +381,7 @@ int host_order_make(struct host_order *order, const char *where,
     }
     order->points = (uint32_t)unique.count;
     order->duplicates = rows - unique.count;
+    order->negative_zeros = unique.negative_zeros;
     if (unique.count < 4) {
         host_fail(error, HOST_INPUT,
                   "%s: %u distinct points (of %llu); a tetrahedron needs 4",

@@ -32,9 +32,10 @@ struct host_region {
 };
 
 struct host_order {
-    uint64_t rows;       /* of the input */
-    uint64_t duplicates; /* rows that stand for an earlier row */
-    uint32_t points;     /* distinct points */
+    uint64_t rows;           /* of the input */
+    uint64_t duplicates;     /* rows that stand for an earlier row */
+    uint64_t negative_zeros; /* coordinates of the input that are -0.0 */
+    uint32_t points;         /* distinct points */
     uint32_t bricks;
     struct incode_brick *brick; /* [bricks]; unused slots repeat the last */
     uint8_t *fill;              /* [bricks] points of each brick, 1..64 */

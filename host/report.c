@@ -127,14 +127,18 @@ void host_report_run(FILE *file, const struct host_run_options *options,
                      const struct host_run_result *alone)
 {
     const struct host_run_result *r = result;
-    fprintf(file, "%s: %llu points, %llu tetrahedra, %s\n", options->input,
-            (unsigned long long)r->points, (unsigned long long)r->tetrahedra,
-            r->digest.text);
+    fprintf(file, "%s: %llu %spoints, %llu tetrahedra, %s\n", options->input,
+            (unsigned long long)r->points, r->duplicates > 0 ? "distinct " : "",
+            (unsigned long long)r->tetrahedra, r->digest.text);
     if (r->duplicates > 0) {
         fprintf(file,
                 "%llu of %llu points are duplicates; each stands for its "
                 "lowest row\n",
                 (unsigned long long)r->duplicates, (unsigned long long)r->rows);
+    }
+    if (r->negative_zeros > 0) {
+        fprintf(file, "coordinates of -0.0, which count as 0.0: %llu\n",
+                (unsigned long long)r->negative_zeros);
     }
     fprintf(file,
             "%s on %u node%s: %.3f s to triangulate (%.3f Mtet/s), %.3f s "

@@ -221,6 +221,7 @@ int host_triangulate_on(const struct host_run_options *options,
         result->rows = order.rows;
         result->points = order.points;
         result->duplicates = order.duplicates;
+        result->negative_zeros = order.negative_zeros;
         status = check_memory(options, result->nodes, order.bricks, order.cells,
                               error);
     }

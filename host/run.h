@@ -55,7 +55,8 @@ struct host_run_options {
 };
 
 struct host_run_result {
-    uint64_t rows, points, duplicates, tetrahedra, hull_facets;
+    uint64_t rows, points, duplicates, negative_zeros;
+    uint64_t tetrahedra, hull_facets;
     struct host_digest digest;
     enum host_strategy strategy; /* the one taken */
     enum host_partition partition;

@@ -98,6 +98,8 @@ static json_t *run_object(const struct host_run_result *r)
     json_t *nodes = json_array();
     put(o, "points", r->rows);
     put(o, "distinct_points", r->points);
+    put(o, "duplicates", r->duplicates);
+    put(o, "negative_zeros", r->negative_zeros);
     put(o, "tetrahedra", r->tetrahedra);
     put(o, "hull_facets", r->hull_facets);
     put_text(o, "digest", r->digest.text);

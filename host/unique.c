@@ -32,6 +32,7 @@ struct search {
     uint64_t distinct[PARTS_MAX];
     struct host_item *items;
     uint64_t first[PARTS_MAX + 1];
+    uint64_t negative_zeros[PARTS_MAX];
     double lo[PARTS_MAX][3], hi[PARTS_MAX][3];
 };
 
@@ -155,14 +156,19 @@ static void fill_part(void *context, unsigned part)
 {
     struct search *s = context;
     struct host_item *to = s->items + s->first[part];
+    uint64_t negative_zeros = 0;
     uint64_t last = part_start(s, part + 1);
     for (uint64_t row = part_start(s, part); row < last; row++) {
         const double *p = s->xyz + 3 * row;
+        for (int d = 0; d < 3; d++) {
+            negative_zeros += p[d] == 0.0 && signbit(p[d]);
+        }
         if (s->doubled[row] == 0) {
             *to++ =
                 (struct host_item){{p[0] + 0.0, p[1] + 0.0, p[2] + 0.0}, row};
         }
     }
+    s->negative_zeros[part] = negative_zeros;
     size_t count = (size_t)(s->first[part + 1] - s->first[part]);
     host_arrange_box(to - count, count, s->lo[part], s->hi[part]);
 }
@@ -176,6 +182,9 @@ static void fill_items(struct search *s, struct host_unique *unique)
         s->first[i + 1] += s->first[i];
     }
     host_fork_all(s->parts, fill_part, s);
+    for (unsigned i = 0; i < s->parts; i++) {
+        unique->negative_zeros += s->negative_zeros[i];
+    }
     for (int d = 0; d < 3; d++) {
         unique->lo[d] = INFINITY;
         unique->hi[d] = -INFINITY;

@@ -21,7 +21,8 @@ struct host_unique {
     struct host_item *items; /* in input order; row = the lowest of equals */
     size_t count;
     size_t capacity;
-    double lo[3], hi[3]; /* tight box */
+    uint64_t negative_zeros; /* coordinates of all rows */
+    double lo[3], hi[3];     /* tight box */
 };
 
 int host_unique_make(struct host_unique *unique, const double *xyz,

@@ -241,8 +241,12 @@ printf '0 0 0\n1 0 0\n0 1 0\n0 0 1\n-0 0 0\n0 0 1\n' > "$in/four.xyz"
 check 'more nodes than points' 'it failed' "$INCODE" run "$in/four.xyz" -q \
     --nodes 32 --verify -o "$scratch/four.npy" --stats "$scratch/four.json"
 check 'duplicates and -0.0 are counted' "$(cat "$scratch/four.json")" \
-    test "$(jq -c '[.points, .distinct_points, .tetrahedra]' \
-    "$scratch/four.json")" = '[6,4,1]'
+    test "$(jq -c '[.points, .distinct_points, .duplicates, .negative_zeros,
+        .tetrahedra]' "$scratch/four.json")" = '[6,4,2,1,1]'
+"$INCODE" run "$in/four.xyz" > "$scratch/output"
+check 'duplicates and -0.0 are told' "$(tr '\n' ' ' < "$scratch/output")" \
+    test "$(grep -cE ': 4 distinct points, 1 tetra|2 of 6 points are dup|-0\.0.*: 1$' \
+    "$scratch/output")" = 3
 for arguments in --help --version 'run --help' 'gen --help' 'verify --help' \
     'digest --help' 'convert --help'; do
     # shellcheck disable=SC2086

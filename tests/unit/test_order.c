@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "../../host/order.h"
+#include "../../host/unique.h"
 
 static uint64_t state = 7;
 
@@ -330,6 +331,7 @@ static void signed_zeros_are_one(void **unused)
                      0);
     assert_int_equal(order.points, 5);
     assert_int_equal(order.duplicates, 3);
+    assert_int_equal(order.negative_zeros, 3);
     for (uint32_t v = 0; v < 5; v++) {
         double p[3];
         host_vertex(&order, v, p);
@@ -337,6 +339,25 @@ static void signed_zeros_are_one(void **unused)
         assert_true(order.row[v] < 4 || order.row[v] == 7);
     }
     host_order_free(&order);
+}
+
+/* Each thread counts its rows. */
+static void signed_zeros_are_counted(void **unused)
+{
+    (void)unused;
+    const size_t rows = (1 << 17) + 5;
+    double *xyz = random_points(rows, 0);
+    struct host_unique distinct;
+    struct host_error error = {0};
+    uint64_t count = 0;
+    for (size_t i = 0; i < 3 * rows; i += 7) {
+        xyz[i] = i % 2 == 0 ? -0.0 : 0.0;
+        count += i % 2 == 0;
+    }
+    assert_int_equal(host_unique_make(&distinct, xyz, rows, &error), 0);
+    assert_int_equal(distinct.negative_zeros, count);
+    host_unique_free(&distinct);
+    free(xyz);
 }
 
 static void extreme_coordinates(void **unused)
@@ -395,6 +416,7 @@ int main(void)
         cmocka_unit_test(bricks_are_compact),
         cmocka_unit_test(shuffling_changes_no_region),
         cmocka_unit_test(signed_zeros_are_one),
+        cmocka_unit_test(signed_zeros_are_counted),
         cmocka_unit_test(extreme_coordinates),
         cmocka_unit_test(flat_input_is_refused),
     };

@@ -17,6 +17,8 @@
 
 static const char *const names[] = {"points",
                                     "distinct_points",
+                                    "duplicates",
+                                    "negative_zeros",
                                     "tetrahedra",
                                     "hull_facets",
                                     "digest",
