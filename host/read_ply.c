@@ -1,4 +1,6 @@
 /* Stanford's .ply, text or binary in either byte order. */
+#include <ctype.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -164,10 +166,12 @@ static int take_list(struct ply *ply, const struct property *p, uint64_t row,
     if (take_number(ply, p->count, row, &count, error) != 0) {
         return error->code;
     }
-    if (!(count >= 0 && count < 0x1p32)) {
-        return host_source_fail(ply->source, error,
-                                "a list of impossible length; the file is "
-                                "damaged, get it again");
+    if (!(count >= 0 && count < 0x1p32 && count == floor(count))) {
+        static const char what[] =
+            "a list of impossible length; correct the header's numbers of "
+            "rows, or get the file again";
+        return ply->coding == TEXT ? damaged(ply, error, what)
+                                   : host_source_fail(ply->source, error, what);
     }
     for (uint64_t i = (uint64_t)count; i > 0; i--) {
         if (take_number(ply, p->type, row, &skipped, error) != 0) {
@@ -191,6 +195,12 @@ static int read_element(struct ply *ply, const struct element *e,
                 return code;
             }
         }
+        if (ply->coding == TEXT && host_scan_more(&ply->scan)) {
+            return damaged(ply, error,
+                           "a number beyond those that the header gives this "
+                           "row; correct the header's properties and numbers "
+                           "of rows");
+        }
         if (e->vertex) {
             double xyz[3] = {value[e->axis[0]], value[e->axis[1]],
                              value[e->axis[2]]};
@@ -200,6 +210,20 @@ static int read_element(struct ply *ply, const struct element *e,
         }
     }
     return 0;
+}
+
+/* Nothing but white space may follow the last element. */
+static int check_end(struct ply *ply, struct host_error *error)
+{
+    static const char what[] = "more follows than the rows that the header "
+                               "gives; correct its numbers of rows";
+    if (ply->coding == TEXT) {
+        return host_scan_end(&ply->scan, error, what);
+    }
+    while (ply->at < ply->end && isspace(*ply->at)) {
+        ply->at++;
+    }
+    return ply->at == ply->end ? 0 : host_source_fail(ply->source, error, what);
 }
 
 int host_read_ply(const struct host_source *source, struct host_mesh *mesh,
@@ -213,6 +237,7 @@ int host_read_ply(const struct host_source *source, struct host_mesh *mesh,
     if (read_header(&ply, error) != 0) {
         return error->code;
     }
+    bool any = false;
     for (int i = 0; i < ply.elements; i++) {
         const struct element *e = &ply.element[i];
         if (e->vertex && (e->axis[0] < 0 || e->axis[1] < 0 || e->axis[2] < 0)) {
@@ -220,10 +245,12 @@ int host_read_ply(const struct host_source *source, struct host_mesh *mesh,
                                     "the vertices have not all of x, y and z; "
                                     "correct the header");
         }
-        if (read_element(&ply, e, mesh->points, error) != 0 || e->vertex) {
+        if (read_element(&ply, e, mesh->points, error) != 0) {
             return error->code;
         }
+        any = any || e->vertex;
     }
-    return host_source_fail(source, error,
-                            "there is no element 'vertex'; give points");
+    return any ? check_end(&ply, error)
+               : host_source_fail(source, error,
+                                  "there is no element 'vertex'; give points");
 }

@@ -1,5 +1,6 @@
 /* Tetrahedra as text: TetGen's .ele, Gmsh's .msh (version 2), Medit's .mesh.
  * Other kinds of element are left out. */
+#include <ctype.h>
 #include <string.h>
 
 #include "readers.h"
@@ -66,7 +67,9 @@ int host_read_ele(const struct host_source *source, struct host_mesh *mesh,
         }
         host_scan_next_line(&s); /* attributes */
     }
-    return 0;
+    return host_scan_end(&s, error,
+                         "a row beyond the number of tetrahedra in the first "
+                         "line; correct that number, or remove the row");
 }
 
 /* --- Gmsh ------------------------------------------------------------- */
@@ -85,6 +88,18 @@ static int msh_format(struct host_scan *s, struct host_error *error)
                               "with Mesh.MshFileVersion = 2.2");
     }
     return 0;
+}
+
+/* After the rows of a section a word begins the next. */
+static int check_section_end(struct host_scan *s, struct host_error *error)
+{
+    return !host_scan_skip_blank_lines(s) || *s->at == '$' ||
+                   isalpha((unsigned char)*s->at)
+               ? 0
+               : host_scan_fail(s, s->at, error,
+                                "a row beyond the number that its section "
+                                "begins with; correct that number, or remove "
+                                "the row");
 }
 
 static int msh_nodes(struct host_scan *s, struct host_mesh *mesh,
@@ -115,7 +130,8 @@ static int msh_nodes(struct host_scan *s, struct host_mesh *mesh,
             return error->code;
         }
     }
-    return 0;
+    host_scan_next_line(s);
+    return check_section_end(s, error);
 }
 
 static int msh_elements(const struct host_source *source, struct host_scan *s,
@@ -151,7 +167,7 @@ static int msh_elements(const struct host_source *source, struct host_scan *s,
             return error->code;
         }
     }
-    return 0;
+    return check_section_end(s, error);
 }
 
 int host_read_msh(const struct host_source *source, struct host_mesh *mesh,
@@ -203,7 +219,7 @@ static int medit_vertices(struct host_scan *s, struct host_mesh *mesh,
             return error->code;
         }
     }
-    return 0;
+    return check_section_end(s, error);
 }
 
 static int medit_tetrahedra(const struct host_source *source,
@@ -225,7 +241,7 @@ static int medit_tetrahedra(const struct host_source *source,
             return error->code;
         }
     }
-    return 0;
+    return check_section_end(s, error);
 }
 
 int host_read_mesh(const struct host_source *source, struct host_mesh *mesh,

@@ -1,5 +1,6 @@
 /* VTK's legacy files, text or binary (big-endian), all kinds of data set that
  * have points. */
+#include <ctype.h>
 #include <string.h>
 #include <strings.h>
 
@@ -98,6 +99,24 @@ static int take_dimensions(struct vtk *vtk, struct host_error *error)
     return 0;
 }
 
+/* What follows numbers is a keyword, or the file's end. */
+static int check_keyword(struct vtk *vtk, struct host_error *error)
+{
+    if (!host_scan_skip_blank_lines(&vtk->scan)) {
+        return 0;
+    }
+    const char *c = vtk->scan.at;
+    while (c < vtk->scan.end && (isalpha((unsigned char)*c) || *c == '_')) {
+        c++;
+    }
+    return c - vtk->scan.at >= 4 &&
+                   (c == vtk->scan.end || isspace((unsigned char)*c))
+               ? 0
+               : damaged(vtk, error,
+                         "a keyword is due after so many points; correct "
+                         "their number");
+}
+
 static int take_points(struct vtk *vtk, struct host_error *error)
 {
     uint64_t count;
@@ -113,6 +132,7 @@ static int take_points(struct vtk *vtk, struct host_error *error)
     if (code == 0) {
         close_stream(vtk, &s);
         vtk->points_done = true;
+        code = check_keyword(vtk, error);
     }
     return code;
 }

@@ -30,7 +30,7 @@ struct xml {
     const uint8_t *appended; /* just past its underscore, or NULL */
     size_t appended_bytes;
     bool appended_base64;
-    bool in_points, in_cells, in_piece, any_piece;
+    bool in_points, in_cells, in_piece, any_piece, counted;
     uint64_t piece_points, piece_cells;
     uint64_t points_before; /* in earlier pieces */
     enum want reading;      /* WANTS: none */
@@ -107,6 +107,12 @@ static void start_array(struct xml *x, const char **attributes)
         fail(x, "an array is there twice or of unknown type; correct it");
         return;
     }
+    const char *components = attribute(attributes, "NumberOfComponents");
+    if (want == POINTS && *components != '\0' && strcmp(components, "3") != 0) {
+        fail(x, "the points have not 3 components; correct "
+                "NumberOfComponents, or give points in space");
+        return;
+    }
     a->there = true;
     a->type = type;
     a->text = strcmp(format, "ascii") == 0 || *format == '\0';
@@ -126,6 +132,31 @@ static void start_array(struct xml *x, const char **attributes)
            x->appended_bytes - (size_t)offset);
 }
 
+/* A piece of a structured grid tells its points by their extent. */
+static void start_piece(struct xml *x, const char **attributes)
+{
+    const char *points = attribute(attributes, "NumberOfPoints");
+    const char *extent = attribute(attributes, "Extent");
+    int e[6];
+    x->any_piece = x->in_piece = true;
+    x->counted = *points != '\0';
+    x->piece_points = strtoull(points, NULL, 10);
+    x->piece_cells = strtoull(attribute(attributes, "NumberOfCells"), NULL, 10);
+    if (!x->counted && sscanf(extent, "%d %d %d %d %d %d", &e[0], &e[1], &e[2],
+                              &e[3], &e[4], &e[5]) == 6) {
+        x->counted = true;
+        x->piece_points = 1;
+        for (int d = 0; d < 6; d += 2) {
+            int64_t n = (int64_t)e[d + 1] - e[d] + 1;
+            if (n < 0 || n > UINT32_MAX || x->piece_points > UINT32_MAX) {
+                fail(x, "an impossible extent; correct it");
+                return;
+            }
+            x->piece_points *= (uint64_t)n;
+        }
+    }
+}
+
 static void XMLCALL start_element(void *context, const char *name,
                                   const char **attributes)
 {
@@ -135,11 +166,7 @@ static void XMLCALL start_element(void *context, const char *name,
     } else if (strcmp(name, "VTKFile") == 0) {
         start_file(x, attributes);
     } else if (strcmp(name, "Piece") == 0) {
-        x->any_piece = x->in_piece = true;
-        x->piece_points =
-            strtoull(attribute(attributes, "NumberOfPoints"), NULL, 10);
-        x->piece_cells =
-            strtoull(attribute(attributes, "NumberOfCells"), NULL, 10);
+        start_piece(x, attributes);
     } else if (strcmp(name, "Points") == 0) {
         x->in_points = true;
     } else if (strcmp(name, "Cells") == 0) {
@@ -210,6 +237,9 @@ static void piece_points(struct xml *x)
     if (x->mesh->points == NULL || (!a->there && x->piece_points == 0)) {
         return;
     }
+    static const char wrong[] =
+        "the numbers in Points are not 3 times NumberOfPoints; correct that, "
+        "or get the file whole";
     uint64_t rows = x->piece_points;
     struct host_stream s = stream_of(x, POINTS);
     if (!a->there) {
@@ -217,15 +247,21 @@ static void piece_points(struct xml *x)
         return;
     }
     if (!a->text) {
-        uint64_t have = a->bytes.bytes / (3 * host_number_bytes(a->type));
-        rows = rows == 0 ? have : rows; /* a structured grid states extents */
-    } else if (rows == 0) {
+        uint64_t row = 3 * host_number_bytes(a->type);
+        rows = x->counted ? rows : a->bytes.bytes / row;
+        if (a->bytes.bytes / row != rows || a->bytes.bytes % row != 0) {
+            fail(x, wrong);
+        }
+    } else if (!x->counted) {
         while (x->error->code == 0 && host_scan_skip_blank_lines(&s.scan)) {
             host_stream_points(&s, 1, x->mesh->points, x->error);
         }
     }
     if (x->error->code == 0) {
         host_stream_points(&s, rows, x->mesh->points, x->error);
+    }
+    if (x->error->code == 0 && !host_stream_ended(&s)) {
+        fail(x, wrong);
     }
 }
 
@@ -248,6 +284,12 @@ static void end_piece(struct xml *x)
         } else {
             host_stream_cells(&c, &o, &t, x->piece_cells, first, x->mesh->tets,
                               x->error);
+            if (x->error->code == 0 &&
+                !(host_stream_ended(&c) && host_stream_ended(&o) &&
+                  host_stream_ended(&t))) {
+                fail(x, "more cells than NumberOfCells, or more corners than "
+                        "their offsets tell; correct these numbers");
+            }
         }
     }
     for (int i = 0; i < WANTS; i++) {

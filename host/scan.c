@@ -72,6 +72,13 @@ int host_scan_fail(const struct host_scan *s, const char *at,
                      (unsigned long long)(at - begin) + 1, what);
 }
 
+int host_scan_end(struct host_scan *s, struct host_error *error,
+                  const char *what)
+{
+    return host_scan_skip_blank_lines(s) ? host_scan_fail(s, s->at, error, what)
+                                         : 0;
+}
+
 /* --- Numbers ---------------------------------------------------------- */
 
 static const uint64_t power10[20] = {1,

@@ -55,6 +55,10 @@ void host_scan_word(struct host_scan *s, char *word, size_t size);
 /* Whether the word at hand is `word`, upper or lower case; takes it if so. */
 bool host_scan_take(struct host_scan *s, const char *word);
 
+/* HOST_INPUT with `what` where anything but comments is left. */
+int host_scan_end(struct host_scan *s, struct host_error *error,
+                  const char *what);
+
 /* "PATH:LINE:COLUMN: what", for the place `at`; returns HOST_INPUT. */
 int host_scan_fail(const struct host_scan *s, const char *at,
                    struct host_error *error, const char *what);

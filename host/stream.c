@@ -61,6 +61,11 @@ int host_stream_skip(struct host_stream *s, uint64_t count,
     return 0;
 }
 
+bool host_stream_ended(struct host_stream *s)
+{
+    return s->text ? !host_scan_skip_blank_lines(&s->scan) : s->at == s->end;
+}
+
 int host_stream_points(struct host_stream *s, uint64_t rows,
                        struct host_points *points, struct host_error *error)
 {

@@ -32,6 +32,9 @@ int host_stream_whole(struct host_stream *s, uint64_t *value,
 int host_stream_skip(struct host_stream *s, uint64_t count,
                      struct host_error *error);
 
+/* Whether nothing is left. */
+bool host_stream_ended(struct host_stream *s);
+
 /* Appends points from three numbers each. */
 int host_stream_points(struct host_stream *s, uint64_t rows,
                        struct host_points *points, struct host_error *error);

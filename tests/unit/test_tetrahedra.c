@@ -415,6 +415,23 @@ static void faults_have_their_place(void **unused)
     refused("a.ele", "1 4 0\n1 0 1 2 3\n", "a.ele:2:10: a vertex of this");
     refused("a.ele", "1 4 0\n0 0 1 2 99999999999\n",
             "a.ele:2:20: a vertex of this tetrahedron is no row of points");
+    refused("a.ele", "1 4 0\n0 0 1 2 3\n# end\n1 0 1 2 4\n",
+            "a.ele:4:1: a row beyond the number");
+    refused("a.msh",
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Elements\n1\n"
+            "1 4 2 1 1 1 2 3 4\n2 4 2 1 1 1 2 3 5\n$EndElements\n",
+            "a.msh:7:1: a row beyond the number");
+    refused("a.mesh",
+            "MeshVersionFormatted 2\nDimension 3\nTetrahedra\n1\n"
+            "1 2 3 4 0\n1 2 3 5 0\nEnd\n",
+            "a.mesh:6:1: a row beyond the number");
+    refused("a.vtu",
+            "<VTKFile>\n<Piece NumberOfPoints=\"5\" NumberOfCells=\"1\">\n"
+            "<Cells><DataArray type=\"Int32\" Name=\"connectivity\">0 1 2 3 "
+            "0 1 2 4</DataArray><DataArray type=\"Int32\" Name=\"offsets\">4 "
+            "8</DataArray><DataArray type=\"UInt8\" Name=\"types\">10 10"
+            "</DataArray></Cells>\n</Piece></VTKFile>",
+            "a.vtu:4: more cells than NumberOfCells");
     refused("a.msh", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "version 2");
     refused("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "$Elements");
     refused("a.mesh", "MeshVersionFormatted 2\nDimension 3\n",

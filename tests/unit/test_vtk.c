@@ -49,6 +49,10 @@ static void vtk_legacy(void **unused)
             "POINTS 2 float\n1 2 3\n4 five 6\n",
             "a.vtk:7:3: 'five' is no number");
     refused("a.vtk",
+            "# vtk DataFile Version 2.0\nt\nASCII\nDATASET POLYDATA\n"
+            "POINTS 2 float\n1 2 3\n4 5 6 7 8 9\nPOINT_DATA 2\n",
+            "a.vtk:7:7: a keyword is due after so many points");
+    refused("a.vtk",
             "# vtk DataFile Version 2.0\nt\nASCII\n"
             "DATASET STRUCTURED_POINTS\nDIMENSIONS 99999 99999 99999\n",
             "more than 2^22");
@@ -132,6 +136,17 @@ static void vtk_xml_of_every_coding(void **unused)
             expect_rows("a.vtp", &b, 4);
             expect_rows("a.vtu", &b, 4);
             expect_rows("a.vts", &b, 4);
+            for (int n = 3; n <= 5; n += 2) { /* points, says the piece */
+                char *said = strstr((char *)b.data, "OfPoints=\"4\"");
+                assert_non_null(said);
+                said[10] = (char)('0' + n);
+                struct host_points points;
+                struct host_error error = {0};
+                assert_int_equal(
+                    host_points_parse("a.vtu", b.data, b.n, &points, &error),
+                    HOST_INPUT);
+                said[10] = '4';
+            }
             size_t tail = way < 3 ? 3 : 30; /* blanks; or past the data */
             b.n -= tail;
             expect_cuts_refused("a.vtu", &b, b.n > 40 ? b.n - 40 : 0);
@@ -147,6 +162,34 @@ static void vtk_xml_of_every_coding(void **unused)
             "</DataArray><DataArray type=\"Int8\" format=\"binary\"/>"
             "</Points></Piece></VTKFile>",
             "there twice");
+    static const char piece[] =
+        "<VTKFile>\n<Piece %s>\n<Points>\n<DataArray type=\"Float64\" "
+        "NumberOfComponents=\"%d\" format=\"ascii\">\n-3 -2.5 -2 -1.5 -1 -.5 "
+        "0 .5 1 1.5 2 2.5\n</DataArray>\n</Points>\n</Piece>\n</VTKFile>\n";
+    static const struct {
+        const char *counts, *wrong;
+        int components;
+    } pieces[] = {
+        {"NumberOfPoints=\"3\"", "a.vtu:8: the numbers in Points are not", 3},
+        {"NumberOfPoints=\"5\"", "a.vtu:6:1: the file ends where", 3},
+        {"NumberOfPoints=\"0\"", "a.vtu:8: the numbers in Points are not", 3},
+        {"NumberOfPoints=\"4\"", "a.vtu:4: the points have not 3 comp", 2},
+        {"Extent=\"0 1 0 2 0 0\"", "a.vtu:6:1: the file ends where", 3},
+        {"Extent=\"0 0 0 0 0 0\"", "a.vtu:8: the numbers in Points are", 3},
+        {"NumberOfPoints=\"4\"", NULL, 3},
+        {"Extent=\"2 3 -1 0 5 5\"", NULL, 3},
+        {"", NULL, 3},
+    };
+    for (size_t i = 0; i < sizeof pieces / sizeof pieces[0]; i++) {
+        struct bytes b = {.n = 0};
+        b.n = (size_t)snprintf((char *)b.data, sizeof b.data, piece,
+                               pieces[i].counts, pieces[i].components);
+        if (pieces[i].wrong != NULL) {
+            refused("a.vtu", (char *)b.data, pieces[i].wrong);
+        } else {
+            expect_rows("a.vts", &b, 4);
+        }
+    }
     refused("a.vtu", "<VTKFile>\n<Piece>\n</VTKFile>\n", "a.vtu:3: mismatch");
     refused("a.vtu", "<VTKFile compressor=\"vtkLZ4DataCompressor\">\n",
             "a.vtu:1: a compressor");
