@@ -61,7 +61,9 @@ static const struct argp_option options_of_run[] = {
     {"nodes", KEY_NODES, "N", 0,
      "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
     {"memory", KEY_MEMORY, "BYTES", 0,
-     "Data memory of a node, stack included: 256K .. 1G. Default: 4M", 1},
+     "Data memory of a node, stack included: 640K .. 1G; a small cube does "
+     "with less, and an error says with how much. Default: 4M",
+     1},
     {"link", KEY_LINK, "NAME", 0,
      "Wires between nodes: tcp, the default, serial (pseudo-terminals) or mpi "
      "(ranks of Open MPI, also under mpirun)",
@@ -211,7 +213,7 @@ static void parse_memory(struct parse *p, const char *value)
         *bytes > UINT64_C(1) << 30) {
         host_fail(p->error, HOST_USAGE,
                   "--memory %s: not a size of memory that is allowed; give "
-                  "256K to 1G",
+                  "640K to 1G, or less to a small cube",
                   value);
     }
     *bytes = *bytes / 4096 * 4096;

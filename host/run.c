@@ -141,6 +141,15 @@ static int run_service(const struct host_run_options *options,
     return status;
 }
 
+static unsigned cube_dimension(unsigned nodes)
+{
+    unsigned dimension = 0;
+    while (1u << dimension < nodes) {
+        dimension++;
+    }
+    return dimension;
+}
+
 /* The least memory that node 0, which has the most links, does with. */
 static uint64_t memory_needed(const struct host_run_options *options,
                               unsigned dimension,
@@ -158,29 +167,45 @@ static uint64_t memory_needed(const struct host_run_options *options,
     return memory;
 }
 
+/* What can be done where a cube needs more memory than its nodes have. */
+static const char *memory_advice(const struct host_run_options *options,
+                                 unsigned nodes,
+                                 const struct incode_setup *setup)
+{
+    struct host_run_options narrow = *options;
+    narrow.window = 0;
+    bool fewer =
+        nodes > 1 && memory_needed(options, 0, setup) <= options->memory;
+    if (options->cube != NULL) {
+        return "";
+    }
+    if (options->window > 0 && memory_needed(&narrow, cube_dimension(nodes),
+                                             setup) <= options->memory) {
+        return fewer ? ", fewer --nodes, or no --window" : ", or no --window";
+    }
+    return fewer ? ", or fewer --nodes" : "";
+}
+
 /* bricks, cells: of the order, where it is known; else 1 and none. */
 static int check_memory(const struct host_run_options *options, unsigned nodes,
                         uint32_t bricks, const uint32_t cells[3],
                         struct host_error *error)
 {
     struct incode_setup setup = {0};
-    unsigned dimension = 0;
-    while (1u << dimension < nodes) {
-        dimension++;
-    }
     setup.bricks = bricks;
     setup.index = (uint8_t)options->index;
     memcpy(setup.cells, cells, sizeof setup.cells);
-    uint64_t needed = memory_needed(options, dimension, &setup);
+    uint64_t needed = memory_needed(options, cube_dimension(nodes), &setup);
     return needed <= options->memory
                ? 0
                : host_fail(error, HOST_USAGE,
-                           "--memory %lluK: index %s on %u node%s needs "
-                           "at least %lluK; give that, or another --index",
-                           (unsigned long long)options->memory / 1024,
-                           host_index_name(options->index), nodes,
-                           nodes == 1 ? "" : "s",
-                           (unsigned long long)needed / 1024);
+                           "%s%s %lluK: a node of %u needs at least %lluK; "
+                           "give that%s",
+                           options->cube == NULL ? "" : options->cube,
+                           options->cube == NULL ? "--memory" : ": memory",
+                           (unsigned long long)options->memory / 1024, nodes,
+                           (unsigned long long)needed / 1024,
+                           memory_advice(options, nodes, &setup));
 }
 
 int host_triangulate_on(const struct host_run_options *options,

@@ -227,6 +227,23 @@ usage 'unknown face rule' 'own.*paper' run "$good" --face-rule all -o "$out"
 usage 'unknown link' 'tcp' run "$good" --link pigeon -o "$out"
 usage 'unknown board' 'linux' run "$good" --board z80 -o "$out"
 usage 'memory too small' 'memory' run "$good" --memory 1K -o "$out"
+# What is said to be needed is: that much works, and less does not.
+for nodes in 1 64; do
+    usage "memory too small for $nodes" 'needs at least [0-9]+K; give that' \
+        run "$good" --nodes $nodes --memory 256K -o "$out"
+    need=$(sed 's/.*at least \([0-9]*\)K.*/\1/' "$scratch/errors")
+    usage "memory a little too small for $nodes" "needs at least ${need}K" \
+        run "$good" --nodes $nodes --memory $((need - 16))K -o "$out"
+    for index in naive grid kd; do
+        succeeds "memory just enough for $nodes, $index" "$INCODE" run "$good" \
+            -q --nodes $nodes --index $index --memory "${need}K"
+    done
+done
+check 'memory that always suffices' "$need K are more" test "$need" -le 640
+usage 'memory enough on fewer nodes' 'give that, or fewer --nodes' run "$good" \
+    --nodes 64 --memory $((need - 32))K -o "$out"
+usage 'memory enough without --window' 'give that, fewer --nodes, or no --window' run "$good" \
+    --nodes 64 --window 64 --memory 1M -o "$out"
 usage 'memory no number' 'memory' run "$good" --memory lots -o "$out"
 usage 'unknown output format' 'vtu' run "$good" -o "$left/o.xls"
 usage 'unknown kind' 'uniform' gen cheese 100 -o "$left/o.xyz"

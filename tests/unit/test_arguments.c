@@ -149,7 +149,7 @@ static void test_refused(void **unused)
         {"--cluster=4", "not in this version"},
         {"--nodes=3", "1, 2, 4, 8, 16, 32, 64"},
         {"--nodes=128", "1, 2, 4, 8, 16, 32, 64"},
-        {"--memory=1K", "256K to 1G"},
+        {"--memory=1K", "640K to 1G"},
         {"--window=0", "1 to 64"}};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         const char *const words[] = {"a.xyz", wrong[i].word, NULL};
