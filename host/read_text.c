@@ -1,21 +1,30 @@
 /* Points as text: .xyz .txt .csv, TetGen's .node, .off. */
 #include <string.h>
 
+#include "read_csv.h"
 #include "readers.h"
 #include "scan.h"
 
-/* Whether the first line of a .csv names the columns: none of them begins like
- * a number. */
-static bool names_columns(struct host_scan s)
+/* Three numbers and no more on a line. */
+static int take_three(struct host_scan *s, double v[3],
+                      struct host_error *error)
 {
-    while (host_scan_more(&s)) {
-        char word[64];
-        host_scan_word(&s, word, sizeof word);
-        if (strchr("+-.0123456789", word[0]) != NULL) {
-            return false;
+    for (int d = 0; d < 3; d++) {
+        if (d > 0 && !host_scan_more(s)) {
+            return host_scan_fail(s, s->at, error,
+                                  d == 1 ? "1 column where x, y and z are "
+                                           "due; complete the line"
+                                         : "2 columns where x, y and z "
+                                           "are due; complete the line");
+        }
+        if (host_scan_double(s, &v[d], error) != 0) {
+            return error->code;
         }
     }
-    return true;
+    return host_scan_more(s)
+               ? host_scan_fail(s, s->at, error,
+                                "more than 3 columns; leave only x, y and z")
+               : 0;
 }
 
 int host_read_xyz(const struct host_source *source, struct host_mesh *mesh,
@@ -23,28 +32,21 @@ int host_read_xyz(const struct host_source *source, struct host_mesh *mesh,
 {
     struct host_scan s =
         host_scan_start(source->path, source->data, source->bytes);
-    if (host_is_csv(source->path) && host_scan_skip_blank_lines(&s) &&
-        names_columns(s)) {
-        host_scan_next_line(&s);
+    struct host_csv csv = {.column = {0, 1, 2}};
+    if (host_is_csv(source->path) && host_csv_header(&csv, &s, error) != 0) {
+        return error->code;
     }
     while (host_scan_skip_blank_lines(&s)) {
-        double xyz[3];
-        for (int d = 0; d < 3; d++) {
-            if (d > 0 && !host_scan_more(&s)) {
-                return host_scan_fail(&s, s.at, error,
-                                      d == 1 ? "1 column where x, y and z are "
-                                               "due; complete the line"
-                                             : "2 columns where x, y and z "
-                                               "are due; complete the line");
-            }
-            if (host_scan_double(&s, &xyz[d], error) != 0) {
-                return error->code;
+        double v[3], xyz[3];
+        if (csv.fields > 3) {
+            host_csv_row(&csv, &s, xyz, error);
+        } else if (take_three(&s, v, error) == 0) {
+            for (int d = 0; d < 3; d++) {
+                xyz[d] = v[csv.column[d]];
             }
         }
-        if (host_scan_more(&s)) {
-            return host_scan_fail(&s, s.at, error,
-                                  "more than 3 columns; leave only x, y and "
-                                  "z");
+        if (error->code != 0) {
+            return error->code;
         }
         if (host_points_append(mesh->points, xyz, 1, error) != 0) {
             return error->code;

@@ -93,6 +93,21 @@ static void text_in_all_its_habits(void **unused)
     b.n = 0;
     put_text(&b, "x,\"y [m]\",z\n-3,-2.5,-2\n");
     expect_rows("a.csv", &b, 1);
+    static const char *const named[] = {
+        "X,Y,Z\n-3,-2.5,-2\n-1.5,-1,-.5\n",
+        "# made\n z , y, \"x\" \r\n-2,-2.5,-3\r\n-.5,-1,-1.5\r\n",
+        "y x z\n-2.5 -3 -2\n  -1  -1.5\t-.5 # behind\n",
+        "name;Z (m);\"id, or none\";x [m];Y\n"
+        "\"a;\"\"b\";-2;#1;-3;-2.5\n\n# between\n;\"-.5\" ; ;-1.5;-1;\n",
+        "id  z   y/mm x\n0 -2  -2.5   -3\nb#c -.5 -1 -1.5  \n",
+        "\xef\xbb\xbf,x,y,z\n0,-3,-2.5,-2\n,-1.5,-1,-.5\n",
+        "east,north,height,\n-3,-2.5,-2\n-1.5,-1,-.5,\n",
+        "t\tx\ty\tz\t\n\t-3\t-2.5\t-2\n1\t-1.5\t-1\t-.5\t\n"};
+    for (size_t i = 0; i < sizeof named / sizeof named[0]; i++) {
+        b.n = 0;
+        put_text(&b, named[i]);
+        expect_rows("a.csv", &b, 2);
+    }
     b.n = 0;
     put_text(&b, "# made by hand\n3 3 1 1\n1 -3 -2.5 -2 7 1\n"
                  "2 -1.5 -1 -.5 7 1\n 3 0 .5 1 7 1\n# end\n");
@@ -121,6 +136,17 @@ static void text_faults_have_their_place(void **unused)
     refused("a.xyz", "1 2 - 3\n", "a.xyz:1:5: '-' is no number");
     refused("a.xyz", "x y z\n1 2 3\n", "a.xyz:1:1: 'x' is no number");
     refused("a.csv", "x,y,z\n1,2,q\n", "a.csv:2:5: 'q' is no number");
+    refused("a.csv", "x,y\n1,2,3\n", "a.csv:1:1: the names of columns are");
+    refused("a.csv", "a,b,c,d\n1,2,3\n", "a.csv:1:1: the names of columns");
+    refused("a.csv", "x,y,X [m],z\n1,2,3,4\n", "a.csv:1:1: two columns");
+    refused("a.csv", "x,y,z,t\n1,2,3,4\n5,6,7\n", "a.csv:3:5: more or fewer");
+    refused("a.csv", "x,y,z,t\n1,2,3,4,5\n", "a.csv:2:9: more or fewer");
+    refused("a.csv", "x,t,y,z\n1,2,3\n", "a.csv:2:5: more or fewer");
+    refused("a.csv", "x,t,y,z\n1,2,,4\n", "a.csv:2:5: ");
+    refused("a.csv", "x,t,y,z\n1,2,3 3,4\n", "a.csv:2:7: more than one number");
+    refused("a.csv", "x,t,y,z\n1,2,3,q\n", "a.csv:2:7: 'q' is no number");
+    refused("a.csv", "z,y,x\n1,2,3,4\n", "a.csv:2:7: more than 3 columns");
+    refused("a.csv", "\"1\",\"2\",\"3\"\n", "a.csv:1:1: '\"1\"' is no number");
     refused("a.xyz", "# nothing\n", "holds no point");
     refused("a.xyz", "", "is empty");
     refused("-", "1 2 x\n", "stdin:1:5: 'x'");

@@ -1,0 +1,31 @@
+/* The columns of a .csv whose first line names them.
+ *
+ * Memory: none.  Work: one pass over a line.
+ *
+ *     struct host_csv csv = {0};
+ *     if (host_csv_header(&csv, &scan, &error) != 0) ...
+ *     while (csv.fields > 3 && host_scan_skip_blank_lines(&scan))
+ *         host_csv_row(&csv, &scan, xyz, &error);
+ */
+#ifndef HOST_READ_CSV_H
+#define HOST_READ_CSV_H
+
+#include "scan.h"
+
+struct host_csv {
+    char delimiter;
+    uint64_t fields;    /* a line; 0: no line names the columns */
+    uint64_t column[3]; /* of x, y and z */
+};
+
+/* Takes the line at hand if it names columns.  x, y and z may be in any order,
+ * in quotes, followed by a unit ("x [m]"), with other columns among them. Three
+ * columns of other names are x, y and z; else HOST_INPUT. */
+int host_csv_header(struct host_csv *csv, struct host_scan *s,
+                    struct host_error *error);
+
+/* Takes a line of as many fields as the header has. */
+int host_csv_row(const struct host_csv *csv, struct host_scan *s, double xyz[3],
+                 struct host_error *error);
+
+#endif
