@@ -8,6 +8,7 @@
 /* ---- memory ---- */
 
 enum {
+    COPIES_MIN = 16,
     FRAMES_MIN = 48,
     FACES_MIN = 4096,
     BRICKS_MIN = 512,
@@ -21,13 +22,29 @@ static size_t round_up(size_t bytes)
     return (bytes + 63) & ~(size_t)63;
 }
 
+/* Copies of points in single precision, near a vertex: one for 32 KB. */
+static uint32_t copies_of(size_t bytes)
+{
+    size_t copies = bytes >> 15;
+    return copies < COPIES_MIN               ? COPIES_MIN
+           : copies > INCODE_VICINITY_COPIES ? INCODE_VICINITY_COPIES
+                                             : (uint32_t)copies;
+}
+
+static size_t control_bytes(size_t bytes)
+{
+    struct incode_vicinity *v = NULL;
+    return round_up(sizeof(struct incode_triangulator)) +
+           copies_of(bytes) * sizeof *v->point;
+}
+
 /* The active face list takes five sixteenths of what the control block leaves
  * (a front of a million points' region), the bricks a sixteenth, page frames
  * the rest. */
 static bool fill_map(struct incode_map *map, size_t bytes)
 {
     memset(map, 0, sizeof *map);
-    map->control = round_up(sizeof(struct incode_triangulator));
+    map->control = control_bytes(bytes);
     map->gather = sizeof(struct incode_gather);
     map->tasks = sizeof(struct incode_task) * INCODE_TASKS;
     if (bytes < map->control)
@@ -61,7 +78,7 @@ static bool fill_map(struct incode_map *map, size_t bytes)
 size_t incode_arena_min(const struct incode_setup *setup)
 {
     (void)setup;
-    size_t bytes = round_up(sizeof(struct incode_triangulator));
+    size_t bytes = sizeof(struct incode_triangulator);
     struct incode_map map;
     while (!fill_map(&map, bytes))
         bytes += 1024;
@@ -105,6 +122,8 @@ incode_triangulator_init(void *arena, size_t bytes,
     t->gather.pages_max = (uint32_t)map.frame_count / 2;
     incode_gather_reset(&t->gather);
     t->vicinity.centre = INCODE_NONE;
+    t->vicinity.point = (void *)((uint8_t *)arena + round_up(sizeof *t));
+    t->vicinity.room = copies_of(bytes);
     t->spread = 1.6;
     t->reach = 2;
     t->window = 4;

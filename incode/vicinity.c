@@ -217,13 +217,13 @@ void incode_vicinity_copy(struct incode_vicinity *v, uint32_t index,
             incode_vd_store_float(v->point[copy][d] + i,
                                   incode_vd_load(axis[d] + i) * scale - origin);
     }
-    if (v->copies < INCODE_VICINITY_COPIES)
+    if (v->copies < v->room)
         v->copies++;
     else
         v->copy[v->owner[copy]] = INCODE_NO_COPY;
     v->owner[copy] = (uint8_t)index;
     v->copy[index] = (uint8_t)copy;
-    v->next = (copy + 1) % INCODE_VICINITY_COPIES;
+    v->next = (copy + 1) % v->room;
 }
 
 uint64_t incode_vicinity_points(const struct incode_vicinity *v, uint32_t index,

@@ -2,9 +2,10 @@
  * in single precision: most searches beyond the points at hand end among them,
  * without the tree, and read the points themselves only where they matter.
  *
- * Memory: struct incode_vicinity, about 30 KB.  Work: a walk of the box pages a
- * brick; a search looks at every box of the list, a vector at a time, and at
- * the points of those that it cannot rule out.
+ * Memory: struct incode_vicinity, about 6 KB, and room for 16 to 32 copies of
+ * 768 bytes, given by its owner.  Work: a walk of the box pages a brick; a
+ * search looks at every box of the list, a vector at a time, and at the points
+ * of those that it cannot rule out.
  *
  *     incode_vicinity_make(&vicinity, &walker, brick, lo, hi, pages_max);
  *     r = incode_vicinity_visit(&vicinity, &walker, &query, visit, context);
@@ -35,7 +36,8 @@ struct incode_vicinity {
     double origin[3], scale;
     double box_lo[3], box_hi[3]; /* what meets this box is in the list */
     /* The points of some of the bricks, in the boxes' units. */
-    alignas(64) float point[INCODE_VICINITY_COPIES][3][INCODE_BRICK_POINTS];
+    float (*point)[3][INCODE_BRICK_POINTS];
+    uint32_t room; /* for so many of them, up to INCODE_VICINITY_COPIES */
     uint8_t copy[INCODE_VICINITY_BRICKS]; /* which, or INCODE_NO_COPY */
     uint8_t owner[INCODE_VICINITY_COPIES];
     uint32_t copies, next; /* how many, and which is given away next */
