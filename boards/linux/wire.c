@@ -80,22 +80,39 @@ static void recover(void *context)
     }
 }
 
+/* From the end, as a device's name may have colons of its own. */
+static bool read_line(struct linux_wire *wire, const char *text)
+{
+    static const char flow[] = ":rtscts";
+    size_t size = strlen(text);
+    wire->rts_cts =
+        size >= strlen(flow) && strcmp(text + size - strlen(flow), flow) == 0;
+    size -= wire->rts_cts ? strlen(flow) : 0;
+    size_t digits = 0;
+    while (digits < size && text[size - digits - 1] >= '0' &&
+           text[size - digits - 1] <= '9') {
+        digits++;
+    }
+    size -= digits;
+    if (digits == 0 || size < 2 || text[size - 1] != ':' ||
+        size > sizeof wire->device) {
+        return false;
+    }
+    wire->baud = (uint32_t)strtoul(text + size, NULL, 10);
+    memcpy(wire->device, text, size - 1);
+    return true;
+}
+
 static bool open_line(struct linux_wire *wire, const char *text,
                       struct linux_fault *fault)
 {
-    const char *baud = strchr(text, ':');
-    const char *flow = baud == NULL ? NULL : strchr(baud + 1, ':');
-    if (baud == NULL || (size_t)(baud - text) >= sizeof wire->device ||
-        (flow != NULL && strcmp(flow, ":rtscts") != 0)) {
+    if (!read_line(wire, text)) {
         fault->what = "not a device and its rate";
         fault->next = "write serial:/dev/ttyS0:115200 or "
                       "serial:/dev/ttyS0:115200:rtscts";
         return false;
     }
-    memcpy(wire->device, text, (size_t)(baud - text));
     wire->kind = LINUX_TERMINAL;
-    wire->baud = (uint32_t)strtoul(baud + 1, NULL, 10);
-    wire->rts_cts = flow != NULL;
     serial_pipe_init(&wire->line, -1, wire->baud);
     wire->line.recover = recover;
     wire->line.context = wire;

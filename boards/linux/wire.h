@@ -23,7 +23,7 @@ struct linux_wire {
     struct tcp_pipe tcp;     /* a socket from the one who started the node */
     struct serial_pipe line; /* a terminal */
     struct tcp_wire *net;    /* TCP, by calling and listening */
-    char device[64];         /* of a terminal that was opened here */
+    char device[128];        /* of a terminal that was opened here */
     uint32_t baud;
     bool rts_cts;
     uint64_t look_us; /* when it was last looked for, */

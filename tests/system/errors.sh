@@ -298,5 +298,10 @@ node 'an address of others' '--wire 0=listen:192.0.2.1:5: cannot listen .*: ' \
     --node 0 --dimension 0 --wire 0=listen:192.0.2.1:5 --key "$in/key"
 node 'no such wire' '--wire 0=tape:a: not one of listen:' \
     --node 0 --dimension 0 --wire 0=tape:a
+node 'a port without a rate' '--wire 0=serial:/dev/null:fast: not a device' \
+    --node 0 --dimension 0 --wire 0=serial:/dev/null:fast
+ln -s /dev/null "$in/usb:1:1.0"
+node 'a port whose name has colons' '--wire .*1.0:9600:rtscts: does not open' \
+    --node 0 --dimension 0 --wire "0=serial:$in/usb:1:1.0:9600:rtscts"
 "$BUILD/incode-node" --help > "$scratch/output" 2> "$scratch/errors"
 check 'node/help' "exit $?" grep -q -e '--wire LINK=WIRE' "$scratch/output"

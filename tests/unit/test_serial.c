@@ -148,6 +148,52 @@ static void a_port_in_use_says_by_whom(void **unused)
     close(ready[1]);
 }
 
+/* A pseudo-terminal has no lasting name but that of a link, which leads to
+ * another one when both ends were made anew. */
+static void a_link_is_followed_each_time(void **unused)
+{
+    char directory[] = "/tmp/incode-serial.XXXXXX", path[64];
+    int first[2], second[2];
+    uint8_t byte = 7;
+    struct serial_port port;
+    struct serial_port_settings settings = {.baud = 921600};
+    (void)unused;
+    assert_non_null(mkdtemp(directory));
+    snprintf(settings.name, sizeof settings.name, "%s/wire", directory);
+    assert_int_equal(serial_pair(first), 0);
+    assert_int_equal(serial_pair(second), 0);
+    assert_int_equal(ttyname_r(first[1], path, sizeof path), 0);
+    assert_int_equal(symlink(path, settings.name), 0);
+    close(first[1]);
+    assert_int_equal(serial_port_open(&port, &settings), 0);
+    struct link_pipe pipe = serial_link_pipe(&port.pipe);
+    assert_int_equal(write(first[0], &byte, 1), 1);
+    wait_for(port.pipe.fd);
+    assert_int_equal(pipe.receive(pipe.context, &byte, 1), 1);
+    close(first[0]);
+    assert_int_equal(pipe.receive(pipe.context, &byte, 1), LINK_PIPE_CLOSED);
+    assert_int_equal(unlink(settings.name), 0);
+    assert_int_equal(ttyname_r(second[1], path, sizeof path), 0);
+    close(second[1]);
+    assert_int_equal(symlink(path, settings.name), 0);
+    for (unsigned i = 0; i < 100 && port.returned == 0; i++) {
+        (void)pipe.receive(pipe.context, &byte, 1);
+        usleep(20000);
+    }
+    assert_int_equal(port.returned, 1);
+    assert_int_equal(write(second[0], &byte, 1), 1);
+    wait_for(port.pipe.fd);
+    assert_int_equal(pipe.receive(pipe.context, &byte, 1), 1);
+    serial_port_close(&port);
+    close(second[0]);
+    assert_int_equal(unlink(settings.name), 0);
+    assert_int_equal(symlink("/dev/null", settings.name), 0);
+    assert_int_equal(serial_port_open(&port, &settings), -1);
+    assert_non_null(strstr(port.fault, settings.name));
+    serial_port_close(&port);
+    assert_int_equal(unlink(settings.name) | rmdir(directory), 0);
+}
+
 static void ports_that_are_not_there(void **unused)
 {
     static const char *const names[] = {"usb:no such number", "at:9-9.9",
@@ -436,6 +482,7 @@ int main(void)
         cmocka_unit_test(a_line_that_breaks_comes_back),
         cmocka_unit_test(rates_and_modes),
         cmocka_unit_test(a_port_in_use_says_by_whom),
+        cmocka_unit_test(a_link_is_followed_each_time),
         cmocka_unit_test(ports_that_are_not_there),
         cmocka_unit_test(a_clean_line_resends_nothing),
         cmocka_unit_test(a_link_fills_a_paced_line),

@@ -12,6 +12,7 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -195,11 +196,11 @@ static int set_rate(struct sp_port *library,
                : -1;
 }
 
-static int open_by_library(struct serial_port *port)
+static int open_by_library(struct serial_port *port, const char *path)
 {
     struct sp_port *library = NULL;
     int fd = -1;
-    if (sp_get_port_by_name(port->device, &library) != SP_OK) {
+    if (sp_get_port_by_name(path, &library) != SP_OK) {
         return refuse(port, "no such serial port", "is it plugged in?");
     }
     if (sp_open(library, SP_MODE_READ_WRITE) != SP_OK) {
@@ -229,13 +230,9 @@ static int open_by_library(struct serial_port *port)
     return status == 0 && fd < 0 ? refuse_errno(port, errno) : fd;
 }
 
-static int open_device(struct serial_port *port)
+static int open_terminal(struct serial_port *port, const char *path)
 {
-    const struct serial_port_settings *s = &port->settings;
-    if (strncmp(port->device, "/dev/pts/", 9) != 0) {
-        return open_by_library(port);
-    }
-    int fd = serial_open(port->device, s->baud, false);
+    int fd = serial_open(path, port->settings.baud, false);
     if (fd < 0) {
         return refuse_errno(port, errno);
     }
@@ -244,6 +241,29 @@ static int open_device(struct serial_port *port)
         return refuse_used(port);
     }
     return fd;
+}
+
+/* By number, wherever they are mounted: Linux numbers the drivers of
+ * pseudo-terminals' slaves 136 to 143. */
+static bool is_pseudo_terminal(dev_t device)
+{
+    return major(device) >= 136 && major(device) <= 143;
+}
+
+/* The name may be a link, which may lead elsewhere the next time; the library
+ * knows devices by their own names alone. */
+static int open_device(struct serial_port *port)
+{
+    char path[PATH_MAX];
+    struct stat about;
+    if (realpath(port->device, path) == NULL || stat(path, &about) != 0) {
+        return refuse_errno(port, errno);
+    }
+    if (!S_ISCHR(about.st_mode)) {
+        return refuse(port, "not a serial port", "give the device of one");
+    }
+    return is_pseudo_terminal(about.st_rdev) ? open_terminal(port, path)
+                                             : open_by_library(port, path);
 }
 
 static uint64_t clock_us(void)

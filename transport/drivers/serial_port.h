@@ -19,7 +19,8 @@
 enum { SERIAL_NAME_MAX = 128, SERIAL_LOOK_US = 500000 };
 
 struct serial_port_settings {
-    /* "/dev/ttyUSB0"; "usb:NUMBER", the adapter's serial number; "at:1-1.3",
+    /* "/dev/ttyUSB0", or a link to it, which is followed each time that the
+     * port is opened; "usb:NUMBER", the adapter's serial number; "at:1-1.3",
      * its bus and the ports on the way to it, as /sys names them. */
     char name[SERIAL_NAME_MAX];
     uint32_t baud; /* any rate that the port can; 0: as it is */
