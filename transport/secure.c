@@ -4,16 +4,20 @@
 
 #include "check.h"
 
-static const uint8_t magic[8] = {'i', 'n', 'c', 'o', 'd', 'e', 's', 1};
+static const uint8_t magic[8] = {'i', 'n', 'c', 'o', 'd', 'e', 's', 2};
 
 /* The complement tells a changed size at once: bytes that never come are not
- * waited for. */
-static void put_head(uint8_t head[SECURE_HEAD_BYTES], size_t size)
+ * waited for.  The number, its low 32 bits, tells what is missing before it. */
+static void put_head(uint8_t head[SECURE_HEAD_BYTES], size_t size,
+                     uint64_t number)
 {
     head[0] = (uint8_t)size;
     head[1] = (uint8_t)(size >> 8);
     head[2] = (uint8_t)~head[0];
     head[3] = (uint8_t)~head[1];
+    for (unsigned i = 0; i < 4; i++) {
+        head[4 + i] = (uint8_t)(number >> 8 * i);
+    }
 }
 
 /* The size that a head states, or SIZE_MAX: none. */
@@ -22,6 +26,15 @@ static size_t head_size(const uint8_t head[SECURE_HEAD_BYTES])
     size_t size = (size_t)head[0] | (size_t)head[1] << 8;
     bool sound = (head[0] ^ head[2]) == 0xff && (head[1] ^ head[3]) == 0xff;
     return sound && size <= SECURE_RECORD_MAX ? size : SIZE_MAX;
+}
+
+/* How many records are missing before it, if it is one to come. */
+static uint32_t head_ahead(const uint8_t head[SECURE_HEAD_BYTES],
+                           uint64_t expected)
+{
+    uint32_t number = (uint32_t)head[4] | (uint32_t)head[5] << 8 |
+                      (uint32_t)head[6] << 16 | (uint32_t)head[7] << 24;
+    return number - (uint32_t)expected;
 }
 
 /* --- proving ------------------------------------------------------------- */
@@ -66,7 +79,7 @@ static bool take_greeting(struct secure_shake *shake)
         return false;
     }
     derive(shake);
-    put_head(proof, 0);
+    put_head(proof, 0, shake->keys.out_count);
     shake->suite->seal(proof + SECURE_HEAD_BYTES, proof, 0, proof,
                        shake->keys.out_count++, shake->keys.out);
     shake->out_end = SECURE_OPENING_BYTES;
@@ -78,7 +91,7 @@ static bool take_proof(struct secure_shake *shake)
 {
     uint8_t *proof = shake->in + SECURE_GREETING_BYTES;
     shake->proven =
-        head_size(proof) == 0 &&
+        head_size(proof) == 0 && head_ahead(proof, 0) == 0 &&
         shake->suite->open(proof, proof + SECURE_HEAD_BYTES, 0, proof,
                            shake->keys.in_count++, shake->keys.in);
     return shake->proven;
@@ -173,7 +186,7 @@ static int channel_send(void *context, const uint8_t *bytes, size_t size)
         return 0;
     }
     size = size < SECURE_RECORD_MAX ? size : SECURE_RECORD_MAX;
-    put_head(c->out, size);
+    put_head(c->out, size, c->keys.out_count);
     c->suite->seal(c->out + SECURE_HEAD_BYTES, bytes, size, c->out,
                    c->keys.out_count++, c->keys.out);
     c->records_out++;
@@ -182,66 +195,138 @@ static int channel_send(void *context, const uint8_t *bytes, size_t size)
     return flush(c) ? (int)size : fail(c);
 }
 
-/* Reads towards a whole record: false when the pipe is closed or the size is
- * none.  No byte beyond the record is taken. */
-static bool receive_record(struct secure_channel *c)
+/* Where the next record begins in what has come, from `at` on; else where one
+ * might whose head is not whole. */
+static size_t find_head(const struct secure_channel *c, size_t at)
 {
-    for (int i = 0; i < 2; i++) {
-        size_t want = SECURE_HEAD_BYTES;
-        if (c->in_end >= SECURE_HEAD_BYTES) {
-            if (head_size(c->in) == SIZE_MAX) {
-                c->refused++;
-                return false;
-            }
-            want += head_size(c->in) + SECURE_TAG_BYTES;
-        }
-        int got = c->pipe.receive(c->pipe.context, c->in + c->in_end,
-                                  want - c->in_end);
-        if (got <= 0) {
-            return got == 0;
-        }
-        c->in_end += (size_t)got;
+    while (at + SECURE_HEAD_BYTES <= c->in_end &&
+           (head_size(c->in + at) == SIZE_MAX ||
+            head_ahead(c->in + at, c->keys.in_count) >= SECURE_AHEAD_MAX)) {
+        at++;
     }
+    return at;
+}
+
+/* The first bytes of what has come are taken. */
+static void take(struct secure_channel *c, size_t size)
+{
+    c->in_end -= size;
+    c->seen = 0;
+    memmove(c->in, c->in + size, c->in_end);
+}
+
+/* Leaves out at least so many, and all that begin no record. */
+static void skip(struct secure_channel *c, size_t least)
+{
+    size_t at = find_head(c, least);
+    if (at > 0) {
+        c->lost += at;
+        take(c, at);
+    }
+}
+
+/* Whether the record that is awaited was cut short, as another begins within
+ * it: then that is the first.  By chance one in 2^37 bytes looks like a head.
+ */
+static bool is_cut(struct secure_channel *c)
+{
+    size_t at = find_head(c, c->seen > 0 ? c->seen : 1);
+    if (c->in_end < SECURE_HEAD_BYTES || at + SECURE_HEAD_BYTES > c->in_end) {
+        c->seen = at;
+        return false;
+    }
+    c->lost += at;
+    take(c, at);
     return true;
 }
 
-static bool open_record(struct secure_channel *c)
+/* The record at the front of what has come: true if it is the peer's.  What is
+ * missing before it ends the frame that it was in. */
+static bool open_record(struct secure_channel *c, size_t size)
 {
-    size_t size = head_size(c->in);
-    if (!c->suite->open(c->in + SECURE_HEAD_BYTES, c->in + SECURE_HEAD_BYTES,
-                        size, c->in, c->keys.in_count++, c->keys.in)) {
+    uint32_t ahead = head_ahead(c->in, c->keys.in_count);
+    if (!c->suite->open(c->plain + 1, c->in + SECURE_HEAD_BYTES, size, c->in,
+                        c->keys.in_count + ahead, c->keys.in)) {
         c->refused++;
+        c->lost += size;
+        skip(c, 1);
         return false;
     }
+    c->keys.in_count += (uint64_t)ahead + 1;
     c->records_in++;
-    c->plain_begin = SECURE_HEAD_BYTES;
-    c->plain_end = SECURE_HEAD_BYTES + size;
-    c->in_end = 0;
+    c->lost = 0;
+    c->plain[0] = 0;
+    c->plain_begin = ahead == 0 ? 1 : 0;
+    c->plain_end = 1 + size;
+    take(c, SECURE_HEAD_BYTES + size + SECURE_TAG_BYTES);
     return true;
+}
+
+/* What to read until a record is whole.  No byte beyond it, as nobody wakes for
+ * bytes that are here; but a place that was lost is not looked for byte by
+ * byte.
+ */
+static size_t missing(const struct secure_channel *c)
+{
+    size_t whole = SECURE_HEAD_BYTES;
+    if (c->in_end >= SECURE_HEAD_BYTES) {
+        whole += head_size(c->in) + SECURE_TAG_BYTES;
+    }
+    if (c->in_end < whole && c->lost > 0) {
+        whole = sizeof c->in;
+    }
+    return whole > c->in_end ? whole - c->in_end : 0;
+}
+
+/* Takes the next good record, of what is here or can be read: 1, 0 it has not
+ * come yet, or LINK_PIPE_CLOSED. */
+static int take_record(struct secure_channel *c, bool reads)
+{
+    bool dry = !reads;
+    while (c->lost <= SECURE_LOST_MAX) {
+        skip(c, 0);
+        size_t want = missing(c);
+        if (want == 0) {
+            if (open_record(c, head_size(c->in))) {
+                return 1;
+            }
+            continue;
+        }
+        if (dry && is_cut(c)) {
+            continue;
+        }
+        if (dry) {
+            return 0;
+        }
+        int got = c->pipe.receive(c->pipe.context, c->in + c->in_end, want);
+        if (got < 0) {
+            return got;
+        }
+        c->in_end += (size_t)got;
+        dry = (size_t)got < want;
+    }
+    return LINK_PIPE_CLOSED;
 }
 
 static int channel_receive(void *context, uint8_t *bytes, size_t size)
 {
     struct secure_channel *c = context;
+    size_t done = 0, have = 1;
+    int status = 1;
     if (c->failed || !flush(c)) {
         return fail(c);
     }
-    if (c->plain_begin == c->plain_end) {
-        if (!receive_record(c)) {
-            return fail(c);
+    while (status > 0 && have > 0) {
+        if (c->plain_begin == c->plain_end) {
+            status = take_record(c, done == 0);
         }
-        bool whole = c->in_end >= SECURE_HEAD_BYTES &&
-                     c->in_end - SECURE_HEAD_BYTES ==
-                         head_size(c->in) + SECURE_TAG_BYTES;
-        if (whole && !open_record(c)) {
-            return fail(c);
-        }
+        have = c->plain_end - c->plain_begin;
+        have = have < size - done ? have : size - done;
+        memcpy(bytes + done, c->plain + c->plain_begin, have);
+        c->plain_begin += have;
+        done += have;
     }
-    size_t have = c->plain_end - c->plain_begin;
-    have = have < size ? have : size;
-    memcpy(bytes, c->in + c->plain_begin, have);
-    c->plain_begin += have;
-    return (int)have;
+    return status < 0 ? fail(c) : (int)done;
 }
 
 struct link_pipe secure_channel_pipe(struct secure_channel *channel)

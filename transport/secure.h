@@ -1,16 +1,19 @@
 /* Authenticated, fresh and secret bytes over a pipe that strangers can reach,
  * beneath a link: both ends prove that they know the cube's key, and every
- * record carries the next number of its direction under keys of this connection
- * alone.  PROTOCOL.md has the bytes.  A record that is not the next one, or not
- * of the peer's making, fails the connection; the link goes on over the next.
+ * record carries a number of its direction under keys of this connection alone.
+ * PROTOCOL.md has the bytes.  A record that is not of the peer's making, or is
+ * older than the last one, is as good as lost: the next one is found behind it,
+ * and the link beneath hears of a gap by a zero byte, which ends a frame.  Many
+ * in a row fail the connection; the link goes on over the next.
  *
  * The primitives are given: keyed BLAKE2b-256 and ChaCha20-Poly1305 (RFC 7693,
  * RFC 8439), from a library that is known for them.
  *
  * Memory: struct secure_shake while a connection is not proven, struct
  * secure_channel then.  Work: a shake hashes at most three short inputs and
- * opens one empty record; a channel's function handles one record and calls the
- * pipe at most three times.
+ * opens one empty record; a channel's function takes one record, and between
+ * two good ones no more than SECURE_LOST_MAX bytes are opened or skipped in
+ * vain.
  *
  *     secure_shake_init(&shake, suite, key, caller, nonce);
  *     while ((status = secure_shake(&shake, &pipe)) == 0) wait;
@@ -26,12 +29,14 @@ enum {
     SECURE_KEY_BYTES = 32,
     SECURE_NONCE_BYTES = 24,
     SECURE_TAG_BYTES = 16,
-    SECURE_HEAD_BYTES = 4,    /* size, and its complement */
+    SECURE_HEAD_BYTES = 8,    /* size, its complement, number */
     SECURE_RECORD_MAX = 2048, /* bytes of the link in a record */
     SECURE_GREETING_BYTES = 32,
     SECURE_PROOF_BYTES = SECURE_HEAD_BYTES + SECURE_TAG_BYTES,
     SECURE_OPENING_BYTES = SECURE_GREETING_BYTES + SECURE_PROOF_BYTES,
-    SECURE_WIRE_MAX = SECURE_HEAD_BYTES + SECURE_RECORD_MAX + SECURE_TAG_BYTES
+    SECURE_WIRE_MAX = SECURE_HEAD_BYTES + SECURE_RECORD_MAX + SECURE_TAG_BYTES,
+    SECURE_AHEAD_MAX = 65536, /* records that may be lost in a row */
+    SECURE_LOST_MAX = 262144
 };
 
 /* `size` bytes in, size + SECURE_TAG_BYTES out, or the other way round; in and
@@ -79,11 +84,15 @@ struct secure_channel {
     struct link_pipe pipe; /* beneath */
     struct secure_keys keys;
     bool failed;
-    uint64_t records_in, records_out, refused;
+    uint64_t records_in, records_out;
+    uint64_t refused;          /* opened in vain */
+    size_t lost;               /* bytes in vain since the last good record */
     size_t out_begin, out_end; /* sealed, not sent */
-    size_t in_end;             /* of a record that has come in part */
+    size_t in_end;             /* come, and not opened */
+    size_t seen;               /* of those, where no other record begins */
     size_t plain_begin, plain_end;
     uint8_t out[SECURE_WIRE_MAX], in[SECURE_WIRE_MAX];
+    uint8_t plain[1 + SECURE_RECORD_MAX]; /* behind a zero, for a gap */
 };
 
 /* Takes the keys of a shake that returned 1. */
