@@ -188,6 +188,10 @@ enum link_state link_state(const struct link *link);
 const struct link_statistics *link_statistics(const struct link *link);
 const struct link_peer *link_peer(const struct link *link);
 
+/* Whether a sound greeting of a link, of whatever version, is whole among these
+ * bytes. */
+bool link_greets(const uint8_t *bytes, size_t size);
+
 /* Microseconds until link_poll must be called again even if no byte comes and
  * nothing is written; 0: at once. */
 uint64_t link_next_due_us(const struct link *link, uint64_t now_us);

@@ -142,6 +142,11 @@ int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe)
     return shake->proven && shake->out_begin == shake->out_end ? 1 : 0;
 }
 
+bool secure_shake_other_key(const struct secure_shake *shake)
+{
+    return shake->in_end == SECURE_OPENING_BYTES && !shake->proven;
+}
+
 /* --- records ------------------------------------------------------------- */
 
 void secure_channel_start(struct secure_channel *channel,

@@ -79,6 +79,10 @@ void secure_shake_init(struct secure_shake *shake,
  * yet, -1 it does not know the key, or is gone. */
 int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe);
 
+/* Whether it failed because the peer has another key, or what it sent was
+ * damaged on the way. */
+bool secure_shake_other_key(const struct secure_shake *shake);
+
 struct secure_channel {
     const struct secure_suite *suite;
     struct link_pipe pipe; /* beneath */

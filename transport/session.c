@@ -48,6 +48,28 @@ void link_pack_hello(const struct link *link, uint8_t *hello)
     hello[23] = 0;
 }
 
+static bool is_greeting(const uint8_t *bytes, size_t size)
+{
+    struct frame_reader reader;
+    struct frame_header header;
+    uint8_t hello[LINK_HELLO_SIZE];
+    return frame_open(&reader, bytes, size, &header) == FRAME_GOOD &&
+           header.kind == LINK_HELLO && header.size == LINK_HELLO_SIZE &&
+           frame_take(&reader, &header, hello) == FRAME_GOOD;
+}
+
+bool link_greets(const uint8_t *bytes, size_t size)
+{
+    size_t begin = 0, zero = 0;
+    bool found = false;
+    while (!found && begin < size) {
+        zero = begin + frame_find_zero(bytes + begin, size - begin);
+        found = zero < size && is_greeting(bytes + begin, zero - begin);
+        begin = zero + 1;
+    }
+    return found;
+}
+
 /* The name of frames that go from one start of a node to one of another. */
 static uint32_t session(uint32_t from_epoch, unsigned from, uint32_t to_epoch,
                         unsigned to)

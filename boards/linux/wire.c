@@ -185,6 +185,9 @@ void linux_wires_idle(struct linux_wire *wires, unsigned count,
             serial_wait_us(&wire->line) < wait_us) {
             wait_us = serial_wait_us(&wire->line);
         }
+        if (wire->kind == LINUX_NET && tcp_wire_wait_us(wire->net) < wait_us) {
+            wait_us = tcp_wire_wait_us(wire->net);
+        }
         first[i] = used;
         used += add_events(wire, fds + used);
     }

@@ -102,12 +102,13 @@ static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
                   bool connected, uint64_t now_us)
 {
     uint8_t nonce[SECURE_NONCE_BYTES];
+    memset(&c->heard, 0, sizeof c->heard);
     if (wire->config.suite != NULL) {
         if (getrandom(nonce, sizeof nonce, 0) != (ssize_t)sizeof nonce) {
             close(fd);
             return false;
         }
-        secure_shake_init(&c->shake, wire->config.suite, wire->config.key,
+        secure_shake_init(&c->heard.shake, wire->config.suite, wire->config.key,
                           !wire->config.listens, nonce);
     }
     /* A peer that answers no more is a broken connection, in the end. */
@@ -121,19 +122,22 @@ static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
     return true;
 }
 
-static void accept_some(struct tcp_wire *wire, uint64_t now_us)
+static bool accept_some(struct tcp_wire *wire, uint64_t now_us)
 {
+    bool some = false;
     for (unsigned i = 0; i < TCP_ACCEPTS_MAX; i++) {
         int fd = accept4(wire->listener, NULL, NULL, SOCK_CLOEXEC);
         if (fd < 0) {
-            return;
+            break;
         }
+        some = true;
         if (tcp_prepare(fd) != 0) {
             close(fd);
             continue;
         }
         (void)begin(wire, place(wire), fd, true, now_us);
     }
+    return some;
 }
 
 /* A call that failed is made again after a pause, longer each time. */
@@ -165,7 +169,8 @@ static void call(struct tcp_wire *wire, uint64_t now_us)
 }
 
 /* Whether the call was answered: 1, 0 not yet, -1 no. */
-static int answered(struct tcp_wire *wire, struct tcp_candidate *c)
+static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
+                    uint64_t now_us)
 {
     struct pollfd wait = {c->fd, POLLOUT, 0};
     int fault = 0;
@@ -182,12 +187,48 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c)
         return -1;
     }
     c->connected = true;
+    c->since_us = now_us;
     return 1;
 }
 
-/* The candidate becomes the connection. */
-static void promote(struct tcp_wire *wire, struct tcp_candidate *c)
+/* Without a key: 1 when it has greeted as a link does, or has kept silent and
+ * there is no better one; 0 not yet, -1 it says something else. */
+static int hear_first(const struct tcp_wire *wire, struct tcp_candidate *c,
+                      uint64_t now_us)
 {
+    struct tcp_first *first = &c->heard.first;
+    struct link_pipe pipe = tcp_link_pipe(&c->pipe);
+    int got = pipe.receive(pipe.context, first->bytes + first->end,
+                           sizeof first->bytes - first->end);
+    first->end += got > 0 ? (size_t)got : 0;
+    if (got > 0 && link_greets(first->bytes, first->end)) {
+        return 1;
+    }
+    if (got < 0 || first->end == sizeof first->bytes) {
+        return -1;
+    }
+    return first->end == 0 && !wire->proven &&
+           now_us - c->since_us > TCP_QUIET_US;
+}
+
+static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
+                 uint64_t now_us)
+{
+    struct link_pipe pipe = tcp_link_pipe(&c->pipe);
+    if (wire->config.suite == NULL) {
+        return wire->config.listens ? hear_first(wire, c, now_us) : 1;
+    }
+    int status = secure_shake(&c->heard.shake, &pipe);
+    wire->other_key = status < 0 ? secure_shake_other_key(&c->heard.shake)
+                                 : wire->other_key && status == 0;
+    return status;
+}
+
+/* The candidate becomes the connection. */
+static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
+                    uint64_t now_us)
+{
+    uint64_t patience = 8 * (now_us - c->since_us);
     if (wire->tcp.fd >= 0) {
         close(wire->tcp.fd);
         wire->replaced = true;
@@ -197,50 +238,84 @@ static void promote(struct tcp_wire *wire, struct tcp_candidate *c)
     wire->connections++;
     wire->pause_us = 0;
     wire->fault = 0;
-    if (wire->config.suite != NULL) {
+    wire->prove_us = patience < TCP_PROVE_MIN_US ? TCP_PROVE_MIN_US
+                     : patience > TCP_PROVE_US   ? TCP_PROVE_US
+                                                 : patience;
+    wire->proven = wire->config.suite != NULL;
+    if (wire->proven) {
         struct link_pipe beneath = tcp_link_pipe(&wire->tcp);
-        secure_channel_start(&wire->channel, &c->shake, &beneath);
+        secure_channel_start(&wire->channel, &c->heard.shake, &beneath);
+    } else {
+        wire->first = c->heard.first;
     }
+}
+
+/* A proof that does not come: bytes of it are lost, or the way is longer than
+ * was thought.  The end that called gives up first, and calls again. */
+static uint64_t patience(const struct tcp_wire *wire,
+                         const struct tcp_candidate *c)
+{
+    return !c->connected          ? TCP_CALL_US
+           : wire->config.listens ? TCP_PROVE_US
+                                  : wire->prove_us;
 }
 
 static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
                     uint64_t now_us)
 {
-    struct link_pipe pipe = tcp_link_pipe(&c->pipe);
-    uint64_t most = c->connected ? TCP_PROVE_US : TCP_CALL_US;
-    int status = answered(wire, c);
-    if (status > 0 && wire->config.suite != NULL) {
-        status = secure_shake(&c->shake, &pipe);
+    int status = answered(wire, c, now_us);
+    if (status > 0) {
+        status = prove(wire, c, now_us);
     }
     if (status > 0) {
-        promote(wire, c);
-    } else if (status < 0 || now_us - c->since_us > most) {
-        drop(c);
-        wire->strangers += wire->config.listens ? 1 : 0;
-        if (!wire->config.listens) {
-            pause_calls(wire, now_us);
-        }
+        promote(wire, c, now_us);
+        return;
     }
+    bool late = now_us - c->since_us > patience(wire, c);
+    if (status == 0 && !late) {
+        return;
+    }
+    if (wire->config.listens) {
+        wire->strangers++;
+    } else {
+        if (status == 0 && c->connected) {
+            wire->prove_us = 2 * wire->prove_us < TCP_PROVE_US
+                                 ? 2 * wire->prove_us
+                                 : TCP_PROVE_US;
+        }
+        pause_calls(wire, now_us);
+    }
+    drop(c);
+}
+
+/* Whether strangers have to wait for their turn. */
+static bool holds_off(const struct tcp_wire *wire, uint64_t now_us)
+{
+    return wire->listener >= 0 && wire->tcp.fd >= 0 && wire->proven &&
+           now_us < wire->look_us;
 }
 
 static void tick(struct tcp_wire *wire)
 {
     uint64_t now_us = clock_us();
-    bool quiet = wire->quiet;
+    bool quiet = wire->quiet, met = false;
     wire->quiet = false;
+    if (holds_off(wire, now_us)) {
+        return;
+    }
     if (wire->listener >= 0) {
-        if (!quiet) {
-            accept_some(wire, now_us);
-        }
+        met = !quiet && accept_some(wire, now_us);
     } else if (wire->tcp.fd < 0 && wire->candidate[0].fd < 0 &&
                now_us >= wire->call_us) {
         call(wire, now_us);
     }
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         if (wire->candidate[i].fd >= 0) {
+            met = true;
             look_at(wire, &wire->candidate[i], now_us);
         }
     }
+    wire->look_us = met ? now_us + TCP_LOOK_US : 0;
 }
 
 /* --- the pipe ------------------------------------------------------------ */
@@ -251,6 +326,8 @@ static int broken(struct tcp_wire *wire)
     if (wire->tcp.fd >= 0) {
         close(wire->tcp.fd);
         tcp_pipe_init(&wire->tcp, -1);
+        wire->proven = false;
+        wire->first.begin = wire->first.end = 0;
         pause_calls(wire, clock_us());
     }
     return LINK_PIPE_CLOSED;
@@ -273,6 +350,17 @@ static int wire_send(void *context, const uint8_t *bytes, size_t size)
     return sent < 0 ? broken(wire) : sent;
 }
 
+/* What the connection said before it was taken. */
+static int receive_first(struct tcp_wire *wire, uint8_t *bytes, size_t size)
+{
+    struct tcp_first *first = &wire->first;
+    size_t have = first->end - first->begin;
+    have = have < size ? have : size;
+    memcpy(bytes, first->bytes + first->begin, have);
+    first->begin += have;
+    return (int)have;
+}
+
 static int wire_receive(void *context, uint8_t *bytes, size_t size)
 {
     struct tcp_wire *wire = context;
@@ -282,7 +370,12 @@ static int wire_receive(void *context, uint8_t *bytes, size_t size)
         return LINK_PIPE_CLOSED;
     }
     struct link_pipe pipe = inner(wire);
-    int got = pipe.receive(pipe.context, bytes, size);
+    int got = wire->first.begin < wire->first.end
+                  ? receive_first(wire, bytes, size)
+                  : pipe.receive(pipe.context, bytes, size);
+    if (got > 0 && !wire->proven) {
+        wire->proven = link_greets(bytes, (size_t)got);
+    }
     return got < 0 ? broken(wire) : got;
 }
 
@@ -319,6 +412,7 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
     memset(wire, 0, sizeof *wire);
     wire->config = *config;
     wire->listener = -1;
+    wire->prove_us = TCP_PROVE_MIN_US;
     tcp_pipe_init(&wire->tcp, -1);
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         wire->candidate[i].fd = -1;
@@ -359,6 +453,9 @@ unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
     if (events != 0) {
         fds[used++] = (struct pollfd){wire->tcp.fd, events, 0};
     }
+    if (holds_off(wire, clock_us())) {
+        return used;
+    }
     if (wire->listener >= 0) {
         fds[used++] = (struct pollfd){wire->listener, POLLIN, 0};
     }
@@ -370,6 +467,11 @@ unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
         }
     }
     return used;
+}
+
+uint64_t tcp_wire_wait_us(const struct tcp_wire *wire)
+{
+    return wire->listener >= 0 && wire->look_us != 0 ? TCP_LOOK_US : UINT64_MAX;
 }
 
 void tcp_wire_heard(struct tcp_wire *wire, const struct pollfd *fds,

@@ -6,7 +6,10 @@
  *
  * Strangers: at most TCP_CANDIDATES_MAX connections are being proven at a time,
  * the oldest giving way, each for TCP_PROVE_US at most; the peer's own new
- * connection, once proven, takes the place of the old one.
+ * connection, once proven, takes the place of the old one.  Without a key the
+ * proof is a link's greeting; who keeps silent is taken while there is no
+ * better one.  While a connection is in use, others are looked at every
+ * TCP_LOOK_US.
  *
  * Memory: struct tcp_wire and in the kernel two buffers of TCP_BUFFER_BYTES a
  * connection.  Work: tcp_wire's pipe accepts at most TCP_ACCEPTS_MAX
@@ -16,7 +19,7 @@
  *     if (tcp_wire_open(&wire, &config) != 0) perror("wire");
  *     pipe = tcp_wire_pipe(&wire);
  *     count = tcp_wire_events(&wire, fds);
- *     poll(fds, count, 100);
+ *     wait_files(fds, count, tcp_wire_wait_us(&wire), 0);
  *     tcp_wire_heard(&wire, fds, count);
  */
 #ifndef TRANSPORT_DRIVERS_TCP_WIRE_H
@@ -32,7 +35,11 @@ enum {
     TCP_CANDIDATES_MAX = 8,
     TCP_ACCEPTS_MAX = 4,
     TCP_WIRE_FDS_MAX = TCP_CANDIDATES_MAX + 2,
+    TCP_FIRST_BYTES = 256, /* within which a greeting must be */
     TCP_PROVE_US = 3000000,
+    TCP_PROVE_MIN_US = 250000, /* at the end that calls, at first */
+    TCP_QUIET_US = 100000,     /* without a key: says nothing for so long */
+    TCP_LOOK_US = 10000,
     TCP_SILENT_MS = 5000,       /* with bytes that are not acknowledged */
     TCP_CALL_US = 3000000,      /* for a connection to be made */
     TCP_PAUSE_MIN_US = 20000,   /* before the next call, doubled each time */
@@ -63,21 +70,35 @@ struct tcp_wire_config {
     const uint8_t *key;               /* SECURE_KEY_BYTES, stay the caller's */
 };
 
+/* What an end without a key has said before it was taken. */
+struct tcp_first {
+    size_t begin, end;
+    uint8_t bytes[TCP_FIRST_BYTES];
+};
+
 struct tcp_candidate {
     int fd;         /* -1: none */
     bool connected; /* a call has been answered */
     uint64_t since_us;
     struct tcp_pipe pipe;
-    struct secure_shake shake;
+    union {
+        struct secure_shake shake; /* with a key */
+        struct tcp_first first;    /* without, where it listens */
+    } heard;
 };
 
 struct tcp_wire {
     struct tcp_wire_config config;
     int listener;        /* -1: none */
     struct tcp_pipe tcp; /* the connection; fd -1: none */
+    bool proven;         /* it has shown who it is */
     bool replaced;       /* by a newer one: the link hears of a break */
     bool quiet;          /* nobody called when it was last waited for */
+    bool other_key;      /* the last one called had another key */
     uint64_t call_us, pause_us;
+    uint64_t prove_us; /* patience with the peer's proof, of the caller */
+    uint64_t look_us;  /* when candidates are looked at again; 0: at once */
+    struct tcp_first first;
     struct tcp_candidate candidate[TCP_CANDIDATES_MAX];
     struct secure_channel channel;
     uint64_t connections, strangers; /* taken; sent away */
@@ -98,6 +119,10 @@ struct link_pipe tcp_wire_pipe(struct tcp_wire *wire);
 /* What to wait for with poll(2): fills fds[TCP_WIRE_FDS_MAX], returns how
  * many. */
 unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds);
+
+/* No longer than so many microseconds may pass before the pipe is used again,
+ * whatever comes. */
+uint64_t tcp_wire_wait_us(const struct tcp_wire *wire);
 
 /* What poll(2) has found of it, as tcp_heard. */
 void tcp_wire_heard(struct tcp_wire *wire, const struct pollfd *fds,
