@@ -51,6 +51,10 @@ struct host_machine {
     /* Ends a node that does not answer, for `check` to start it again; false,
      * as where it is NULL: the node is not this machine's to start. */
     bool (*kill)(void *context, unsigned node);
+    bool keyed; /* the nodes must have the host's key */
+    /* Why a node is not heard, and what to do, as "WHAT; WHAT TO DO NEXT";
+     * NULL, or the result: nothing is known of it. */
+    const char *(*doubt)(void *context, unsigned node);
     /* Leaves the host's wires alone for a time, as another host has them; NULL:
      * there is no other. */
     void (*rest)(void *context, uint64_t rest_us);

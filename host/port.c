@@ -109,6 +109,11 @@ void host_port_rest(struct host_port *port, uint64_t rest_us)
     }
 }
 
+bool host_port_other_key(const struct host_port *port)
+{
+    return port->kind == HOST_PORT_NET && port->net.other_key;
+}
+
 void host_port_close(struct host_port *port)
 {
     if (port->kind == HOST_PORT_SERIAL) {

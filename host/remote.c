@@ -146,6 +146,21 @@ static bool machine_kill(void *context, unsigned node)
     return host_child_kill(&r->process[node]);
 }
 
+/* The host hears of the keys on its own wires alone. */
+static const char *machine_doubt(void *context, unsigned node)
+{
+    const struct host_remote *r = context;
+    const char *doubt = NULL;
+    for (unsigned i = 0; i < r->ports; i++) {
+        if (host_cube_host_wire(r->file, i)->node == node &&
+            host_port_other_key(&r->port[i])) {
+            doubt = "answers, but with another key; give both ends the same "
+                    "key file";
+        }
+    }
+    return doubt;
+}
+
 static void machine_rest(void *context, uint64_t rest_us)
 {
     struct host_remote *r = context;
@@ -204,6 +219,8 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     }
     machine.restarts = all_here ? machine_restarts : NULL;
     machine.kill = machine_kill;
+    machine.keyed = remote->file->has_key;
+    machine.doubt = machine_doubt;
     machine.rest = machine_rest;
     machine.ended = machine_ended;
     machine.stop = machine_stop;

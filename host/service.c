@@ -356,7 +356,10 @@ static int check_renewed(const struct host_service *s, struct host_error *error)
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         bool dead = wiring_is_dead(w, w->dead_count, i, dimension, dimension);
         if (i == w->gate ? dead : s->node[i].given_up && !dead) {
-            return host_fail(error, HOST_CUBE,
+            return host_watch_doubt(s, i, error) != 0
+                       ? error->code
+                       : host_fail(
+                             error, HOST_CUBE,
                              "node %u link %u: lost, and the cube cannot go "
                              "on without it; look after that node and its "
                              "wires, and run again",

@@ -332,6 +332,31 @@ static uint64_t patience_of(const struct host_service *s)
     return s->machine->restarts != NULL ? BRING_UP_US_MAX : s->patience_us;
 }
 
+int host_watch_doubt(const struct host_service *service, unsigned node,
+                     struct host_error *error)
+{
+    const struct host_machine *m = service->machine;
+    const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
+    return doubt == NULL
+               ? 0
+               : host_fail(error, HOST_CUBE, "node %u link %u: %s", node,
+                           host_watch_link(service, node), doubt);
+}
+
+static int fail_silent(const struct host_service *s, unsigned node,
+                       struct host_error *error)
+{
+    if (host_watch_doubt(s, node, error) != 0) {
+        return error->code;
+    }
+    return host_fail(error, HOST_CUBE,
+                     "node %u link %u: no answer, %u of %u nodes are there; is "
+                     "the node's program of this version%s, and the machine "
+                     "not too busy?",
+                     node, host_watch_link(s, node), s->here, s->machine->nodes,
+                     s->machine->keyed ? ", its key file the same" : "");
+}
+
 /* Nodes that have not answered since the generation began. */
 static int check_bring_up(const struct host_service *s, uint64_t now_us,
                           struct host_error *error)
@@ -343,12 +368,7 @@ static int check_bring_up(const struct host_service *s, uint64_t now_us,
     }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (!s->node[i].lost && !s->report[i].here) {
-            return host_fail(error, HOST_CUBE,
-                             "node %u link %u: no answer, %u of %u nodes are "
-                             "there; is the node's program of this version, "
-                             "and the machine not too busy?",
-                             i, host_watch_link(s, i), s->here,
-                             s->machine->nodes);
+            return fail_silent(s, i, error);
         }
     }
     return 0;

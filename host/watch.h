@@ -37,6 +37,10 @@ int host_watch_answer(struct host_service *service,
                       const struct cube_message *message,
                       struct host_error *error);
 
+/* HOST_CUBE, if the machine knows why a node is not heard; else 0. */
+int host_watch_doubt(const struct host_service *service, unsigned node,
+                     struct host_error *error);
+
 /* Sets service->loss where a new generation is due.  HOST_CUBE where the cube
  * cannot go on. */
 int host_watch_check(struct host_service *service, uint64_t now_us,

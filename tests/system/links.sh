@@ -115,6 +115,8 @@ END
     }
     rm -f "$scratch/out.npy"
     refused 'another key: exit 4' 's/cube.key/other.key/'
+    check 'links/another key: it says so' "$(last "$scratch/errors")" \
+        grep -q 'link 0: answers, but with another key; ' "$scratch/errors"
     refused 'no key: exit 4' 's/--key [^ ]*//'
     check 'links/no output without a key' 'it left one' \
         test ! -e "$scratch/out.npy"
