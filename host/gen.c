@@ -203,11 +203,12 @@ int host_gen(const char *kind, uint64_t n, uint64_t seed,
              struct host_points *points, struct host_error *error)
 {
     *points = (struct host_points){0};
-    if (n < 4 || n >= UINT32_MAX) {
+    if (n < HOST_GEN_MIN || n > host_gen_max) {
         return host_fail(error, HOST_USAGE,
-                         "gen: %llu points: too few or too many; ask for 4 to "
-                         "4294967294",
-                         (unsigned long long)n);
+                         "gen: %llu points: too few or too many; ask for %d to "
+                         "%llu",
+                         (unsigned long long)n, HOST_GEN_MIN,
+                         (unsigned long long)host_gen_max);
     }
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         if (strcmp(kind, kinds[i].name) == 0) {

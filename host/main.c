@@ -109,7 +109,10 @@ static int command_run(int argc, char **argv, struct host_error *error)
 static int command_gen(int argc, char **argv, struct host_error *error)
 {
     static const struct argp_option options[] = {
-        {"seed", 's', "S", 0, "Another seed makes other points. Default: 1", 0},
+        {"seed", 's', "S", 0,
+         "Another seed makes other points of uniform, bubbles, sphere and hub; "
+         "the other kinds have no chance in them. Default: 1",
+         0},
         {"output", 'o', "FILE", 0,
          "Write to FILE, by its extension; -, the default, is .xyz on standard "
          "output",
@@ -121,13 +124,14 @@ static int command_gen(int argc, char **argv, struct host_error *error)
     parse(argc, argv, options, "KIND N",
           "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
           "grid, rotated (a grid turned out of its axes), or hub (one point "
-          "amid N-1 on a sphere).",
+          "amid N-1 on a sphere). N: 4 to 4294901760 (2^32 - 2^16).",
           2, &s);
-    if (host_parse_number(s.argument[1], 4, UINT32_MAX - 1, &n) != 0) {
+    if (host_parse_number(s.argument[1], HOST_GEN_MIN, host_gen_max, &n) != 0) {
         return host_fail(error, HOST_USAGE,
-                         "gen %s %s: not a number of points; give 4 to "
-                         "4294967294",
-                         s.argument[0], s.argument[1]);
+                         "gen %s %s: not a number of points; give %d to "
+                         "%llu",
+                         s.argument[0], s.argument[1], HOST_GEN_MIN,
+                         (unsigned long long)host_gen_max);
     }
     int status = host_gen(s.argument[0], n, s.seed, &points, error);
     if (status == 0) {

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -88,6 +89,25 @@ static void shapes_are_as_named(void **unused)
     host_points_free(&r);
 }
 
+/* As --help says it. */
+static void some_kinds_have_no_chance_in_them(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *kind;
+        bool chance;
+    } kinds[] = {{"uniform", true}, {"bubbles", true},   {"sphere", true},
+                 {"hub", true},     {"bluntfin", false}, {"grid", false},
+                 {"rotated", false}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+        struct host_points a = made(kinds[i].kind, 500, 1);
+        struct host_points b = made(kinds[i].kind, 500, 2);
+        assert_int_equal(memcmp(a.xyz, b.xyz, 500 * 24) != 0, kinds[i].chance);
+        host_points_free(&a);
+        host_points_free(&b);
+    }
+}
+
 static void seeds_differ_and_points_do_not_repeat(void **unused)
 {
     (void)unused;
@@ -129,6 +149,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(digests_are_known),
         cmocka_unit_test(shapes_are_as_named),
+        cmocka_unit_test(some_kinds_have_no_chance_in_them),
         cmocka_unit_test(seeds_differ_and_points_do_not_repeat),
         cmocka_unit_test(wrong_requests_are_refused),
     };
