@@ -384,7 +384,8 @@ int host_order_make(struct host_order *order, const char *where,
     order->negative_zeros = unique.negative_zeros;
     if (unique.count < 4) {
         host_fail(error, HOST_INPUT,
-                  "%s: %u distinct points (of %llu); a tetrahedron needs 4",
+                  "%s: %u distinct points (of %llu) where a tetrahedron has 4; "
+                  "give more points",
                   where, order->points, (unsigned long long)rows);
     }
     memcpy(order->lo, unique.lo, sizeof order->lo);

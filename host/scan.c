@@ -229,10 +229,30 @@ static struct decimal parse_decimal(const char *c, const char *end)
     return n;
 }
 
+static size_t word_length(struct host_scan *s);
+
+/* Whether the word at hand has a NUL byte in it, which no text has. */
+static bool is_binary(struct host_scan *s, struct host_error *error)
+{
+    size_t n = word_length(s);
+    const char *nul = n > 0 ? memchr(s->at, '\0', n) : NULL;
+    if (nul == NULL) {
+        return false;
+    }
+    host_scan_fail(s, nul, error,
+                   "a NUL byte where text is due: the file is binary or UTF-16 "
+                   "perhaps; give it the extension of its format, or save it "
+                   "as UTF-8");
+    return true;
+}
+
 static int no_number(struct host_scan *s, struct host_error *error)
 {
     char word[48], text[160];
     const char *at = s->at;
+    if (is_binary(s, error)) {
+        return error->code;
+    }
     host_scan_word(s, word, sizeof word);
     const char *bare = word + (word[0] == '-' || word[0] == '+');
     if (word[0] == '\0') {
@@ -306,6 +326,9 @@ int host_scan_unsigned(struct host_scan *s, uint64_t most, uint64_t *value,
         n = 10 * n + (uint64_t)(*c++ - '0');
     }
     if (c == s->at || (c < s->end && !is_blank(*c) && !is_end(*c))) {
+        if (is_binary(s, error)) {
+            return error->code;
+        }
         return host_scan_fail(s, s->at, error,
                               "a whole number is due here; correct it");
     }

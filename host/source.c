@@ -112,6 +112,14 @@ static int read_all(struct host_source *source, int file,
     }
 }
 
+static bool all_zero(const uint8_t *bytes, size_t n)
+{
+    while (n > 0 && bytes[n - 1] == 0) {
+        n--;
+    }
+    return n == 0;
+}
+
 static int inflate_members(struct host_source *out, z_stream *z,
                            struct host_error *error)
 {
@@ -126,8 +134,8 @@ static int inflate_members(struct host_source *out, z_stream *z,
         int status = inflate(z, Z_NO_FLUSH);
         out->bytes += room - z->avail_out;
         if (status == Z_STREAM_END) {
-            if (z->avail_in == 0) {
-                return 0;
+            if (all_zero(z->next_in, z->avail_in)) {
+                return 0; /* padding of a tape or a disk, if any */
             }
             status = inflateReset(z); /* another member follows */
         }

@@ -93,12 +93,14 @@ static void text_in_all_its_habits(void **unused)
     b.n = 0;
     put_text(&b, "x,\"y [m]\",z\n-3,-2.5,-2\n");
     expect_rows("a.csv", &b, 1);
+    static const char quoted[] =
+        "name;Z (m);\"id, or none\";x [m];Y\n"
+        "\"a;\"\"b\";-2;#1;-3;-2.5\n\n# between\n;\"-.5\" ; ;-1.5;-1;\n";
     static const char *const named[] = {
         "X,Y,Z\n-3,-2.5,-2\n-1.5,-1,-.5\n",
         "# made\n z , y, \"x\" \r\n-2,-2.5,-3\r\n-.5,-1,-1.5\r\n",
         "y x z\n-2.5 -3 -2\n  -1  -1.5\t-.5 # behind\n",
-        "name;Z (m);\"id, or none\";x [m];Y\n"
-        "\"a;\"\"b\";-2;#1;-3;-2.5\n\n# between\n;\"-.5\" ; ;-1.5;-1;\n",
+        quoted,
         "id  z   y/mm x\n0 -2  -2.5   -3\nb#c -.5 -1 -1.5  \n",
         "\xef\xbb\xbf,x,y,z\n0,-3,-2.5,-2\n,-1.5,-1,-.5\n",
         "east,north,height,\n-3,-2.5,-2\n-1.5,-1,-.5,\n",
@@ -159,6 +161,30 @@ static void text_faults_have_their_place(void **unused)
     refused("a.off", "2 0 0\n", "the first word is not OFF");
     refused("a.off", "OFF\n2 0 0\n1 2 3\n", "a.off:4:1: the file ends");
     refused("a.off", "OFF BINARY\n", "binary OFF");
+}
+
+/* Bytes of zero are told as such, where they are. */
+static void binary_is_no_text(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *path, *bytes, *where;
+        size_t n;
+    } files[] = {{"a.xyz", "1 2 3\n4 5\0 6\n", "a.xyz:2:4: a NUL byte", 14},
+                 {"a.xyz", "1 2 3\n\0\0\0\0", "a.xyz:2:1: a NUL byte", 10},
+                 {"a.xyz", "1\0 \0002\0 \0003\0\n", "a.xyz:1:2: a NUL", 11},
+                 {"a.csv", "x,y,t,z\n1,2,3,\0", "a.csv:2:7: a NUL byte", 15},
+                 {"a.node", "2\0 3 0 0\n", "a.node:1:2: a NUL byte", 9}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        struct host_points points;
+        struct host_error error = {0};
+        assert_int_equal(host_points_parse(files[i].path, files[i].bytes,
+                                           files[i].n, &points, &error),
+                         HOST_INPUT);
+        if (strstr(error.text, files[i].where) == NULL) {
+            fail_msg("%s, not %s", error.text, files[i].where);
+        }
+    }
 }
 
 /* What a header counts is what there is. */
@@ -464,9 +490,21 @@ static void packed_files(void **unused)
         (void)deflateEnd(&z);
     }
     expect_rows("a.xyz.gz", &b, 2);
+    size_t whole = b.n;
+    for (size_t padding = 1; padding <= 512; padding *= 8) {
+        for (b.n = whole; b.n < whole + padding;) {
+            put_word(&b, 0, 1, false);
+        }
+        expect_rows("a.xyz.gz", &b, 2);
+    }
     struct host_points points;
     struct host_error error = {0};
-    b.n -= 3;
+    put_word(&b, 7, 1, false);
+    assert_int_equal(
+        host_points_parse("a.xyz.gz", b.data, b.n, &points, &error),
+        HOST_INPUT);
+    error = (struct host_error){0};
+    b.n = whole - 3;
     assert_int_equal(
         host_points_parse("a.xyz.gz", b.data, b.n, &points, &error),
         HOST_INPUT);
@@ -548,6 +586,7 @@ int main(void)
         cmocka_unit_test(numbers_are_correctly_rounded),
         cmocka_unit_test(text_in_all_its_habits),
         cmocka_unit_test(text_faults_have_their_place),
+        cmocka_unit_test(binary_is_no_text),
         cmocka_unit_test(text_is_as_long_as_it_says),
         cmocka_unit_test(ply_is_as_long_as_it_says),
         cmocka_unit_test(ply_of_every_coding),
