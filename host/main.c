@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "../incode/predicates.h"
 #include "arguments.h"
@@ -293,6 +294,19 @@ static int dispatch(int argc, char **argv, struct host_error *error)
                      argv[0]);
 }
 
+/* What was printed, help included, has to arrive. */
+static void finish_stdout(void)
+{
+    errno = 0;
+    if (fflush(stdout) != 0 || ferror(stdout) != 0) {
+        (void)fprintf(stderr, "incode: standard output: %s; %s\n",
+                      errno != 0 ? strerror(errno) : "writing failed",
+                      errno == EPIPE ? "let its reader read on"
+                                     : "make room and run again");
+        _exit(HOST_INPUT);
+    }
+}
+
 int main(int argc, char **argv)
 {
     static const struct argp argp = {
@@ -320,6 +334,7 @@ int main(int argc, char **argv)
     int command = 0;
     argp_err_exit_status = HOST_USAGE;
     host_output_guard();
+    (void)atexit(finish_stdout);
     (void)argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &command);
     const char *fault = incode_arithmetic_fault();
     if (fault != NULL) {
@@ -335,13 +350,6 @@ int main(int argc, char **argv)
             fprintf(stderr, "incode: %s\n", error.text);
         }
         return status;
-    }
-    if (fflush(stdout) != 0) {
-        fprintf(stderr,
-                "incode: standard output: %s; make room and run "
-                "again\n",
-                strerror(errno));
-        return HOST_INPUT;
     }
     return 0;
 }

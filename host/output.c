@@ -104,6 +104,24 @@ void host_output_clean(const char *path, pid_t writer, uint64_t since_ns)
     }
 }
 
+/* Opens a device or a pipe, for which nobody waits that does not come. */
+static int open_in_place(struct host_output *out, bool pipe,
+                         struct host_error *error)
+{
+    int wait = pipe ? O_NONBLOCK : 0;
+    out->file = open(out->target, O_WRONLY | O_CLOEXEC | wait);
+    if (out->file < 0 && pipe && errno == ENXIO) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: nobody reads from this pipe; start its reader "
+                         "first, or choose another place",
+                         out->path);
+    }
+    if (out->file < 0 || (pipe && fcntl(out->file, F_SETFL, O_WRONLY) != 0)) {
+        return cannot_make(out->path, errno, error);
+    }
+    return 0;
+}
+
 /* Opens a new file beside the target, or the target itself. */
 static int open_file(struct host_output *out, struct host_error *error)
 {
@@ -121,8 +139,7 @@ static int open_file(struct host_output *out, struct host_error *error)
         return cannot_make(out->path, EISDIR, error);
     }
     if (there && !S_ISREG(status.st_mode)) {
-        out->file = open(out->target, O_WRONLY | O_CLOEXEC);
-        return out->file < 0 ? cannot_make(out->path, errno, error) : 0;
+        return open_in_place(out, S_ISFIFO(status.st_mode), error);
     }
     if (there && access(out->target, W_OK) != 0) {
         return cannot_make(out->path, errno, error);
@@ -163,6 +180,20 @@ int host_output_open(struct host_output *out, const char *path,
     }
     if (error->code != 0) {
         host_output_close(out, 1, error);
+    }
+    return error->code;
+}
+
+int host_output_probe(const char *path, struct host_error *error)
+{
+    struct host_output out;
+    struct stat status;
+    if (host_output_open(&out, path, error) == 0) {
+        struct host_error dropped = {.code = HOST_BROKEN}; /* remove it */
+        if (fstat(out.file, &status) == 0 && S_ISFIFO(status.st_mode)) {
+            out.file = -1; /* until the program ends */
+        }
+        (void)host_output_close(&out, 1, &dropped);
     }
     return error->code;
 }
@@ -236,7 +267,12 @@ static void finish(struct host_output *out, struct host_error *error)
         }
         out->file = -1;
     }
-    if (out->failure != 0) {
+    if (out->failure == EPIPE) {
+        host_fail(error, HOST_INPUT,
+                  "%s: its reader went away before the end (%s); let it read "
+                  "on, or write to a file",
+                  out->path, strerror(EPIPE));
+    } else if (out->failure != 0) {
         host_fail(error, HOST_INPUT,
                   "%s: writing failed (%s); make room or choose another place",
                   out->path, strerror(out->failure));

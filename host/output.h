@@ -36,9 +36,14 @@ void host_output_guard(void);
 void host_output_clean(const char *path, pid_t writer, uint64_t since_ns);
 
 /* "-" is standard output; what is there and is no plain file (a device, a
- * pipe) is written in place.  HOST_INPUT where no file can be made. */
+ * pipe) is written in place.  HOST_INPUT where no file can be made, or
+ * nobody reads from the pipe. */
 int host_output_open(struct host_output *out, const char *path,
                      struct host_error *error);
+
+/* Whether the output can be made: opens it and takes it away again.  A pipe
+ * stays open, for its reader would take that for the end. */
+int host_output_probe(const char *path, struct host_error *error);
 
 /* None of these fails at once: host_output_close tells. */
 void host_output_bytes(struct host_output *out, const void *bytes, size_t n);

@@ -208,9 +208,8 @@ const char *host_write_file(const char *path, unsigned k, char *name,
     if (k == 0) {
         return path;
     }
-    size_t stem = length - strlen(".ele");
-    memcpy(name, path, stem);
-    strcpy(name + stem, beside[k - 1]);
+    size_t stem = length - strlen(".ele"); /* or .ELE */
+    (void)snprintf(name, size, "%.*s%s", (int)stem, path, beside[k - 1]);
     return name;
 }
 
@@ -477,11 +476,9 @@ int host_write_probe(const char *path, struct host_error *error)
     char name[HOST_PATH_MAX];
     const char *file = path;
     for (unsigned k = 0; file != NULL && error->code == 0; k++) {
-        struct host_output out;
-        struct host_error dropped = {.code = HOST_BROKEN}; /* remove it */
         file = k == 0 ? path : host_write_file(path, k, name, sizeof name);
-        if (file != NULL && host_output_open(&out, file, error) == 0) {
-            (void)host_output_close(&out, 1, &dropped);
+        if (file != NULL) {
+            host_output_probe(file, error);
         }
     }
     return error->code;

@@ -8,6 +8,7 @@ left=$scratch/left
 mkdir "$in"
 good=$in/good.xyz
 "$INCODE" gen uniform 300 --seed 5 -o "$good" 2> /dev/null
+"$INCODE" gen uniform 3000 -o "$in/many.xyz" 2> /dev/null
 
 # run FILE [OPTION...] as `refuses` wants it
 run() { "$INCODE" run "$@"; }
@@ -118,6 +119,27 @@ refuses 'errors/statistics cannot be written' 3 'absent' run "$good" -q \
     --nodes 2 -o "$left/o.vtu" --stats "$left/absent/s.json"
 refuses 'errors/statistics fill the disk' 3 '/dev/full: .*space' run "$good" \
     -q --nodes 2 -o "$left/o.vtu" --stats /dev/full
+for arguments in --help --version 'run --help' 'gen uniform 9000'; do
+    # shellcheck disable=SC2086
+    refuses "errors/$arguments into a full disk" 3 ': .*space' \
+        bash -c '"$@" > /dev/full' - "$INCODE" $arguments
+done
+for arguments in "run $in/many.xyz -q -o -" 'gen uniform 90000'; do
+    # shellcheck disable=SC2086
+    refuses "errors/the reader of '${arguments%% *}' goes away" 3 \
+        '^incode: -: its reader went away before the end' bash -c \
+        '"$@" | head -n 1 > /dev/null; exit "${PIPESTATUS[0]}"' - "$INCODE" \
+        $arguments
+done
+
+# A pipe has a name like a file; its reader is there, or it is not.
+mkfifo "$in/pipe.npy"
+refuses 'errors/a pipe without a reader' 3 'pipe.npy: .*no.* reads' timeout 20 \
+    "$INCODE" run "$good" -q -o "$left/o.vtu" -o "$in/pipe.npy"
+cat "$in/pipe.npy" > "$scratch/piped.npy" &
+timeout 20 "$INCODE" run "$good" -q -o "$in/pipe.npy" -o "$scratch/plain.npy"
+check 'errors/a pipe with a reader' "exit $?" \
+    eval 'wait $! && cmp "$scratch/piped.npy" "$scratch/plain.npy"'
 # Root may write anywhere: nobody tries.
 name='errors/output in a directory without permission'
 nobody=
@@ -141,7 +163,6 @@ full_disk() {
         [ -z \"\$(ls -A '$left')\" ] || exit 98
         exit \$status"
 }
-"$INCODE" gen uniform 3000 -o "$in/many.xyz" 2> /dev/null
 user=$([ "$(id -u)" = 0 ] || echo -r)
 for format in vtu ele npy vtk msh mesh; do
     name="errors/disk fills under .$format"
@@ -231,7 +252,7 @@ usage 'memory too small' 'memory' run "$good" --memory 1K -o "$out"
 for nodes in 1 64; do
     usage "memory too small for $nodes" 'needs at least [0-9]+K; give that' \
         run "$good" --nodes $nodes --memory 256K -o "$out"
-    need=$(sed 's/.*at least \([0-9]*\)K.*/\1/' "$scratch/errors")
+    need=$(sed -n 's/.*at least \([0-9]*\)K.*/\1/p' "$scratch/errors")
     usage "memory a little too small for $nodes" "needs at least ${need}K" \
         run "$good" --nodes $nodes --memory $((need - 16))K -o "$out"
     for index in naive grid kd; do
