@@ -8,7 +8,10 @@
 #include <string.h>
 
 #include "../transport/cube.h"
+#include "../transport/drivers/key_file.h"
 #include "arguments.h"
+
+enum { TEXT_MAX = 4 << 20 };
 
 /* --- values -------------------------------------------------------------- */
 
@@ -80,12 +83,25 @@ static int resolve(const struct host_cube_file *file,
     return 0;
 }
 
+static void print_address(const struct tcp_address *address, char *text,
+                          size_t size)
+{
+    char host[NI_MAXHOST], port[NI_MAXSERV];
+    if (getnameinfo(&address->to.any, address->size, host, sizeof host, port,
+                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
+        snprintf(text, size, "?");
+        return;
+    }
+    snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host,
+             port);
+}
+
 static int read_key(struct host_cube_file *file, const config_setting_t *where,
                     struct host_error *error)
 {
     const char *name = config_setting_get_string(where);
     const char *slash = strrchr(file->path, '/');
-    char text[65] = "", message[200];
+    char message[HOST_STRAP_BYTES + 200];
     if (name == NULL) {
         return wrong(file, where, error,
                      "key: not a file's name; write it in "
@@ -97,23 +113,22 @@ static int read_key(struct host_cube_file *file, const config_setting_t *where,
                  file->path, name) >= (int)sizeof file->key_path) {
         return wrong(file, where, error, "key: too long a path; move the file");
     }
-    FILE *key = fopen(file->key_path, "re");
-    size_t got = key == NULL ? 0 : fread(text, 1, 64, key);
-    if (key != NULL) {
-        fclose(key);
+    enum key_file_state state = key_file_read(file->key_path, file->key);
+    int reason = state == KEY_FILE_UNREADABLE ? errno : 0;
+    struct key_file_text fault = key_file_text(state);
+    file->has_key = state == KEY_FILE_GOOD || state == KEY_FILE_SEEN;
+    if (fault.what == NULL) {
+        return 0;
     }
-    bool good = got == 64 && strspn(text, "0123456789abcdef") == 64;
-    for (unsigned i = 0; i < SECURE_KEY_BYTES && good; i++) {
-        char pair[3] = {text[2 * i], text[2 * i + 1], '\0'};
-        file->key[i] = (uint8_t)strtoul(pair, NULL, 16);
+    snprintf(message, sizeof message, "key %s: %s%s%s; %s", file->key_path,
+             fault.what, reason == 0 ? "" : ": ",
+             reason == 0 ? "" : strerror(reason), fault.next);
+    if (!file->has_key) {
+        return wrong(file, where, error, message);
     }
-    memset(text, 0, sizeof text);
-    file->has_key = good;
-    snprintf(message, sizeof message,
-             "key %.80s: not a file of 64 hexadecimal digits; make one: "
-             "openssl rand -hex 32 > FILE",
-             file->key_path);
-    return good ? 0 : wrong(file, where, error, message);
+    fprintf(stderr, "incode: %s:%u: %s\n", file->path,
+            config_setting_source_line(where), message);
+    return 0;
 }
 
 /* --- wires --------------------------------------------------------------- */
@@ -263,6 +278,85 @@ host_cube_host_wire(const struct host_cube_file *file, unsigned k)
     return NULL;
 }
 
+/* The host's machine has the ports of all nodes that it starts. */
+static unsigned owner(const struct host_cube_file *file, unsigned node)
+{
+    return node == CUBE_HOST || file->local[node] ? CUBE_HOST : node;
+}
+
+/* Two that listen at one address: on one machine, or at one address of all. */
+static bool same_address(const struct host_cube_file *file,
+                         const struct host_cube_wire *a,
+                         const struct host_cube_wire *b)
+{
+    return !a->serial && !b->serial && a->at.size == b->at.size &&
+           memcmp(&a->at.to, &b->at.to, a->at.size) == 0 &&
+           (!tcp_address_is_any(&a->at) ||
+            owner(file, a->node) == owner(file, b->node));
+}
+
+/* The device at the ends of both that is the same one; NULL: none. */
+static const char *same_device(const struct host_cube_file *file,
+                               const struct host_cube_wire *a,
+                               const struct host_cube_wire *b)
+{
+    const char *found = NULL;
+    for (int i = 0; i < 4 && a->serial && b->serial; i++) {
+        unsigned left = i / 2 == 0 ? a->node : a->to;
+        unsigned right = i % 2 == 0 ? b->node : b->to;
+        if (owner(file, left) == owner(file, right) &&
+            strcmp(a->device[i / 2], b->device[i % 2]) == 0) {
+            found = a->device[i / 2];
+        }
+    }
+    return found;
+}
+
+/* "nodes 0 and 1", "node 0 and the host" */
+static void name_wire(const struct host_cube_wire *wire, char text[40])
+{
+    if (wire->to == CUBE_HOST) {
+        snprintf(text, 40, "node %u and the host", wire->node);
+    } else {
+        snprintf(text, 40, "nodes %u and %u", wire->node, wire->to);
+    }
+}
+
+/* No two links share an end. */
+static int check_ends(const struct host_cube_file *file,
+                      struct host_error *error)
+{
+    char address[HOST_STRAP_BYTES / 2], names[2][40];
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        const char *what = w->serial &&
+                                   owner(file, w->node) == owner(file, w->to) &&
+                                   strcmp(w->device[0], w->device[1]) == 0
+                               ? w->device[0]
+                               : NULL;
+        unsigned other = i;
+        for (unsigned k = 0; k < i && what == NULL; k++) {
+            what = same_device(file, &file->wire[k], w);
+            if (what == NULL && same_address(file, &file->wire[k], w)) {
+                print_address(&w->at, address, sizeof address);
+                what = address;
+            }
+            other = k;
+        }
+        if (what != NULL) {
+            name_wire(w, names[0]);
+            name_wire(&file->wire[other], names[1]);
+            return host_fail(error, HOST_INPUT,
+                             "%s:%u: the link between %s has %s, and so has "
+                             "that between %s in line %u; give each end of a "
+                             "link its own",
+                             file->path, w->line, names[0], what, names[1],
+                             file->wire[other].line);
+        }
+    }
+    return 0;
+}
+
 /* Each wire once, and the host's. */
 static int check_wires(const struct host_cube_file *file,
                        const config_setting_t *list, struct host_error *error)
@@ -350,6 +444,10 @@ static int read_nodes(struct host_cube_file *file, const config_t *config,
             return wrong(file, where, error,
                          "start: not numbers of nodes; write [0, 1, 2]");
         }
+        if (file->local[node]) {
+            return wrong(file, where, error,
+                         "start: a node twice; name each once");
+        }
         file->local[node] = true;
     }
     where = config_setting_get_member(root, "key");
@@ -387,7 +485,39 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
             return error->code;
         }
     }
-    return check_wires(file, links, error);
+    return check_wires(file, links, error) != 0 ? error->code
+                                                : check_ends(file, error);
+}
+
+/* The whole text, as libconfig ends the program where it cannot read; NULL: as
+ * the error says. */
+static char *read_text(const char *path, struct host_error *error)
+{
+    FILE *stream = fopen(path, "re");
+    char *text = stream == NULL ? NULL : malloc(TEXT_MAX + 1);
+    size_t size = text == NULL ? 0 : fread(text, 1, TEXT_MAX + 1, stream);
+    int status = 0;
+    if (stream == NULL || ferror(stream)) {
+        status = host_fail(error, HOST_INPUT, "%s: %s; give the cube's file",
+                           path, strerror(errno));
+    } else if (text == NULL) {
+        status = host_fail_memory(error, "the cube file");
+    } else if (size > TEXT_MAX || memchr(text, '\0', size) != NULL) {
+        status = host_fail(error, HOST_INPUT,
+                           "%s: not a text of at most 4 MB; give the cube's "
+                           "file",
+                           path);
+    } else {
+        text[size] = '\0';
+    }
+    if (stream != NULL) {
+        fclose(stream);
+    }
+    if (status != 0) {
+        free(text);
+        text = NULL;
+    }
+    return text;
 }
 
 int host_cube_file_read(struct host_cube_file *file, const char *path,
@@ -397,13 +527,12 @@ int host_cube_file_read(struct host_cube_file *file, const char *path,
     int status;
     memset(file, 0, sizeof *file);
     file->path = path;
-    FILE *stream = fopen(path, "re");
-    if (stream == NULL) {
-        return host_fail(error, HOST_INPUT, "%s: %s; give the cube's file",
-                         path, strerror(errno));
+    char *text = read_text(path, error);
+    if (text == NULL) {
+        return error->code;
     }
     config_init(&config);
-    if (config_read(&config, stream) == CONFIG_TRUE) {
+    if (config_read_string(&config, text) == CONFIG_TRUE) {
         status = read_settings(file, &config, error);
     } else {
         status = host_fail(
@@ -411,7 +540,7 @@ int host_cube_file_read(struct host_cube_file *file, const char *path,
             path, config_error_line(&config), config_error_text(&config));
     }
     config_destroy(&config);
-    fclose(stream);
+    free(text);
     if (status != 0) {
         host_cube_file_free(file);
     }
@@ -426,19 +555,6 @@ void host_cube_file_free(struct host_cube_file *file)
 }
 
 /* --- straps -------------------------------------------------------------- */
-
-static void print_address(const struct tcp_address *address, char *text,
-                          size_t size)
-{
-    char host[NI_MAXHOST], port[NI_MAXSERV];
-    if (getnameinfo(&address->to.any, address->size, host, sizeof host, port,
-                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
-        snprintf(text, size, "?");
-        return;
-    }
-    snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host,
-             port);
-}
 
 static void print_wire(const struct host_cube_wire *wire, unsigned link,
                        bool first, char text[HOST_STRAP_BYTES])

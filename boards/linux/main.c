@@ -26,12 +26,13 @@
 #include <unistd.h>
 
 #include "../../node/node.h"
+#include "../../transport/drivers/key_file.h"
 #include "../../transport/learn.h"
 #include "../process.h"
 #include "straps.h"
 #include "wire.h"
 
-enum { SANITIZED_STATIC = 8192, KEY_DIGITS = 64 };
+enum { SANITIZED_STATIC = 8192 };
 
 struct linux_board {
     struct linux_wire wire[CUBE_LINKS_MAX];
@@ -70,34 +71,19 @@ static void reset(void *context, int status)
     _exit(status);
 }
 
-/* 64 hexadecimal digits. */
+/* That others can read it, the host says, once. */
 static bool read_key(const char *path, uint8_t key[SECURE_KEY_BYTES],
                      struct linux_fault *fault)
 {
-    static const char digits[] = "0123456789abcdef";
-    char text[KEY_DIGITS];
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    ssize_t got = fd < 0 ? -1 : read(fd, text, sizeof text);
+    enum key_file_state state = key_file_read(path, key);
+    int reason = state == KEY_FILE_UNREADABLE ? errno : 0;
+    struct key_file_text text = key_file_text(state);
     *fault = (struct linux_fault){.where = "--key",
                                   .value = path,
-                                  .what = "cannot be read",
-                                  .next = "make one: openssl rand -hex 32",
-                                  .reason = got < 0 ? errno : 0};
-    if (fd >= 0) {
-        close(fd);
-    }
-    if (got < 0) {
-        return false;
-    }
-    fault->what = "not a file of 64 hexadecimal digits";
-    for (int i = 0; i < KEY_DIGITS && got == KEY_DIGITS; i++) {
-        const char *at = text[i] == '\0' ? NULL : strchr(digits, text[i]);
-        if (at == NULL) {
-            return false;
-        }
-        key[i / 2] = (uint8_t)(key[i / 2] << 4 | (at - digits));
-    }
-    return got == KEY_DIGITS;
+                                  .what = text.what,
+                                  .next = text.next,
+                                  .reason = reason};
+    return state == KEY_FILE_GOOD || state == KEY_FILE_SEEN;
 }
 
 static bool open_wires(struct linux_board *linux_board,

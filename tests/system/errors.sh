@@ -296,6 +296,27 @@ for arguments in --help --version 'run --help' 'gen --help' 'verify --help' \
     check "$arguments" "exit $?" test $? = 0 -a -s "$scratch/help"
 done
 
+# --- cube files ---------------------------------------------------------------
+
+cube() { "$INCODE" cube "$@"; }
+refuses 'cube/a directory' 3 "^incode: $in: Is a directory; " cube "$in"
+refuses 'cube/no such file' 3 'absent.cube: No such file' cube "$in/absent.cube"
+refuses 'cube/no text' 3 'good.npy: not a text' cube "$in/good.npy"
+printf 'dimension = 0; key = "seen.key";
+    links = ( { node = 0; to = "host"; tcp = "127.0.0.1:7500"; } );\n' \
+    > "$in/seen.cube"
+printf '%064d\n' 0 > "$in/seen.key"
+chmod 640 "$in/seen.key"
+cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"
+check 'cube/a key that others can read' "$(last "$scratch/errors")" \
+    grep -q "^incode: .*seen.cube:1: key .*/seen.key: can be read by others.*; " \
+    "$scratch/errors"
+chmod 600 "$in/seen.key"
+cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"
+check 'cube/a key of its own, from a file' "exit $?" test ! -s "$scratch/errors"
+cube <(cat "$in/seen.cube" | sed 's/key = "[^"]*";//') > "$scratch/output"
+check 'cube/from a pipe' "exit $?" grep -q -e '--memory 4194304' "$scratch/output"
+
 # --- a node's own arguments ---------------------------------------------------
 
 node() { # NAME PATTERN ARGUMENT...
@@ -319,6 +340,12 @@ node 'no key file' '--key .*absent: cannot be read: No such file' \
 node 'a bad key file' '--key .*: not a file of 64 hexadecimal' \
     --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --key "$in/empty.xyz"
 printf '%064d\n' 0 > "$in/key"
+node 'a directory for a key' '--key .*: cannot be read: Is a directory' \
+    --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --key "$in"
+printf '%064d\n' 0 > "$in/open.key"
+chmod 602 "$in/open.key"
+node 'a key that others can write' '--key .*: can be written by others' \
+    --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --key "$in/open.key"
 node 'an address of others' '--wire 0=listen:192.0.2.1:5: cannot listen .*: ' \
     --node 0 --dimension 0 --wire 0=listen:192.0.2.1:5 --key "$in/key"
 node 'no such wire' '--wire 0=tape:a: not one of listen:' \

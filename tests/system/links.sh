@@ -2,6 +2,7 @@
 # The same bytes over every kind of wire, also where the wire suffers.  What
 # waits more than it works goes on beside the rest.  40 seconds.
 . tests/system/lib.sh
+umask 077 # for keys
 
 points=$scratch/points.npy
 "$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -32,7 +33,7 @@ static int set_up(void **unused)
     snprintf(key_path, sizeof key_path, "%s/lab.key", directory);
     write_file(key_path, "000102030405060708090a0b0c0d0e0f"
                          "101112131415161718191a1b1c1d1e1f\n");
-    return 0;
+    return chmod(key_path, 0600);
 }
 
 static int tear_down(void **unused)
@@ -96,7 +97,7 @@ static void nodes_are_started_as_it_says(void **unused)
 }
 
 /* A text of the good file, another in its place, and where and what the error
- * must say. */
+ * must say, if it is one. */
 static void mistakes_are_named(void **unused)
 {
     static const struct {
@@ -108,7 +109,20 @@ static void mistakes_are_named(void **unused)
         {"dimension = 1;", "dimension = ;", ":1: ", "syntax error", 3},
         {"\"512K\"", "\"12K\"", ":1: ", "memory", 3},
         {"memory", "mammary", ":1: ", "mammary: no such setting", 3},
-        {"lab.key", "no.key", ":1: ", "64 hexadecimal digits", 3},
+        {"lab.key", "no.key", ":1: ", "cannot be read: No such file", 3},
+        {"lab.key", ".", ":1: ", "cannot be read: Is a directory", 3},
+        {"lab.key", "lab.cube", ":1: ", "64 hexadecimal digits", 3},
+        {"start = [1]", "start = [1, 0, 1]", ":1: ", "twice", 3},
+        {"127.0.0.1:7001", "10.0.0.1:7000", ":4: ",
+         "node 1 and the host has 10.0.0.1:7000, and so has that between node "
+         "0 and the host in line 3; ",
+         3},
+        {"/dev/ttyS1\", \"/dev/ttyUSB0", "/dev/t\", \"/dev/t", ":0: ", "", 0},
+        {"start = [1]", "start = [0, 1]", ":0: ", "", 0},
+        {"tcp = \"127.0.0.1:7001\"", "serial = [\"/dev/ttyS1\", \"/dev/a\"]",
+         ":5: ", "/dev/ttyS1", 3},
+        {"tcp = \"127.0.0.1:7001\"", "serial = [\"/dev/ttyUSB0\", \"/dev/a\"]",
+         ":0: ", "", 0},
         {"key = \"lab.key\";", "", ":3: ", "without a key", 3},
         {"start = [1]", "start = [2]", ":1: ", "start", 3},
         {"node = 1; to = 0;", "node = 1; to = 1;", ":5: ", "no neighbours", 3},
@@ -138,13 +152,23 @@ static void mistakes_are_named(void **unused)
         write_file(path, text);
         snprintf(where, sizeof where, "%s%s", path, cases[i].where);
         int status = host_cube_file_read(&file, path, &error);
-        if (status != cases[i].code || strstr(error.text, where) == NULL ||
-            strstr(error.text, cases[i].what) == NULL) {
+        if (status != cases[i].code ||
+            (status != 0 && (strstr(error.text, where) == NULL ||
+                             strstr(error.text, cases[i].what) == NULL))) {
             fail_msg("case %zu: exit %d: %s", i, status, error.text);
+        }
+        if (status == 0) {
+            host_cube_file_free(&file);
         }
     }
     struct host_error error = {0};
     assert_int_equal(host_cube_file_read(&file, "/no/such.cube", &error), 3);
+    write_file(path, good);
+    assert_int_equal(chmod(key_path, 0602), 0);
+    error = (struct host_error){0};
+    assert_int_equal(host_cube_file_read(&file, path, &error), 3);
+    assert_non_null(strstr(error.text, "can be written by others"));
+    assert_int_equal(chmod(key_path, 0600), 0);
 }
 
 int main(void)

@@ -61,6 +61,15 @@ bool tcp_address_is_loopback(const struct tcp_address *address)
            ntohl(v4->sin_addr.s_addr) >> 24 == 127;
 }
 
+bool tcp_address_is_any(const struct tcp_address *address)
+{
+    const struct sockaddr_in *v4 = (const struct sockaddr_in *)&address->to;
+    const struct sockaddr_in6 *v6 = (const struct sockaddr_in6 *)&address->to;
+    return address->to.any.sa_family == AF_INET6
+               ? IN6_IS_ADDR_UNSPECIFIED(&v6->sin6_addr)
+               : v4->sin_addr.s_addr == htonl(INADDR_ANY);
+}
+
 void tcp_address_to_loopback(struct tcp_address *address)
 {
     struct sockaddr_in *v4 = (struct sockaddr_in *)&address->to;

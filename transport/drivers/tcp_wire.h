@@ -60,6 +60,9 @@ int tcp_address_parse(struct tcp_address *address, const char *text);
 /* Of this machine only: 127.0.0.0/8 or ::1. */
 bool tcp_address_is_loopback(const struct tcp_address *address);
 
+/* All addresses of a machine: 0.0.0.0 or ::. */
+bool tcp_address_is_any(const struct tcp_address *address);
+
 /* Makes a loopback address of it, with the same port. */
 void tcp_address_to_loopback(struct tcp_address *address);
 

@@ -1,0 +1,32 @@
+/* The file with a cube's key: 64 hexadecimal digits.  Whoever can write it can
+ * join the cube, so that such a file is refused; whoever can read it can, too,
+ * of which the user is to be told.
+ *
+ * Memory: none.  Work: reads the first 64 bytes.
+ *
+ *     switch (key_file_read("cube.key", key)) {
+ *     case KEY_FILE_UNREADABLE: perror("cube.key"); ...
+ */
+#ifndef TRANSPORT_DRIVERS_KEY_FILE_H
+#define TRANSPORT_DRIVERS_KEY_FILE_H
+
+#include "../secure.h"
+
+enum key_file_state {
+    KEY_FILE_GOOD,
+    KEY_FILE_SEEN,       /* good, but others can read it */
+    KEY_FILE_WRITABLE,   /* others can write it */
+    KEY_FILE_UNREADABLE, /* and errno */
+    KEY_FILE_NO_KEY      /* not 64 digits */
+};
+
+/* What is wrong, and what to do; of KEY_FILE_GOOD, NULL. */
+struct key_file_text {
+    const char *what, *next;
+};
+
+/* key: SECURE_KEY_BYTES, filled where the state is one of the first two. */
+enum key_file_state key_file_read(const char *path, uint8_t *key);
+struct key_file_text key_file_text(enum key_file_state state);
+
+#endif
