@@ -231,6 +231,8 @@ static void parse_output(struct parse *p, const char *value)
     p->options->output[p->options->outputs++] = value;
 }
 
+const char *const host_boards[] = {"linux", NULL};
+
 static bool parse_names(int key, const char *value, struct parse *p)
 {
     static const char *const strategies[] = {"sequential", "spatial", "auto",
@@ -239,7 +241,6 @@ static bool parse_names(int key, const char *value, struct parse *p)
     static const char *const indexes[] = {"naive", "grid", "kd", NULL};
     static const char *const rules[] = {"own", "paper", NULL};
     static const char *const links[] = {"tcp", "serial", "mpi", NULL};
-    static const char *const boards[] = {"linux", NULL};
     struct host_run_options *o = p->options;
     switch (key) {
     case KEY_STRATEGY:
@@ -262,7 +263,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
         o->link = (enum host_wire_kind)choose(p, "link", value, links, NULL);
         return true;
     case KEY_BOARD:
-        (void)choose(p, "board", value, boards, ",mps2-an500,mps2-an385,");
+        (void)choose(p, "board", value, host_boards, ",mps2-an500,mps2-an385,");
         return true;
     default:
         return false;

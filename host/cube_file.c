@@ -399,6 +399,27 @@ static int check_wires(const struct host_cube_file *file,
 
 /* --- the file ------------------------------------------------------------ */
 
+static int read_board(struct host_cube_file *file, const config_setting_t *root,
+                      struct host_error *error)
+{
+    const config_setting_t *where = config_setting_get_member(root, "board");
+    const char *name =
+        where == NULL ? host_boards[0] : config_setting_get_string(where);
+    char text[120];
+    size_t used = 0;
+    for (unsigned i = 0; host_boards[i] != NULL; i++) {
+        if (name != NULL && strcmp(name, host_boards[i]) == 0) {
+            file->board = host_boards[i];
+            return 0;
+        }
+        used += (size_t)snprintf(text + used, sizeof text - used, "%s\"%s\"",
+                                 i == 0 ? "board: not one that there is; give "
+                                        : " or ",
+                                 host_boards[i]);
+    }
+    return wrong(file, where, error, text);
+}
+
 static int read_nodes(struct host_cube_file *file, const config_t *config,
                       struct host_error *error)
 {
@@ -437,6 +458,9 @@ static int read_nodes(struct host_cube_file *file, const config_t *config,
         }
         file->dead_s = (unsigned)value;
     }
+    if (read_board(file, root, error) != 0) {
+        return error->code;
+    }
     where = config_setting_get_member(root, "start");
     for (int i = 0; where != NULL && i < config_setting_length(where); i++) {
         int node = config_setting_get_int_elem(where, i);
@@ -457,8 +481,9 @@ static int read_nodes(struct host_cube_file *file, const config_t *config,
 static int read_settings(struct host_cube_file *file, const config_t *config,
                          struct host_error *error)
 {
-    static const char *const names[] = {"dimension", "memory", "window", "key",
-                                        "start",     "dead",   "links",  NULL};
+    static const char *const names[] = {"dimension", "board", "memory",
+                                        "window",    "key",   "start",
+                                        "dead",      "links", NULL};
     const config_setting_t *root = config_root_setting(config);
     const config_setting_t *links = config_setting_get_member(root, "links");
     if (check_names(file, root, names, error) != 0 ||
@@ -609,6 +634,8 @@ unsigned host_cube_straps(const struct host_cube_file *file, unsigned node,
             print_wire(wire, d, wire->node == node, straps[n++]);
         }
     }
+    snprintf(straps[n++], HOST_STRAP_BYTES, "--board");
+    snprintf(straps[n++], HOST_STRAP_BYTES, "%s", file->board);
     return n;
 }
 

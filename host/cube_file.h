@@ -32,6 +32,7 @@ struct host_cube_wire {
 struct host_cube_file {
     const char *path;
     unsigned nodes, dimension;
+    const char *board; /* one of host_boards */
     uint64_t memory;
     unsigned window;
     unsigned dead_s; /* a link silent so long is given up; 0: never */

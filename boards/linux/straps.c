@@ -20,6 +20,8 @@ static const char help[] =
     "  --dead US          microseconds of silence after which a link is given "
     "up; 0: never\n"
     "  --key FILE         64 hexadecimal digits: the key of the cube\n"
+    "  --board linux      what this program is for: on another it does not "
+    "start\n"
     "  --wire LINK=WIRE   opens the wire of that link, 0 to dimension (the "
     "host's):\n"
     "                     listen:ADDRESS:PORT, call:ADDRESS:PORT (in "
@@ -116,6 +118,10 @@ static const char *read_one(const char *name, const char *text,
     }
     if (strcmp(name, "--wire") == 0) {
         return read_wire(text, straps);
+    }
+    if (strcmp(name, "--board") == 0) {
+        return strcmp(text, "linux") == 0 ? NULL
+                                          : "another board's program starts it";
     }
     if (strcmp(name, "--key") == 0) {
         straps->key = text;

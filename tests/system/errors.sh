@@ -315,7 +315,7 @@ chmod 600 "$in/seen.key"
 cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"
 check 'cube/a key of its own, from a file' "exit $?" test ! -s "$scratch/errors"
 cube <(cat "$in/seen.cube" | sed 's/key = "[^"]*";//') > "$scratch/output"
-check 'cube/from a pipe' "exit $?" grep -q -e '--memory 4194304' "$scratch/output"
+check 'cube/from a pipe' "exit $?" grep -q -e '--board linux' "$scratch/output"
 
 # --- a node's own arguments ---------------------------------------------------
 
@@ -346,6 +346,8 @@ printf '%064d\n' 0 > "$in/open.key"
 chmod 602 "$in/open.key"
 node 'a key that others can write' '--key .*: can be written by others' \
     --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --key "$in/open.key"
+node 'another board' '--board z80: another board' \
+    --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --board z80
 node 'an address of others' '--wire 0=listen:192.0.2.1:5: cannot listen .*: ' \
     --node 0 --dimension 0 --wire 0=listen:192.0.2.1:5 --key "$in/key"
 node 'no such wire' '--wire 0=tape:a: not one of listen:' \

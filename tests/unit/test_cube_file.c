@@ -84,6 +84,7 @@ static void nodes_are_started_as_it_says(void **unused)
     assert_true(has(straps, count, "--memory", "524288"));
     assert_true(has(straps, count, "--lines", "921600"));
     assert_true(has(straps, count, "--key", key_path));
+    assert_true(has(straps, count, "--board", "linux"));
     assert_true(
         has(straps, count, "--wire", "0=serial:/dev/ttyUSB0:921600:rtscts"));
     assert_true(has(straps, count, "--wire", "1=listen:10.0.0.1:7000"));
@@ -112,6 +113,8 @@ static void mistakes_are_named(void **unused)
         {"lab.key", "no.key", ":1: ", "cannot be read: No such file", 3},
         {"lab.key", ".", ":1: ", "cannot be read: Is a directory", 3},
         {"lab.key", "lab.cube", ":1: ", "64 hexadecimal digits", 3},
+        {"start = [1]", "board = \"z80\"", ":1: ", "give \"linux\"", 3},
+        {"start = [1]", "board = 7", ":1: ", "give \"linux\"", 3},
         {"start = [1]", "start = [1, 0, 1]", ":1: ", "twice", 3},
         {"127.0.0.1:7001", "10.0.0.1:7000", ":4: ",
          "node 1 and the host has 10.0.0.1:7000, and so has that between node "
