@@ -36,7 +36,8 @@ uint64_t process_clock_us(clockid_t clock)
 
 void *process_arena(size_t bytes)
 {
+    int at_once = bytes <= PROCESS_AT_ONCE ? MAP_POPULATE : 0;
     void *arena = mmap(NULL, bytes, PROT_READ | PROT_WRITE,
-                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+                       MAP_PRIVATE | MAP_ANONYMOUS | at_once, -1, 0);
     return arena == MAP_FAILED ? NULL : arena;
 }
