@@ -132,6 +132,7 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
 {
     memset(wire, 0, sizeof *wire);
     wire->net = net;
+    wire->text = text;
     if (strncmp(text, "listen:", 7) == 0) {
         return open_net(wire, text + 7, true, key, fault);
     }
@@ -174,6 +175,22 @@ static void hear(struct linux_wire *wire, const struct pollfd *fds,
     }
 }
 
+/* Once, and at the end that calls: whoever calls the other may be a stranger.
+ */
+static void tell_of_key(struct linux_wire *wire)
+{
+    if (wire->kind == LINUX_NET && !wire->told && wire->net->other_key &&
+        wire->net->pause_us > 2 * TCP_PAUSE_MIN_US &&
+        !wire->net->config.listens) {
+        wire->told = true;
+        fault_print(
+            &(struct linux_fault){.where = "--wire",
+                                  .value = wire->text,
+                                  .what = "answers, but with another key",
+                                  .next = "give both ends the same key file"});
+    }
+}
+
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
                       uint64_t wait_us, uint64_t watch_us)
 {
@@ -195,5 +212,6 @@ void linux_wires_idle(struct linux_wire *wires, unsigned count,
     wait_files(fds, used, wait_us, watch_us);
     for (unsigned i = 0; i < count; i++) {
         hear(&wires[i], fds + first[i], first[i + 1] - first[i]);
+        tell_of_key(&wires[i]);
     }
 }

@@ -121,6 +121,24 @@ END
     refused 'no key: exit 4' 's/--key [^ ]*//'
     check 'links/no output without a key' 'it left one' \
         test ! -e "$scratch/out.npy"
+    # Between nodes it is the one that calls who hears of it.
+    printf 'dimension = 1; key = "cube.key"; links = (
+        { node = 0; to = "host"; tcp = "127.0.0.1:%d"; },
+        { node = 0; to = 1; tcp = "127.0.0.1:%d"; } );\n' \
+        $((base + 51)) $((base + 52)) > "$scratch/pair.cube"
+    start_nodes "$scratch/pair.cube" '--node 0 '
+    # shellcheck disable=SC2046
+    "$BUILD/"$("$INCODE" cube "$scratch/pair.cube" | grep -e '--node 1 ' |
+        sed 's/cube.key/other.key/') 2> "$scratch/said" &
+    nodes="$nodes $!"
+    for _ in $(seq 100); do
+        [ -s "$scratch/said" ] && break
+        sleep 0.1
+    done
+    end_nodes
+    check 'links/another key between nodes' "$(cat "$scratch/said")" \
+        grep -q "^incode-node: --wire .*$((base + 52)): answers, but with" \
+        "$scratch/said"
     sed -i 's/--key [^ ]*//; s/127.0.0.1/0.0.0.0/' "$scratch/straps"
     # shellcheck disable=SC2046
     "$BUILD/"$(cat "$scratch/straps") 2> "$scratch/said" &
