@@ -164,7 +164,13 @@ static void mistakes_are_named(void **unused)
             host_cube_file_free(&file);
         }
     }
+}
+
+static void files_that_are_not_taken(void **unused)
+{
+    static struct host_cube_file file;
     struct host_error error = {0};
+    (void)unused;
     assert_int_equal(host_cube_file_read(&file, "/no/such.cube", &error), 3);
     write_file(path, good);
     assert_int_equal(chmod(key_path, 0602), 0);
@@ -179,6 +185,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nodes_are_started_as_it_says),
         cmocka_unit_test(mistakes_are_named),
+        cmocka_unit_test(files_that_are_not_taken),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
