@@ -35,7 +35,7 @@ static struct field next_field(const char **at, const char *end, char delimiter)
 {
     bool quoted = false;
     const char *c = *at;
-    while (c < end && is_blank(*c) && (*c != delimiter || c[0] == ' ')) {
+    while (c < end && is_blank(*c) && (delimiter == ' ' || *c != delimiter)) {
         c++;
     }
     struct field f = {c, c};
@@ -43,8 +43,8 @@ static struct field next_field(const char **at, const char *end, char delimiter)
         quoted = quoted != (*c == '"');
     }
     *at = c < end ? c + 1 : NULL;
-    while (delimiter == ' ' && *at != NULL && is_blank(**at)) {
-        *at = *at + 1 < end ? *at + 1 : NULL; /* many are one */
+    while (delimiter == ' ' && *at != NULL && (*at == end || is_blank(**at))) {
+        *at = *at < end ? *at + 1 : NULL; /* many are one */
     }
     while (c > f.first && is_blank(c[-1])) {
         c--;

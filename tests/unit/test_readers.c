@@ -81,6 +81,21 @@ static void numbers_are_correctly_rounded(void **unused)
     free(b);
 }
 
+/* Reads every beginning of a file, with nothing readable behind it. */
+static void read_cuts(const char *path, const struct bytes *b)
+{
+    for (size_t n = 1; n < b->n; n++) {
+        struct host_points points;
+        struct host_error error = {0};
+        uint8_t *copy = malloc(n);
+        assert_non_null(copy);
+        memcpy(copy, b->data, n);
+        (void)host_points_parse(path, copy, n, &points, &error);
+        host_points_free(&points);
+        free(copy);
+    }
+}
+
 static void text_in_all_its_habits(void **unused)
 {
     (void)unused;
@@ -109,6 +124,7 @@ static void text_in_all_its_habits(void **unused)
         b.n = 0;
         put_text(&b, named[i]);
         expect_rows("a.csv", &b, 2);
+        read_cuts("a.csv", &b);
     }
     b.n = 0;
     put_text(&b, "# made by hand\n3 3 1 1\n1 -3 -2.5 -2 7 1\n"
