@@ -181,23 +181,30 @@ static bool flush(struct secure_channel *c)
     return true;
 }
 
+/* All that the pipe has room for: what is not taken, the link holds back until
+ * the pipe has room again. */
 static int channel_send(void *context, const uint8_t *bytes, size_t size)
 {
     struct secure_channel *c = context;
+    size_t done = 0;
     if (c->failed || !flush(c)) {
         return fail(c);
     }
-    if (c->out_begin < c->out_end || size == 0) {
-        return 0;
+    while (done < size && c->out_begin == c->out_end) {
+        size_t part =
+            size - done < SECURE_RECORD_MAX ? size - done : SECURE_RECORD_MAX;
+        put_head(c->out, part, c->keys.out_count);
+        c->suite->seal(c->out + SECURE_HEAD_BYTES, bytes + done, part, c->out,
+                       c->keys.out_count++, c->keys.out);
+        c->records_out++;
+        c->out_begin = 0;
+        c->out_end = SECURE_HEAD_BYTES + part + SECURE_TAG_BYTES;
+        done += part;
+        if (!flush(c)) {
+            return fail(c);
+        }
     }
-    size = size < SECURE_RECORD_MAX ? size : SECURE_RECORD_MAX;
-    put_head(c->out, size, c->keys.out_count);
-    c->suite->seal(c->out + SECURE_HEAD_BYTES, bytes, size, c->out,
-                   c->keys.out_count++, c->keys.out);
-    c->records_out++;
-    c->out_begin = 0;
-    c->out_end = SECURE_HEAD_BYTES + size + SECURE_TAG_BYTES;
-    return flush(c) ? (int)size : fail(c);
+    return (int)done;
 }
 
 /* Where the next record begins in what has come, from `at` on; else where one

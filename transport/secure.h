@@ -11,9 +11,9 @@
  *
  * Memory: struct secure_shake while a connection is not proven, struct
  * secure_channel then.  Work: a shake hashes at most three short inputs and
- * opens one empty record; a channel's function takes one record, and between
- * two good ones no more than SECURE_LOST_MAX bytes are opened or skipped in
- * vain.
+ * opens one empty record; a channel's functions are linear in the bytes given
+ * and taken, and between two good records no more than SECURE_LOST_MAX bytes
+ * are opened or skipped in vain.
  *
  *     secure_shake_init(&shake, suite, key, caller, nonce);
  *     while ((status = secure_shake(&shake, &pipe)) == 0) wait;

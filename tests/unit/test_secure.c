@@ -165,6 +165,21 @@ static void what_is_said_arrives(void **unused)
     }
 }
 
+/* A pipe that has room is given all: what it does not take, the link holds back
+ * until it hears of room. */
+static void all_that_fits_is_taken(void **unused)
+{
+    static uint8_t said[3 * SECURE_RECORD_MAX], heard[sizeof said];
+    struct world *w = connected(2, 0);
+    struct link_pipe p = secure_channel_pipe(&w->channel[0]);
+    (void)unused;
+    assert_int_equal(p.send(p.context, said, sizeof said), sizeof said);
+    assert_int_equal(receive_all(w, 1, heard, sizeof heard), sizeof said);
+    w->lanes[0].most = 100;
+    assert_int_equal(p.send(p.context, said, sizeof said), SECURE_RECORD_MAX);
+    free(w);
+}
+
 static void another_key_is_refused(void **unused)
 {
     (void)unused;
@@ -502,6 +517,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_said_arrives),
+        cmocka_unit_test(all_that_fits_is_taken),
         cmocka_unit_test(another_key_is_refused),
         cmocka_unit_test(a_changed_opening_is_refused),
         cmocka_unit_test(a_changed_byte_loses_a_record),
