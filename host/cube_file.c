@@ -441,7 +441,8 @@ static int read_nodes(struct host_cube_file *file, const config_t *config,
         (host_parse_bytes(text, &file->memory) != 0 ||
          file->memory < 256 * 1024 || file->memory > UINT64_C(1) << 30)) {
         return wrong(file, config_lookup(config, "memory"), error,
-                     "memory: not a size; write \"4M\", from 256K to 1G");
+                     "memory: not a size; write \"4M\", from 640K to "
+                     "1G, or less to a small cube");
     }
     if (config_lookup_int(config, "window", &value) == CONFIG_TRUE) {
         if (value < 1 || value > LINK_WINDOW_MAX) {
