@@ -37,9 +37,9 @@ struct incode_afl {
     uint32_t *touched_heads;
     uint32_t capacity, mask, count, count_max; /* of faces */
     uint32_t free, unused; /* nodes: a list, and all from this one on */
-    uint32_t touched_capacity, touched_mask, touched_free, touched_count,
-        touched_max;
-    uint32_t crowded; /* a vertex with a long list, or INCODE_NONE */
+    uint32_t touched_capacity, touched_mask, touched_free, touched_count;
+    uint32_t touched_max; /* at a time; entries from here on were never used */
+    uint32_t crowded;     /* a vertex with a long list, or INCODE_NONE */
 };
 
 #define INCODE_AFL_NIL UINT32_MAX

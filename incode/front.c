@@ -172,7 +172,7 @@ bool incode_front_drain(struct incode_triangulator *t)
 static uint32_t spill_position(const struct incode_triangulator *t)
 {
     uint32_t nearest = t->current, farthest = 0;
-    for (uint32_t i = 0; i < t->afl.touched_capacity; i++) {
+    for (uint32_t i = 0; i < t->afl.touched_max; i++) {
         const struct incode_touched *entry = &t->afl.touched[i];
         if (!incode_touched_used(entry))
             continue;
@@ -223,7 +223,7 @@ static bool evict_brick(struct incode_triangulator *t,
 /* Evicts one brick beyond the threshold, or notes that none is left. */
 static void evict_next(struct incode_triangulator *t)
 {
-    while (t->spill_cursor < t->afl.touched_capacity) {
+    while (t->spill_cursor < t->afl.touched_max) {
         const struct incode_touched *entry = &t->afl.touched[t->spill_cursor];
         if (incode_touched_used(entry) && is_spilled(t, entry->brick)) {
             (void)evict_brick(t, entry);

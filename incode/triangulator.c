@@ -447,7 +447,7 @@ static bool next_foreign(struct incode_triangulator *t, uint32_t *v)
 {
     const struct incode_touched *best = NULL;
     uint32_t least = 0;
-    for (uint32_t i = 0; i < t->afl.touched_capacity; i++) {
+    for (uint32_t i = 0; i < t->afl.touched_max; i++) {
         const struct incode_touched *entry = &t->afl.touched[i];
         if (!incode_touched_used(entry) || is_returning(t, entry->brick))
             continue;
@@ -475,7 +475,7 @@ static enum incode_step finish(struct incode_triangulator *t)
         if (incode_own_brick(t, brick) && !incode_front_has_hub(t, brick))
             t->ports.commit(t->ports.context, brick);
     }
-    for (uint32_t i = 0; i < t->afl.touched_capacity; i++)
+    for (uint32_t i = 0; i < t->afl.touched_max; i++)
         if (incode_touched_used(&t->afl.touched[i]))
             incode_afl_drop(&t->afl, t->afl.touched[i].brick);
     INCODE_ASSERT(t->afl.count == 0 && t->afl.touched_count == 0);
