@@ -38,9 +38,9 @@ static size_t control_bytes(size_t bytes)
            copies_of(bytes) * sizeof *v->point;
 }
 
-/* The active face list takes five sixteenths of what the control block leaves
- * (a front of a million points' region), the bricks a sixteenth, page frames
- * the rest. */
+/* The active face list takes three eighths of what the control block leaves
+ * (the front of a region of 1,250,000 points, with a tenth to spare), the
+ * bricks a sixteenth, page frames the rest. */
 static bool fill_map(struct incode_map *map, size_t bytes)
 {
     memset(map, 0, sizeof *map);
@@ -52,7 +52,7 @@ static bool fill_map(struct incode_map *map, size_t bytes)
     size_t rest = bytes - map->control;
     size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
     size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
-    map->afl_faces = rest * 5 / 16 / face;
+    map->afl_faces = rest * 3 / 8 / face;
     map->brick_entries = rest / 16 / brick;
     if (map->afl_faces < FACES_MIN)
         map->afl_faces = FACES_MIN;
