@@ -262,17 +262,16 @@ static uint64_t others(const struct incode_query *q,
                    bit_of(q->c, brick) | bit_of(q->best, brick));
 }
 
-/* Looks at some bricks of the list.  False: one is missing, or too much lies in
- * the ball. */
+/* Looks at some bricks of the list, and draws the query's ball in, which this
+ * one holds.  False: one is missing, or too much lies in the ball. */
 static bool look_at(struct incode_make *n, struct incode_query *q,
+                    const struct incode_vicinity_ball *ball,
                     const uint32_t *index, uint32_t count, struct hits *hits)
 {
     struct incode_vicinity *list = &n->t->vicinity;
     struct incode_pager *pager = &n->t->pager;
-    struct incode_vicinity_ball ball;
     uint32_t brick[BATCH], met = 0;
     uint64_t in[BATCH];
-    incode_vicinity_set_ball(list, q, &ball);
     n->t->stats.candidates += (uint64_t)count * INCODE_BRICK_POINTS;
     for (uint32_t i = 0; i < count; i++) {
         brick[met] = list->brick[index[i]];
@@ -282,7 +281,7 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
                 return false;
             incode_vicinity_copy(list, index[i], f);
         }
-        in[met] = incode_vicinity_points(list, index[i], &ball);
+        in[met] = incode_vicinity_points(list, index[i], ball);
         met += in[met] != 0;
     }
     for (uint32_t i = 0; i < met; i++) {
@@ -302,7 +301,8 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
 {
     const struct incode_vicinity *list = &n->t->vicinity;
     uint32_t index[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING];
-    uint32_t count = incode_vicinity_in_ball(list, q, index);
+    struct incode_vicinity_ball ball;
+    uint32_t count = incode_vicinity_in_ball(list, q, &ball, index);
     hits->count = hits->placed = 0;
     while (count > BATCH) {
         double square = q->square;
@@ -310,7 +310,7 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
         while (first + BATCH < count &&
                list->brick[index[first + BATCH / 2]] < list->centre)
             first++;
-        if (!look_at(n, q, index + first, BATCH, hits))
+        if (!look_at(n, q, &ball, index + first, BATCH, hits))
             return false;
         if (q->square > 0.7 * square) {
             memmove(index + first, index + first + BATCH,
@@ -319,11 +319,13 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
             break;
         }
         hits->count = hits->placed = 0;
-        count = incode_vicinity_in_ball(list, q, index);
+        count = incode_vicinity_in_ball(list, q, &ball, index);
     }
     for (uint32_t i = 0; i < count; i += BATCH) {
         uint32_t left = count - i;
-        if (!look_at(n, q, index + i, left < BATCH ? left : BATCH, hits))
+        if (i > 0)
+            incode_vicinity_set_ball(list, q, &ball);
+        if (!look_at(n, q, &ball, index + i, left < BATCH ? left : BATCH, hits))
             return false;
     }
     return true;

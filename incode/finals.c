@@ -158,7 +158,7 @@ uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
                              struct incode_tally *tally)
 {
     struct face face;
-    struct places at = {{0}, {0}, {0}};
+    struct places at; /* place() sets all that is read */
     if (f->count == 0)
         return INCODE_FINALS_NONE;
     set_face(&face, v, b, c, scale);

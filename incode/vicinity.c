@@ -41,7 +41,7 @@ static bool copy_boxes(struct incode_walker *walker, struct incode_query *q,
 
 static void set_empty(struct incode_vicinity *v)
 {
-    v->count = v->copies = v->next = 0;
+    v->count = v->next = 0;
     memset(v->copy, INCODE_NO_COPY, sizeof v->copy);
     for (int d = 0; d < 3; d++) {
         v->box_lo[d] = __builtin_inf();
@@ -148,22 +148,22 @@ void incode_vicinity_set_ball(const struct incode_vicinity *v,
 
 /* What meets the ball and is not certainly on the known side of the face. */
 static void in_ball(const struct incode_vicinity *v,
-                    const struct incode_query *q, struct chosen *chosen)
+                    const struct incode_query *q,
+                    struct incode_vicinity_ball *ball, struct chosen *chosen)
 {
     const float *corner[3]; /* the farthest beyond the face */
-    struct incode_vicinity_ball ball;
     incode_vf c[3], n[3], zero = incode_vf_all(0);
     double level = 0, extent = incode_max_norm(q->sphere.n);
-    incode_vicinity_set_ball(v, q, &ball);
+    incode_vicinity_set_ball(v, q, ball);
     for (int d = 0; d < 3; d++) {
         double at = (q->pv[d] - v->origin[d]) * v->scale;
         double normal = q->sphere.n[d] / extent;
-        c[d] = incode_vf_all(ball.centre[d]);
+        c[d] = incode_vf_all(ball->centre[d]);
         n[d] = all_of(normal);
         corner[d] = normal > 0 ? v->hi[d] : v->lo[d];
         level += normal * at;
     }
-    incode_vf square = incode_vf_all(ball.square);
+    incode_vf square = incode_vf_all(ball->square);
     incode_vf floor = all_of(level - 0x1p-17);
     for (uint32_t i = 0; i < v->count; i += INCODE_VF_LANES) {
         incode_vf sum = zero, top = zero;
@@ -184,11 +184,12 @@ static void in_ball(const struct incode_vicinity *v,
 
 uint32_t incode_vicinity_in_ball(
     const struct incode_vicinity *v, const struct incode_query *q,
+    struct incode_vicinity_ball *ball,
     uint32_t index[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING])
 {
     struct chosen chosen;
     uint32_t count = 0;
-    in_ball(v, q, &chosen);
+    in_ball(v, q, ball, &chosen);
     for (uint32_t i = 0; i < v->count; i += INCODE_VF_LANES) {
         uint32_t in =
             (uint32_t)(chosen.word[i / 64] >> (i % 64)) & INCODE_VF_ALL;
@@ -217,10 +218,9 @@ void incode_vicinity_copy(struct incode_vicinity *v, uint32_t index,
             incode_vd_store_float(v->point[copy][d] + i,
                                   incode_vd_load(axis[d] + i) * scale - origin);
     }
-    if (v->copies < v->room)
-        v->copies++;
-    else
-        v->copy[v->owner[copy]] = INCODE_NO_COPY;
+    uint8_t *old = &v->copy[v->owner[copy]];
+    if (*old == copy)
+        *old = INCODE_NO_COPY;
     v->owner[copy] = (uint8_t)index;
     v->copy[index] = (uint8_t)copy;
     v->next = (copy + 1) % v->room;
@@ -263,11 +263,12 @@ enum incode_walk incode_vicinity_visit(const struct incode_vicinity *v,
                                        struct incode_query *q,
                                        incode_visit *visit, void *context)
 {
+    struct incode_vicinity_ball ball;
     struct chosen chosen;
     double square = q->square;
     bool round = q->round;
     if (round)
-        in_ball(v, q, &chosen);
+        in_ball(v, q, &ball, &chosen);
     else
         in_box(v, q, &chosen);
     /* From the centre on, for near bricks first, and around. */
@@ -283,7 +284,7 @@ enum incode_walk incode_vicinity_visit(const struct incode_vicinity *v,
             if (round && q->round && q->square < square) {
                 struct chosen left;
                 square = q->square;
-                in_ball(v, q, &left);
+                in_ball(v, q, &ball, &left);
                 for (uint32_t k = 0; k < v->count; k += 64)
                     chosen.word[k / 64] &= left.word[k / 64];
             }

@@ -40,7 +40,7 @@ struct incode_vicinity {
     uint32_t room; /* for so many of them, up to INCODE_VICINITY_COPIES */
     uint8_t copy[INCODE_VICINITY_BRICKS]; /* which, or INCODE_NO_COPY */
     uint8_t owner[INCODE_VICINITY_COPIES];
-    uint32_t copies, next; /* how many, and which is given away next */
+    uint32_t next; /* copy to be given away */
 };
 
 /* The ball of a round query in the list's units, widened by what rounding to
@@ -70,10 +70,11 @@ enum incode_walk incode_vicinity_visit(const struct incode_vicinity *vicinity,
                                        incode_visit *visit, void *context);
 
 /* Indices, in the list, of the bricks that meet the ball of a round query and
- * are not certainly on the known side of its face; returns how many.  Room for
- * a vector more is needed. */
+ * are not certainly on the known side of its face; returns how many, and the
+ * ball.  Room for a vector more is needed. */
 uint32_t incode_vicinity_in_ball(
     const struct incode_vicinity *vicinity, const struct incode_query *q,
+    struct incode_vicinity_ball *ball,
     uint32_t index[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING]);
 
 void incode_vicinity_set_ball(const struct incode_vicinity *vicinity,
