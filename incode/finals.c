@@ -66,18 +66,19 @@ static void set_face(struct face *f, const double v[3], const double pb[3],
     f->numerator[1] = FINE * area * area;
 }
 
-/* Places of a vector of candidates in the pencil: hi + lo, and its error,
- * infinite for one in doubt about the face; hi is infinite for one that is not
- * beyond it. */
+/* Places of candidates in the pencil: hi + lo, and its error, infinite for one
+ * in doubt about the face; hi is infinite for one that is not beyond it. */
 struct places {
     alignas(64) double hi[INCODE_FINALISTS];
     alignas(64) double lo[INCODE_FINALISTS];
     alignas(64) double error[INCODE_FINALISTS];
 };
 
-INCODE_INLINE void place(struct places *out, uint32_t i, const struct face *f,
-                         const struct incode_finals *finals, const double v[3],
-                         double scale)
+/* Those of a vector of candidates; which are in doubt, one bit each. */
+INCODE_INLINE uint32_t place(struct places *out, uint32_t i,
+                             const struct face *f,
+                             const struct incode_finals *finals,
+                             const double v[3], double scale)
 {
     struct incode_lanes r[3], n[3], m[3];
     incode_vd size = incode_vd_all(0), tiny = incode_vd_all(TINY);
@@ -111,7 +112,9 @@ INCODE_INLINE void place(struct places *out, uint32_t i, const struct face *f,
     error = incode_vd_select(above.hi > level + level, error, infinite);
     *(incode_vd *)(out->hi + i) = incode_vd_select(none, infinite, hi);
     *(incode_vd *)(out->lo + i) = incode_vd_select(none, zero, lo);
-    *(incode_vd *)(out->error + i) = incode_vd_select(none, zero, error);
+    error = incode_vd_select(none, zero, error);
+    *(incode_vd *)(out->error + i) = error;
+    return incode_vd_mask(error > incode_vd_all(DBL_MAX));
 }
 
 static bool is_beyond(const struct incode_finals *f, uint32_t i,
@@ -158,7 +161,8 @@ uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
                              struct incode_tally *tally)
 {
     struct face face;
-    struct places at; /* place() sets all that is read */
+    struct places at;
+    uint32_t doubt = 0;
     if (f->count == 0)
         return INCODE_FINALS_NONE;
     set_face(&face, v, b, c, scale);
@@ -166,10 +170,9 @@ uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
         for (int d = 0; d < 3; d++)
             f->p[d][i] = f->p[d][0];
     for (uint32_t i = 0; i < f->count; i += INCODE_VD_LANES)
-        place(&at, i, &face, f, v, scale);
-    for (uint32_t i = 0; i < f->count; i++) {
-        if (!(at.error[i] > DBL_MAX))
-            continue;
+        doubt |= place(&at, i, &face, f, v, scale) << i;
+    for (; doubt != 0; doubt &= doubt - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(doubt);
         if (is_beyond(f, i, v, b, c, tally))
             return INCODE_FINALS_NONE;
         at.hi[i] = __builtin_inf();

@@ -1,7 +1,10 @@
+#include <stdalign.h>
 #include <string.h>
 
 #include "lanes.h"
 #include "query.h"
+
+enum { LEAF_ALL = (1 << INCODE_LEAF_POINTS) - 1 }; /* its points, a bit each */
 
 /* What a walk does with the points of the leaves that it comes to: each
  * question's candidates, a vector of points at a time. */
@@ -26,9 +29,10 @@ INCODE_INLINE void load_points(struct lane_points *p,
         scale;
 }
 
-/* Points that are not certainly beaten, one bit each. */
+/* Points that are not certainly beaten, one bit each; depth: how far before the
+ * best they lie in the face's pencil, as far as doubles tell. */
 INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
-                                  const struct lane_points *p)
+                                  const struct lane_points *p, incode_vd *depth)
 {
     const struct incode_sphere *s = &q->sphere;
     incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
@@ -47,8 +51,11 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
     incode_vd margin = plane_error * eps + tiny;
     incode_vl out = q->timid ? ~(plane > margin) : plane + margin < zero;
+    *depth = zero;
     if (s->has_apex) {
         value -= incode_vd_all(s->det) * square;
+        *depth = incode_vd_select(plane > zero, value / plane,
+                                  incode_vd_all(-__builtin_inf()));
         value_error += incode_vd_all(s->pdet) * square;
         out |= value + (value_error * eps + tiny) < zero;
     }
@@ -120,11 +127,12 @@ uint32_t incode_query_lanes(const struct incode_query *q,
     uint32_t mask = 0;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
         struct lane_points points;
+        incode_vd depth;
         for (int d = 0; d < 3; d++)
             points.r[d] =
                 (incode_vd_load(axis[d] + i) - incode_vd_all(q->pv[d])) *
                 incode_vd_all(q->scale);
-        mask |= apex_lanes(q, &points) << i;
+        mask |= apex_lanes(q, &points, &depth) << i;
     }
     return mask;
 }
@@ -214,10 +222,18 @@ static bool is_done(const struct incode_query *q, const double p[3])
     return done;
 }
 
-/* The points of a leaf that an APEX query must consider, one bit each. */
+/* The points of a brick that a query must consider, one bit each. */
+struct chosen {
+    uint64_t in;
+    bool ranked; /* they have just been chosen by their depths */
+    alignas(64) double depth[INCODE_BRICK_POINTS];
+};
+
+/* Those of some points of a leaf that an APEX query must consider, one bit
+ * each. */
 static uint32_t apex_leaf(const struct incode_query *q,
                           const struct incode_frame *frame, unsigned first,
-                          uint32_t lanes)
+                          uint32_t lanes, struct chosen *chosen)
 {
     uint32_t in = 0;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
@@ -227,7 +243,8 @@ static uint32_t apex_leaf(const struct incode_query *q,
         if (q->round)
             here &= ball_lanes(q, &points);
         if (here != 0)
-            here &= apex_lanes(q, &points);
+            here &= apex_lanes(q, &points,
+                               (incode_vd *)(chosen->depth + first + i));
         if (here != 0 && q->ceiling.set)
             here &= ~above_lanes(q, &points);
         in |= here << i;
@@ -239,44 +256,82 @@ static uint32_t apex_leaf(const struct incode_query *q,
     return in;
 }
 
-static void visit_leaf(struct incode_walker *walker, struct incode_query *q,
-                       const struct incode_frame *frame, uint32_t brick,
-                       unsigned leaf)
+static void choose(struct incode_walker *walker, struct incode_query *q,
+                   const struct incode_frame *frame, uint32_t leaves,
+                   struct chosen *chosen)
 {
-    unsigned first = leaf * INCODE_LEAF_POINTS;
-    unsigned count = frame->count - first;
-    uint32_t lanes = count >= INCODE_LEAF_POINTS ? 0xff : (1U << count) - 1;
-    *walker->candidates += (unsigned)__builtin_popcount(lanes);
-    if (q->question == INCODE_QUERY_APEX) {
-        incode_query_look(q);
-        lanes = apex_leaf(q, frame, first, lanes);
+    chosen->in = 0;
+    chosen->ranked = q->question == INCODE_QUERY_APEX;
+    for (; leaves != 0; leaves &= leaves - 1) {
+        unsigned first = (unsigned)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
+        unsigned count = frame->count - first;
+        uint32_t lanes =
+            count >= INCODE_LEAF_POINTS ? LEAF_ALL : (1U << count) - 1;
+        *walker->candidates += (unsigned)__builtin_popcount(lanes);
+        if (q->question == INCODE_QUERY_APEX) {
+            incode_query_look(q);
+            lanes = apex_leaf(q, frame, first, lanes, chosen);
+        }
+        chosen->in |= (uint64_t)lanes << first;
     }
-    for (; lanes != 0; lanes &= lanes - 1) {
-        unsigned slot = first + (unsigned)__builtin_ctz(lanes);
-        uint32_t id = brick * INCODE_BRICK_POINTS + slot;
-        if (id == q->v || id == q->b || id == q->c || id == q->best)
-            continue;
-        double p[3];
-        point_of(p, frame, slot);
-        if (q->done && is_done(q, p))
-            continue;
-        if (q->question == INCODE_QUERY_APEX)
-            incode_query_consider(q, walker->tally, id, p);
-        else if (q->question == INCODE_QUERY_SUPPORT)
-            consider_height(q, p);
-        else if (q->question == INCODE_QUERY_NEAREST)
-            consider_near(q, id, p);
-        else
-            consider_circle(q, id, p);
+}
+
+/* The same after an APEX query has found another best. */
+static void choose_again(const struct incode_query *q,
+                         const struct incode_frame *frame,
+                         struct chosen *chosen)
+{
+    uint64_t in = chosen->in;
+    chosen->in = 0;
+    chosen->ranked = true;
+    for (unsigned i = 0; i < INCODE_BRICK_POINTS; i += INCODE_LEAF_POINTS) {
+        uint32_t lanes = (uint32_t)(in >> i) & LEAF_ALL;
+        if (lanes != 0)
+            chosen->in |= (uint64_t)apex_leaf(q, frame, i, lanes, chosen) << i;
     }
+}
+
+/* Takes one out; of those ranked, that which is first in the pencil.  On a
+ * curve, where each point would beat the one before, it beats all at once. */
+static unsigned take(struct chosen *chosen)
+{
+    unsigned first = (unsigned)__builtin_ctzll(chosen->in);
+    uint64_t others = chosen->ranked ? chosen->in & (chosen->in - 1) : 0;
+    for (; others != 0; others &= others - 1) {
+        unsigned slot = (unsigned)__builtin_ctzll(others);
+        first = chosen->depth[slot] > chosen->depth[first] ? slot : first;
+    }
+    chosen->in &= ~(UINT64_C(1) << first);
+    chosen->ranked = false;
+    return first;
 }
 
 bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
                          const struct incode_frame *frame, uint32_t brick,
                          uint32_t leaves, void *context)
 {
+    struct chosen chosen;
     (void)context;
-    for (; leaves != 0; leaves &= leaves - 1)
-        visit_leaf(walker, q, frame, brick, (unsigned)__builtin_ctz(leaves));
+    choose(walker, q, frame, leaves, &chosen);
+    while (chosen.in != 0) {
+        unsigned slot = take(&chosen);
+        uint32_t id = brick * INCODE_BRICK_POINTS + slot;
+        double p[3];
+        if (id == q->v || id == q->b || id == q->c || id == q->best)
+            continue;
+        point_of(p, frame, slot);
+        if (q->done && is_done(q, p))
+            continue;
+        if (q->question == INCODE_QUERY_APEX) {
+            incode_query_consider(q, walker->tally, id, p);
+            if (q->best == id)
+                choose_again(q, frame, &chosen);
+        } else if (q->question == INCODE_QUERY_SUPPORT)
+            consider_height(q, p);
+        else if (q->question == INCODE_QUERY_NEAREST)
+            consider_near(q, id, p);
+        else
+            consider_circle(q, id, p);
+    }
     return true;
 }

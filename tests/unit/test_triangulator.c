@@ -315,6 +315,31 @@ static void made_sets(void **unused)
     }
 }
 
+/* Two lines, and a curve of the third degree: a tetrahedron for each pair of
+ * their segments, and searches in which nearly every point beats the one
+ * before. */
+static void curves(void **unused)
+{
+    (void)unused;
+    enum { HALF = 30 };
+    static double xyz[2][2 * HALF][3];
+    for (int i = 0; i < 2 * HALF; i++) {
+        double t = (double)i / HALF, *line = xyz[0][i], *curve = xyz[1][i];
+        line[0] = i < HALF ? t : 0.5;
+        line[1] = i < HALF ? 0 : t - 1;
+        line[2] = i < HALF ? 0 : 1;
+        curve[0] = t;
+        curve[1] = t * t;
+        curve[2] = t * t * t;
+    }
+    for (int k = 0; k < 2; k++) {
+        struct host_points points = {.xyz = xyz[k][0], .count = 2 * HALF};
+        struct host_digest digest;
+        reference_digest(&points, &digest);
+        expect_all(&points, digest.text, k == 0 ? "lines" : "curve", false);
+    }
+}
+
 /* What a made set takes with all of its memory. */
 static struct solo taken_by(const char *kind, uint64_t n)
 {
@@ -546,6 +571,7 @@ int main(void)
         cmocka_unit_test(mixed_scales),
         cmocka_unit_test(denormal_neighbours),
         cmocka_unit_test(made_sets),
+        cmocka_unit_test(curves),
         cmocka_unit_test(rough_sides),
         cmocka_unit_test(rough_sphere),
         cmocka_unit_test(rough_at_both_ends),
