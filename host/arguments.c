@@ -40,7 +40,8 @@ static const struct argp_option options_of_run[] = {
     {"output", 'o', "FILE", 0,
      "Write the tetrahedra to FILE, by its extension: .ele (with .node, "
      ".neigh and .face beside it), .vtu, .vtk, .msh, .mesh, .npy; - is .ele "
-     "on standard output. May be given several times",
+     "on standard output. May be given several times; all files get their "
+     "names at the end of a run that succeeds, or none does",
      1},
     {"strategy", KEY_STRATEGY, "NAME", 0,
      "sequential (one node computes, others hold pages), spatial (a region a "

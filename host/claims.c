@@ -1,16 +1,19 @@
 #include "claims.h"
 
+#include <errno.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "output.h"
 #include "write.h"
 
 struct host_claim {
     const char *option, *path; /* as the user gave them */
     char *name;                /* of this file of theirs */
+    char *target;              /* where that leads */
     struct stat status;        /* of the file, or of its directory */
     bool known, there, input;
 };
@@ -37,8 +40,8 @@ static bool look(struct host_claim *c)
         return true;
     }
     c->there = false;
-    size_t length = (size_t)(last_name(c->name) - c->name);
-    char *directory = length > 0 ? strndup(c->name, length) : strdup(".");
+    size_t length = (size_t)(last_name(c->target) - c->target);
+    char *directory = length > 0 ? strndup(c->target, length) : strdup(".");
     bool found = directory != NULL && stat(directory, &c->status) == 0;
     free(directory);
     return found;
@@ -56,7 +59,7 @@ static bool is_same(const struct host_claim *a, const struct host_claim *b)
         return false;
     }
     return a->there ? S_ISREG(a->status.st_mode) || S_ISFIFO(a->status.st_mode)
-                    : strcmp(last_name(a->name), last_name(b->name)) == 0;
+                    : strcmp(last_name(a->target), last_name(b->target)) == 0;
 }
 
 static int refuse(const struct host_claim *c, const struct host_claim *other,
@@ -91,11 +94,15 @@ static int claim(struct host_claims *claims, struct host_claim new,
     }
     struct host_claim *c = &claims->claim[claims->count];
     *c = new;
+    claims->count++;
     c->name = strdup(name);
-    if (c->name == NULL) {
+    c->target = host_output_target(name);
+    if (c->target == NULL && errno != ENOMEM) {
+        c->target = strdup(name);
+    }
+    if (c->name == NULL || c->target == NULL) {
         return host_fail_memory(error, "the names of files");
     }
-    claims->count++;
     c->known = look(c); /* where it is not, opening it will tell why */
     for (struct host_claim *other = claims->claim; other < c; other++) {
         if (!c->input && is_same(c, other)) {
@@ -131,6 +138,7 @@ void host_claims_free(struct host_claims *claims)
 {
     for (unsigned i = 0; i < claims->count; i++) {
         free(claims->claim[i].name);
+        free(claims->claim[i].target);
     }
     free(claims->claim);
     *claims = (struct host_claims){0};

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "claims.h"
+#include "output.h"
 #include "points.h"
 #include "source.h"
 #include "tetrahedra.h"
@@ -108,7 +109,7 @@ static bool has_tetrahedra(const char *path)
     return any;
 }
 
-int host_convert(const char *in, const char *out, struct host_error *error)
+static int convert(const char *in, const char *out, struct host_error *error)
 {
     enum host_format to = host_format_of(out);
     bool either = to == HOST_VTU || to == HOST_VTK || to == HOST_NPY;
@@ -125,4 +126,10 @@ int host_convert(const char *in, const char *out, struct host_error *error)
         host_points_free(&points);
     }
     return error->code;
+}
+
+int host_convert(const char *in, const char *out, struct host_error *error)
+{
+    (void)convert(in, out, error);
+    return host_output_commit(error);
 }

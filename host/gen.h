@@ -4,7 +4,7 @@
  * Memory: the points.  Work: O(n).
  *
  *     host_gen("uniform", 20000, 1, &points, &error);
- *     host_points_write("u.npy", &points, &error);
+ *     host_points_write("u.npy", &points, &error); host_output_commit(&error);
  *     host_points_free(&points);
  */
 #ifndef HOST_GEN_H

@@ -563,7 +563,7 @@ int host_launch_mpi(char **argv, const struct host_run_options *options,
     if (!whole && l->host_pid != 0) {
         host_run_clean(options, l->host_pid, since_ns);
     }
-    if (caught != 0) {
+    if (caught != 0 && !(whole && l->report.status == 0)) {
         (void)sigaction(SIGINT, &before[0], NULL);
         (void)sigaction(SIGTERM, &before[1], NULL);
         (void)raise(caught);

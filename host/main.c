@@ -1,6 +1,5 @@
 /* The host program.  Nothing here but its commands and their arguments. */
 #include <argp.h>
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -136,10 +135,10 @@ static int command_gen(int argc, char **argv, struct host_error *error)
     }
     int status = host_gen(s.argument[0], n, s.seed, &points, error);
     if (status == 0) {
-        status = host_points_write(s.output, &points, error);
+        host_points_write(s.output, &points, error);
     }
     host_points_free(&points);
-    return status;
+    return host_output_commit(error);
 }
 
 static int command_verify(int argc, char **argv, struct host_error *error)
@@ -297,12 +296,9 @@ static int dispatch(int argc, char **argv, struct host_error *error)
 /* What was printed, help included, has to arrive. */
 static void finish_stdout(void)
 {
-    errno = 0;
-    if (fflush(stdout) != 0 || ferror(stdout) != 0) {
-        (void)fprintf(stderr, "incode: standard output: %s; %s\n",
-                      errno != 0 ? strerror(errno) : "writing failed",
-                      errno == EPIPE ? "let its reader read on"
-                                     : "make room and run again");
+    struct host_error error = {0};
+    if (host_output_printed(&error) != 0) {
+        (void)fprintf(stderr, "incode: %s\n", error.text);
         _exit(HOST_INPUT);
     }
 }

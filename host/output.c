@@ -2,20 +2,33 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdio_ext.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { BUFFER_BYTES = 1 << 20, PARTS_MAX = 8 };
+enum { BUFFER_BYTES = 1 << 20, LINKS_MAX = 40 };
 
-/* The names of parts that a signal has to remove; NULL: none. */
-static char *volatile parts[PARTS_MAX];
+/* A file beside the one that it will be.  What is there already has a second
+ * name while names change. */
+struct host_part {
+    struct host_part *next;
+    char *path;   /* as the user gave it */
+    char *target; /* what it is in the end, links followed */
+    char *name, *kept;
+    bool named;      /* it has its name */
+    bool was, keeps; /* something was there; that has its second name */
+};
+
+/* Those whose outputs are not done: what a signal has to remove. */
+static struct host_part *volatile parts;
 
 static const int endings[] = {SIGINT, SIGTERM, SIGHUP};
 enum { ENDINGS = sizeof endings / sizeof endings[0] };
@@ -23,10 +36,8 @@ enum { ENDINGS = sizeof endings / sizeof endings[0] };
 /* With its default action back, the signal ends the program on return. */
 static void on_ending(int number)
 {
-    for (int i = 0; i < PARTS_MAX; i++) {
-        if (parts[i] != NULL) {
-            (void)unlink(parts[i]);
-        }
+    for (struct host_part *part = parts; part != NULL; part = part->next) {
+        (void)unlink(part->name);
     }
     (void)raise(number);
 }
@@ -46,8 +57,8 @@ void host_output_guard(void)
     (void)signal(SIGXFSZ, SIG_IGN);
 }
 
-/* Holds signals off while names and files change together.  No other thread
- * lives while outputs are open. */
+/* Holds signals off while the list and the files change together.  No other
+ * thread lives while outputs are open. */
 static void hold(sigset_t *before)
 {
     sigset_t set;
@@ -63,13 +74,14 @@ static void release(const sigset_t *before)
     (void)pthread_sigmask(SIG_SETMASK, before, NULL);
 }
 
-/* Replaces `old` in the list by `new`. */
-static void note(const char *old, char *new)
+/* What has its names is whole, whatever comes after. */
+static void end_guard(void)
 {
-    for (int i = 0; i < PARTS_MAX; i++) {
-        if (parts[i] == old) {
-            parts[i] = new;
-            return;
+    struct sigaction action;
+    for (int i = 0; i < ENDINGS; i++) {
+        if (sigaction(endings[i], NULL, &action) == 0 &&
+            action.sa_handler == on_ending) {
+            (void)signal(endings[i], SIG_IGN);
         }
     }
 }
@@ -81,35 +93,166 @@ static int cannot_make(const char *path, int reason, struct host_error *error)
                      strerror(reason));
 }
 
-/* The name under which `writer` writes what will be `target`. */
-static void part_name(char *name, size_t size, const char *target, pid_t writer)
+/* Beside `target`, of process `writer` and nobody else. */
+static char *name_beside(const char *target, const char *what, pid_t writer)
 {
-    (void)snprintf(name, size, "%s.part-%ld", target, (long)writer);
+    char *name = NULL;
+    return asprintf(&name, "%s.%s-%ld", target, what, (long)writer) < 0 ? NULL
+                                                                        : name;
+}
+
+/* Where the link `path` leads, from where it is. */
+static char *next_of(const char *path)
+{
+    char to[PATH_MAX], *next = NULL;
+    ssize_t n = readlink(path, to, sizeof to - 1);
+    if (n < 0) {
+        return NULL;
+    }
+    to[n] = '\0';
+    const char *slash = strrchr(path, '/');
+    int from = slash == NULL || to[0] == '/' ? 0 : (int)(slash + 1 - path);
+    return asprintf(&next, "%.*s%s", from, path, to) < 0 ? NULL : next;
+}
+
+char *host_output_target(const char *path)
+{
+    char *at = strdup(path);
+    for (int links = 0; at != NULL && links < LINKS_MAX; links++) {
+        char *end = realpath(at, NULL);
+        char *next = end == NULL && errno == ENOENT ? next_of(at) : NULL;
+        if (end == NULL && next == NULL &&
+            (errno == ENOENT || errno == EINVAL)) {
+            return at; /* it is not there yet */
+        }
+        free(at);
+        if (next == NULL) {
+            return end;
+        }
+        at = next;
+    }
+    free(at);
+    errno = ELOOP;
+    return NULL;
 }
 
 void host_output_clean(const char *path, pid_t writer, uint64_t since_ns)
 {
-    char name[4096 + 32];
     struct stat status;
-    char *target = realpath(path, NULL);
-    part_name(name, sizeof name, target == NULL ? path : target, writer);
-    (void)unlink(name);
+    char *target = host_output_target(path);
+    char *name = target == NULL ? NULL : name_beside(target, "part", writer);
+    char *kept = target == NULL ? NULL : name_beside(target, "kept", writer);
+    if (name != NULL && kept != NULL) {
+        (void)unlink(name);
+        bool back = rename(kept, target) == 0;
+        (void)unlink(kept); /* where both are names of one file */
+        /* A change of name counts as one of the file. */
+        if (!back && stat(target, &status) == 0 && S_ISREG(status.st_mode) &&
+            (uint64_t)status.st_ctim.tv_sec * 1000000000 +
+                    (uint64_t)status.st_ctim.tv_nsec >=
+                since_ns) {
+            (void)unlink(target);
+        }
+    }
+    free(name);
+    free(kept);
     free(target);
-    /* A change of name counts as one of the file. */
-    if (stat(path, &status) == 0 && S_ISREG(status.st_mode) &&
-        (uint64_t)status.st_ctim.tv_sec * 1000000000 +
-                (uint64_t)status.st_ctim.tv_nsec >=
-            since_ns) {
-        (void)unlink(path);
+}
+
+/* --- parts ---------------------------------------------------------------- */
+
+static void free_part(struct host_part *part)
+{
+    if (part != NULL) {
+        free(part->path);
+        free(part->target);
+        free(part->name);
+        free(part->kept);
+        free(part);
     }
 }
+
+/* Takes `target` over. */
+static struct host_part *make_part(const char *path, char *target)
+{
+    struct host_part *part = calloc(1, sizeof *part);
+    if (part == NULL) {
+        free(target);
+        return NULL;
+    }
+    part->path = strdup(path);
+    part->target = target;
+    part->name = name_beside(target, "part", getpid());
+    part->kept = name_beside(target, "kept", getpid());
+    if (part->path == NULL || part->name == NULL || part->kept == NULL) {
+        free_part(part);
+        return NULL;
+    }
+    return part;
+}
+
+static bool is_ours(const char *name)
+{
+    const struct host_part *part = parts;
+    while (part != NULL && strcmp(part->name, name) != 0) {
+        part = part->next;
+    }
+    return part != NULL;
+}
+
+/* Makes the part's file and notes it.  One that is there is of an earlier
+ * process of this number, which was killed. */
+static int open_part(struct host_part *part)
+{
+    sigset_t signals;
+    const int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
+    hold(&signals);
+    int file = open(part->name, flags, 0666);
+    if (file < 0 && errno == EEXIST && !is_ours(part->name) &&
+        unlink(part->name) == 0) {
+        file = open(part->name, flags, 0666);
+    }
+    int reason = errno;
+    if (file >= 0 && parts == NULL) {
+        parts = part;
+    } else if (file >= 0) {
+        struct host_part *before = parts;
+        while (before->next != NULL) {
+            before = before->next;
+        }
+        before->next = part;
+    }
+    release(&signals);
+    errno = reason;
+    return file;
+}
+
+static void drop_part(struct host_part *part)
+{
+    sigset_t signals;
+    hold(&signals);
+    (void)unlink(part->name);
+    if (parts == part) {
+        parts = part->next;
+    } else {
+        struct host_part *before = parts;
+        while (before->next != part) {
+            before = before->next;
+        }
+        before->next = part->next;
+    }
+    free_part(part);
+    release(&signals);
+}
+
+/* --- opening -------------------------------------------------------------- */
 
 /* Opens a device or a pipe, for which nobody waits that does not come. */
 static int open_in_place(struct host_output *out, bool pipe,
                          struct host_error *error)
 {
     int wait = pipe ? O_NONBLOCK : 0;
-    out->file = open(out->target, O_WRONLY | O_CLOEXEC | wait);
+    out->file = open(out->path, O_WRONLY | O_CLOEXEC | wait);
     if (out->file < 0 && pipe && errno == ENXIO) {
         return host_fail(error, HOST_INPUT,
                          "%s: nobody reads from this pipe; start its reader "
@@ -122,47 +265,35 @@ static int open_in_place(struct host_output *out, bool pipe,
     return 0;
 }
 
-/* Opens a new file beside the target, or the target itself. */
+/* Opens a new file beside the target, or what is there in its place. */
 static int open_file(struct host_output *out, struct host_error *error)
 {
     struct stat status;
-    sigset_t signals;
-    out->target = realpath(out->path, NULL);
-    if (out->target == NULL) {
-        out->target = strdup(out->path); /* it is not there yet */
-    }
-    if (out->target == NULL) {
-        return host_fail_memory(error, "an output");
-    }
-    bool there = stat(out->target, &status) == 0;
+    bool there = stat(out->path, &status) == 0;
     if (there && S_ISDIR(status.st_mode)) {
         return cannot_make(out->path, EISDIR, error);
     }
     if (there && !S_ISREG(status.st_mode)) {
         return open_in_place(out, S_ISFIFO(status.st_mode), error);
     }
-    if (there && access(out->target, W_OK) != 0) {
+    if (there && access(out->path, W_OK) != 0) {
         return cannot_make(out->path, errno, error);
     }
-    size_t size = strlen(out->target) + 32;
-    out->temporary = malloc(size);
-    if (out->temporary == NULL) {
+    char *target = host_output_target(out->path);
+    if (target == NULL) {
+        return cannot_make(out->path, errno, error);
+    }
+    struct host_part *part = make_part(out->path, target);
+    if (part == NULL) {
         return host_fail_memory(error, "an output");
     }
-    part_name(out->temporary, size, out->target, getpid());
-    hold(&signals);
-    out->file =
-        open(out->temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    int reason = errno;
-    if (out->file >= 0) {
-        note(NULL, out->temporary);
-    }
-    release(&signals);
+    out->file = open_part(part);
     if (out->file < 0) {
-        free(out->temporary);
-        out->temporary = NULL; /* not ours to remove */
+        int reason = errno;
+        free_part(part); /* its file is not ours to remove */
         return cannot_make(out->path, reason, error);
     }
+    out->part = part;
     return 0;
 }
 
@@ -197,6 +328,8 @@ int host_output_probe(const char *path, struct host_error *error)
     }
     return error->code;
 }
+
+/* --- writing -------------------------------------------------------------- */
 
 static void flush(struct host_output *out)
 {
@@ -257,10 +390,16 @@ void host_output_double(struct host_output *out, double value)
     host_output_bytes(out, text, (size_t)n);
 }
 
+/* --- the end -------------------------------------------------------------- */
+
+/* What the disk cannot take, it may say as late as this. */
 static void finish(struct host_output *out, struct host_error *error)
 {
     if (out->file >= 0) {
         flush(out);
+        if (out->part != NULL && out->failure == 0 && fsync(out->file) != 0) {
+            out->failure = errno;
+        }
         if (out->file != STDOUT_FILENO && close(out->file) != 0 &&
             out->failure == 0) {
             out->failure = errno;
@@ -282,31 +421,101 @@ static void finish(struct host_output *out, struct host_error *error)
 int host_output_close(struct host_output *out, size_t n,
                       struct host_error *error)
 {
-    sigset_t signals;
     for (size_t i = 0; i < n; i++) {
         finish(&out[i], error);
-    }
-    hold(&signals); /* all of them get their names, or none */
-    for (size_t i = 0; i < n; i++) {
-        if (out[i].temporary != NULL && error->code == 0 &&
-            rename(out[i].temporary, out[i].target) != 0) {
-            cannot_make(out[i].path, errno, error);
-        } else if (out[i].temporary != NULL && error->code == 0) {
-            note(out[i].temporary, NULL);
-            free(out[i].temporary);
-            out[i].temporary = NULL;
-        }
-    }
-    for (size_t i = 0; i < n; i++) {
-        if (out[i].temporary != NULL) {
-            (void)unlink(out[i].temporary);
-            note(out[i].temporary, NULL);
-        }
-        free(out[i].temporary);
-        free(out[i].target);
         free(out[i].buffer);
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (out[i].part != NULL && error->code != 0) {
+            drop_part(out[i].part);
+        }
         out[i] = (struct host_output){.file = -1};
+    }
+    return error->code;
+}
+
+/* Gives the part its name, and what is there a second one, so that it can have
+ * its own back. */
+static bool name_part(struct host_part *part)
+{
+    part->keeps = link(part->target, part->kept) == 0 ||
+                  (errno == EEXIST && unlink(part->kept) == 0 &&
+                   link(part->target, part->kept) == 0);
+    part->was = part->keeps || errno != ENOENT;
+    part->named = rename(part->name, part->target) == 0;
+    return part->named;
+}
+
+/* The path of an output whose former file could not be kept; NULL: none. */
+static const char *take_names_back(void)
+{
+    const char *lost = NULL;
+    for (struct host_part *part = parts; part != NULL; part = part->next) {
+        if (part->named &&
+            !(part->keeps && rename(part->kept, part->target) == 0)) {
+            (void)unlink(part->target);
+            lost = part->was && lost == NULL ? part->path : lost;
+        } else if (part->keeps && !part->named) {
+            (void)unlink(part->kept);
+        }
+    }
+    return lost;
+}
+
+/* All of them get their names, or none. */
+static int name_all(struct host_error *error)
+{
+    struct host_part *part = parts;
+    while (part != NULL && name_part(part)) {
+        part = part->next;
+    }
+    if (part != NULL) {
+        int reason = errno;
+        const char *lost = take_names_back();
+        return host_fail(error, HOST_INPUT,
+                         "%s: cannot be written (%s)%s%s%s; choose another "
+                         "place",
+                         part->path, strerror(reason),
+                         lost == NULL ? "" : ", and what was in ",
+                         lost == NULL ? "" : lost,
+                         lost == NULL ? "" : " before is lost");
+    }
+    while (parts != NULL) {
+        part = parts;
+        parts = part->next;
+        if (part->keeps) {
+            (void)unlink(part->kept);
+        }
+        free_part(part);
+    }
+    return 0;
+}
+
+int host_output_commit(struct host_error *error)
+{
+    sigset_t signals;
+    hold(&signals);
+    if (error->code == 0 && name_all(error) == 0) {
+        end_guard();
+    }
+    while (parts != NULL) {
+        drop_part(parts);
     }
     release(&signals);
     return error->code;
+}
+
+int host_output_printed(struct host_error *error)
+{
+    errno = 0;
+    if (fflush(stdout) == 0 && ferror(stdout) == 0) {
+        return error->code;
+    }
+    int reason = errno;
+    __fpurge(stdout); /* nor is it tried again */
+    clearerr(stdout);
+    return host_fail(error, HOST_INPUT, "standard output: %s; %s",
+                     reason != 0 ? strerror(reason) : "writing failed",
+                     reason == EPIPE ? "let its reader read on"
+                                     : "make room and run again");
 }

@@ -38,7 +38,8 @@ int host_points_append(struct host_points *points, const double *xyz,
                        uint64_t rows, struct host_error *error);
 
 /* Writes by extension (.xyz .txt .csv .node .ply .off .npy .vtk .vtu .vtp; "-"
- * is .xyz on standard output), so that reading gives the same doubles. */
+ * is .xyz on standard output), so that reading gives the same doubles.  The
+ * file has its name when host_output_commit gives it. */
 int host_points_write(const char *path, const struct host_points *points,
                       struct host_error *error);
 

@@ -323,21 +323,14 @@ static bool stdout_is_data(const struct host_run_options *options)
     return data;
 }
 
-/* Outputs that were whole before a later one failed: a failed run leaves
- * none. */
-static void remove_outputs(const struct host_run_options *options,
-                           unsigned count)
+/* The summary, which has to arrive where it goes to standard output. */
+static int report(const struct host_run_options *options,
+                  const struct host_run_result *result,
+                  const struct host_run_result *alone, struct host_error *error)
 {
-    char name[HOST_PATH_MAX];
-    const char *file;
-    for (unsigned i = 0; i < count; i++) {
-        for (unsigned k = 0;
-             (file = host_write_file(options->output[i], k, name,
-                                     sizeof name)) != NULL;
-             k++) {
-            (void)unlink(file);
-        }
-    }
+    FILE *file = stdout_is_data(options) ? stderr : stdout;
+    host_report_run(file, options, result, alone);
+    return file == stdout ? host_output_printed(error) : 0;
 }
 
 void host_run_clean(const struct host_run_options *options, pid_t writer,
@@ -426,7 +419,6 @@ static int finish(const struct host_run_options *options,
     start = host_now_us();
     for (unsigned i = 0; i < options->outputs; i++) {
         if (host_write(options->output[i], points, tets, error) != 0) {
-            remove_outputs(options, i);
             return error->code;
         }
     }
@@ -488,11 +480,9 @@ int host_run(const struct host_run_options *options,
     result->time_total_s = seconds_since(start);
     if (status == 0 && options->stats != NULL) {
         status = host_stats_write(options->stats, result, error);
-        remove_outputs(options, status != 0 ? options->outputs : 0);
     }
     if (status == 0 && !options->quiet) {
-        host_report_run(stdout_is_data(options) ? stderr : stdout, options,
-                        result, options->table ? &alone : NULL);
+        report(options, result, options->table ? &alone : NULL, error);
     }
-    return status;
+    return host_output_commit(error);
 }

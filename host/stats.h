@@ -3,13 +3,15 @@
  * Memory: about 1 KiB a node while it is written.  Work: O(nodes).
  *
  *     host_stats_write("run.json", &result, &error);
+ *     host_output_commit(&error);
  */
 #ifndef HOST_STATS_H
 #define HOST_STATS_H
 
 #include "run.h"
 
-/* "-" is standard output.  0, or HOST_INPUT where the file cannot be made. */
+/* "-" is standard output.  The file has its name when host_output_commit gives
+ * it.  0, or HOST_INPUT where the file cannot be made. */
 int host_stats_write(const char *path, const struct host_run_result *result,
                      struct host_error *error);
 

@@ -1,12 +1,14 @@
 /* Tetrahedra out to files: .ele (with .node, .neigh and .face beside it), .vtu,
  * .vtk, .msh (Gmsh 2.2), .mesh (Medit), .npy (m,4); "-" is .ele on standard
- * output.  A file appears under its name only when it is whole.
+ * output.  A file has its name when host_output_commit gives it.
  *
- * Memory: 1 MiB of buffer; for .neigh and .face also 8 bytes a tetrahedron and
- * 8 a point.  Work: one pass, about 100 ns a tetrahedron as text.
+ * Memory: 1 MiB of buffer a file; for .neigh and .face also 8 bytes a
+ * tetrahedron and 8 a point.  Work: one pass, about 100 ns a tetrahedron as
+ * text.
  *
  *     host_tetrahedra_map(&tets, order.row); host_tetrahedra_sort(&tets);
  *     if (host_write("out.vtu", &points, &tets, &error) != 0) ...
+ *     return host_output_commit(&error);
  */
 #ifndef HOST_WRITE_H
 #define HOST_WRITE_H

@@ -2,7 +2,6 @@
  * ranks.  The program incode becomes this one where mpirun has started it, and
  * starts mpirun where nobody has (host/launch.h). */
 #include <argp.h>
-#include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -76,11 +75,6 @@ int main(int argc, char **argv)
                                  "this machine: %s; build without flags that "
                                  "loosen floating point",
                                  fault);
-    if (status == 0 && fflush(stdout) != 0) {
-        status = host_fail(&error, HOST_INPUT,
-                           "standard output: %s; make room and run again",
-                           strerror(errno));
-    }
     /* The launcher knows how a rank was lost. */
     bool heard = host_launch_report(status, ranks.lost, ranks.terminated);
     if (status != 0 && !(heard && (ranks.lost != 0 || ranks.terminated))) {

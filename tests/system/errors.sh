@@ -104,6 +104,10 @@ twice 'statistics and output' '--stats .*already' -o "$left/o.npy" \
     --stats "$left/o.npy"
 twice 'statistics and a file beside' 'already written beside -o .*o.ele; ' \
     -o "$left/o.ele" --stats "$left/o.face"
+ln -s new.npy "$over/first.npy"
+ln -s new.npy "$over/second.npy"
+twice 'links to what is not there yet' 'second.npy: .*already written for -o ' \
+    -o "$over/first.npy" -o "$over/second.npy"
 twice 'standard output' 'standard output is already' -o - --stats -
 check 'errors/two outputs to nowhere' 'refused' run "$good" -q -o - \
     --stats /dev/null > /dev/null
@@ -119,6 +123,24 @@ refuses 'errors/statistics cannot be written' 3 'absent' run "$good" -q \
     --nodes 2 -o "$left/o.vtu" --stats "$left/absent/s.json"
 refuses 'errors/statistics fill the disk' 3 '/dev/full: .*space' run "$good" \
     -q --nodes 2 -o "$left/o.vtu" --stats /dev/full
+# What was there before a run that fails late is there after it, and no more.
+late=$in/late
+mkdir "$late" "$late/real"
+ln -s real/o.vtu "$late/o.vtu"
+mkfifo "$late/o.npy"
+cp "$good" "$late/o.msh"
+exec 7<> "$late/o.npy"
+refuses 'errors/a run that fails late' 3 '/dev/full: .*space' run "$good" -q \
+    --nodes 2 -o "$late/o.vtu" -o "$late/o.npy" -o "$late/o.msh" \
+    -o "$late/o.mesh" --stats /dev/full
+exec 7>&-
+check 'errors/what was there before a run that fails late' \
+    "$(ls "$late" "$late/real")" test -L "$late/o.vtu" -a -p "$late/o.npy" -a \
+    "$(cksum < "$late/o.msh")" = "$(cksum < "$good")" -a \
+    "$(cd "$late" && find . | wc -l)" = 5
+refuses 'errors/the report fills the disk' 3 '^incode: standard output: .*space' \
+    bash -c '"$@" > /dev/full' - "$INCODE" run "$good" --nodes 2 \
+    -o "$left/o.ele" -o "$left/o.npy" --stats "$left/s.json"
 for arguments in --help --version 'run --help' 'gen uniform 9000'; do
     # shellcheck disable=SC2086
     refuses "errors/$arguments into a full disk" 3 ': .*space' \
@@ -136,10 +158,13 @@ done
 mkfifo "$in/pipe.npy"
 refuses 'errors/a pipe without a reader' 3 'pipe.npy: .*no.* reads' timeout 20 \
     "$INCODE" run "$good" -q -o "$left/o.vtu" -o "$in/pipe.npy"
-cat "$in/pipe.npy" > "$scratch/piped.npy" &
-timeout 20 "$INCODE" run "$good" -q -o "$in/pipe.npy" -o "$scratch/plain.npy"
-check 'errors/a pipe with a reader' "exit $?" \
-    eval 'wait $! && cmp "$scratch/piped.npy" "$scratch/plain.npy"'
+exec 7<> "$in/pipe.npy" 8< "$in/pipe.npy" # both ends, before anybody looks
+timeout 20 cat <&8 7>&- > "$scratch/piped.npy" &
+timeout 20 "$INCODE" run "$good" -q -o "$in/pipe.npy" -o "$scratch/plain.npy" 7>&-
+status=$?
+exec 7>&- 8<&-
+check 'errors/a pipe with a reader' "exit $status" \
+    eval 'wait $! && [ $status = 0 ] && cmp "$scratch/piped.npy" "$scratch/plain.npy"'
 # Root may write anywhere: nobody tries.
 name='errors/output in a directory without permission'
 nobody=
@@ -182,16 +207,17 @@ for outputs in '-o o.vtu' '-o o.ele' '--stats o.json'; do
         "$(realpath "$INCODE")" "$good" "$outputs"
 done
 
-# Ended while it writes into a pipe, which nobody empties, beside three parts.
+# Ended while it writes into a pipe, which nobody empties, beside three parts
+# and an output that is done.
 interrupted() { # SIGNAL
     local pipe=$left/o.neigh parts status
     rm -rf "$left"
     mkdir "$left"
     mkfifo "$pipe"
     exec 7<> "$pipe"
-    "$INCODE" run "$in/many.xyz" -q -o "$left/o.ele" &
+    "$INCODE" run "$in/many.xyz" -q -o "$left/o.npy" -o "$left/o.ele" &
     for _ in $(seq 300); do
-        [ "$(find "$left" -name '*.part-*' | wc -l)" = 3 ] && break
+        [ "$(find "$left" -name '*.part-*' | wc -l)" = 4 ] && break
         sleep 0.05
     done
     # shellcheck disable=SC2012
@@ -202,7 +228,7 @@ interrupted() { # SIGNAL
     exec 7>&-
     check "errors/$1 while it writes" \
         "$parts files, then status $status and $(ls "$left" | tr '\n' ' ')" \
-        test "$parts $status $(ls "$left")" = "4 $(($(kill -l "$1") + 128)) o.neigh"
+        test "$parts $status $(ls "$left")" = "5 $(($(kill -l "$1") + 128)) o.neigh"
 }
 interrupted TERM
 interrupted HUP

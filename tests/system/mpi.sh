@@ -113,6 +113,9 @@ left=$scratch/left
 refuses 'mpi/points in a plane' 3 'plane' bash -c "printf '%s\n' '0 0 1' \
     '1 0 1' '0 1 1' '3 5 1' | '$INCODE' run - -q --link mpi --nodes 2 \
     -o '$left/o.npy'"
+refuses 'mpi/the report fills the disk' 3 '^incode: standard output: .*space' \
+    bash -c '"$@" > /dev/full' - "$INCODE" run "$points" --link mpi --nodes 2 \
+    -o "$left/o.ele"
 refuses 'mpi/no mpirun' 4 'openmpi-bin' env PATH=/nowhere "$INCODE" run \
     "$points" --link mpi --nodes 2 -o "$left/o.npy"
 mkdir "$scratch/bin"

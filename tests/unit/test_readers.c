@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include "../../host/gen.h"
+#include "../../host/output.h"
 #include "../../host/source.h"
 #include "bytes.h"
 #include "reference.h"
@@ -474,6 +475,7 @@ static void written_and_read_back(void **unused)
                        (long)getpid(), extensions[i]);
         points.base = i % 2;
         assert_int_equal(host_points_write(path, &points, &error), 0);
+        assert_int_equal(host_output_commit(&error), 0);
         assert_int_equal(host_points_read(path, &again, &error), 0);
         assert_int_equal(again.count, points.count);
         assert_memory_equal(again.xyz, points.xyz, 24 * points.count);

@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 
 #include "../../host/memory.h"
+#include "../../host/output.h"
 #include "../../host/stats.h"
 
 static const char *const names[] = {"points",
@@ -90,6 +91,7 @@ static void test_names(void **unused)
     close(fd);
     fill(&result);
     assert_int_equal(host_stats_write(path, &result, &error), 0);
+    assert_int_equal(host_output_commit(&error), 0);
     json_t *o = json_load_file(path, 0, NULL);
     unlink(path);
     assert_non_null(o);

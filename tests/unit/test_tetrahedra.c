@@ -17,6 +17,7 @@
 
 #include "../../host/convert.h"
 #include "../../host/gen.h"
+#include "../../host/output.h"
 #include "../../host/write.h"
 #include "reference.h"
 
@@ -230,6 +231,14 @@ static void triangulate(struct host_points *points,
     host_tetrahedra_sort(tets);
 }
 
+static void write_whole(const char *path, const struct host_points *points,
+                        const struct host_tetrahedra *tets)
+{
+    struct host_error error = {0};
+    assert_int_equal(host_write(path, points, tets, &error), 0);
+    assert_int_equal(host_output_commit(&error), 0);
+}
+
 static void written_and_read_back(void **unused)
 {
     (void)unused;
@@ -246,7 +255,7 @@ static void written_and_read_back(void **unused)
             points.base = base;
             in_folder(&folder, names[i], path);
             assert_int_equal(host_write_probe(path, &error), 0);
-            assert_int_equal(host_write(path, &points, &tets, &error), 0);
+            write_whole(path, &points, &tets);
             if (host_tetrahedra_read(path, &again, &read, &error) != 0) {
                 fail_msg("%s", error.text);
             }
@@ -277,13 +286,10 @@ static void neighbours_are_right(void **unused)
     (void)unused;
     struct host_points points;
     struct host_tetrahedra tets;
-    struct host_error error = {0};
     struct folder folder = make_folder();
     char path[128];
     triangulate(&points, &tets);
-    assert_int_equal(
-        host_write(in_folder(&folder, "a.ele", path), &points, &tets, &error),
-        0);
+    write_whole(in_folder(&folder, "a.ele", path), &points, &tets);
     FILE *neigh = fopen(in_folder(&folder, "a.neigh", path), "r");
     FILE *face = fopen(in_folder(&folder, "a.face", path), "r");
     assert_non_null(neigh);
@@ -376,10 +382,10 @@ static void links_are_followed(void **unused)
     triangulate(&points, &tets);
     in_folder(&folder, "target.npy", target);
     in_folder(&folder, "link.npy", link);
-    assert_int_equal(host_write(target, &points, &tets, &error), 0);
+    write_whole(target, &points, &tets);
     host_tetrahedra_cut(&tets, 10);
     assert_int_equal(symlink(target, link), 0);
-    assert_int_equal(host_write(link, &points, &tets, &error), 0);
+    write_whole(link, &points, &tets);
     struct stat status;
     assert_int_equal(lstat(link, &status), 0);
     assert_true(S_ISLNK(status.st_mode));
@@ -501,7 +507,7 @@ static void conversion(void **unused)
     char a[128], b[128];
     triangulate(&points, &tets);
     in_folder(&folder, "a.ele", a);
-    assert_int_equal(host_write(a, &points, &tets, &error), 0);
+    write_whole(a, &points, &tets);
     static const char *const chain[] = {"b.vtu", "b.msh", "b.vtk", "b.mesh",
                                         "b.npy"};
     for (size_t i = 0; i < sizeof chain / sizeof *chain; i++) {
@@ -520,6 +526,7 @@ static void conversion(void **unused)
     in_folder(&folder, "p.xyz", a);
     in_folder(&folder, "p.npy", b);
     assert_int_equal(host_points_write(a, &points, &error), 0);
+    assert_int_equal(host_output_commit(&error), 0);
     assert_int_equal(host_convert(a, b, &error), 0);
     struct host_points read;
     assert_int_equal(host_points_read(b, &read, &error), 0);
