@@ -7,6 +7,7 @@
 
 #include "../incode/predicates.h"
 #include "arguments.h"
+#include "begin.h"
 #include "bench_links.h"
 #include "convert.h"
 #include "gen.h"
@@ -329,7 +330,7 @@ int main(int argc, char **argv)
     struct host_error error = {0};
     int command = 0;
     argp_err_exit_status = HOST_USAGE;
-    host_output_guard();
+    host_begin();
     (void)atexit(finish_stdout);
     (void)argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &command);
     const char *fault = incode_arithmetic_fault();

@@ -12,8 +12,8 @@
 #include "../../incode/predicates.h"
 #include "../../transport/drivers/mpi_environment.h"
 #include "../arguments.h"
+#include "../begin.h"
 #include "../launch.h"
-#include "../output.h"
 #include "../run.h"
 #include "bench.h"
 #include "ranks.h"
@@ -60,7 +60,7 @@ int main(int argc, char **argv)
     struct host_error error = {0};
     static char name[] = "incode run";
     argp_err_exit_status = HOST_USAGE;
-    host_output_guard();
+    host_begin();
     prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
     mpi_environment();
     MPI_Init(&argc, &argv);

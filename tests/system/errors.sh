@@ -165,6 +165,19 @@ status=$?
 exec 7>&- 8<&-
 check 'errors/a pipe with a reader' "exit $status" \
     eval 'wait $! && [ $status = 0 ] && cmp "$scratch/piped.npy" "$scratch/plain.npy"'
+# Whatever started it.
+check 'errors/a closed standard input' "exit $?" timeout 8 \
+    "$INCODE" run "$good" -q --nodes 2 --link serial <&-
+check 'errors/nothing is open' "exit $?" timeout 8 "$INCODE" run "$good" -q \
+    --nodes 2 -o "$scratch/closed.npy" <&- >&- 2>&-
+refuses 'errors/a closed standard output' 3 'standard output: Bad file' \
+    bash -c '"$@" >&-' - "$INCODE" run "$good" --nodes 2 -o "$left/o.vtu"
+refuses 'errors/tetrahedra to a closed standard output' 3 '-: .*Bad file' \
+    bash -c '"$@" >&-' - "$INCODE" run "$good" -q --nodes 2 -o -
+refuses 'errors/ends of children are ignored' 4 'ended 3 times, .*status 1;' timeout 20 \
+    env --ignore-signal=CHLD "$INCODE" run "$good" -q --nodes 2 \
+    --node-program /bin/false -o "$left/o.vtu"
+
 # Root may write anywhere: nobody tries.
 name='errors/output in a directory without permission'
 nobody=

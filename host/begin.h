@@ -1,0 +1,18 @@
+/* What a program of the host needs of its process, whatever started it:
+ * descriptors 0 to 2 that are open, so that no file or wire takes their place;
+ * the ends of children, also where the parent ignores its own; and signals as
+ * outputs want them (output.h).
+ *
+ * Memory: none.  Work: a few system calls.
+ *
+ *     int main(int argc, char **argv)
+ *     {
+ *         host_begin();
+ */
+#ifndef HOST_BEGIN_H
+#define HOST_BEGIN_H
+
+/* First of all. */
+void host_begin(void);
+
+#endif
