@@ -27,15 +27,21 @@ static int check_claims(const char *in, const char *out,
 static int points_beside(const char *in, const char *out,
                          struct host_points *points, struct host_error *error)
 {
-    size_t n = strlen(in);
-    char *name = malloc(n + 8);
+    size_t n = strlen(in) - (host_is_packed(in) ? strlen(".gz") : 0);
+    char *name = malloc(n + sizeof ".node.gz");
     if (name == NULL) {
         return host_fail_memory(error, "a name");
     }
-    strcpy(name, in);
-    char *dot = strrchr(name, '.');
-    strcpy(dot == NULL ? name + n : dot, ".node");
+    memcpy(name, in, n);
+    name[n] = '\0';
+    char *end = strrchr(name, '.'); /* the format was known by it */
+    end = end == NULL ? name + n : end;
+    strcpy(end, ".node");
     if (access(name, R_OK) != 0) {
+        strcpy(end, ".node.gz");
+    }
+    if (access(name, R_OK) != 0) {
+        strcpy(end, ".node");
         host_fail(error, HOST_INPUT,
                   "%s: it holds no points and there is no %s; put the points "
                   "there",

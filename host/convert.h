@@ -12,7 +12,7 @@
 #include "error.h"
 
 /* A tetrahedra file that holds no points (.ele, .npy) takes them from the
- * .node beside it where the target needs them. */
+ * .node beside it, packed or not, where the target needs them. */
 int host_convert(const char *in, const char *out, struct host_error *error);
 
 #endif

@@ -28,14 +28,14 @@ static bool ends_in(const char *path, size_t length, const char *extension)
     return length > n && strncasecmp(path + length - n, extension, n) == 0;
 }
 
-static bool is_packed(const char *path)
+bool host_is_packed(const char *path)
 {
     return ends_in(path, strlen(path), ".gz");
 }
 
 static size_t plain_length(const char *path)
 {
-    return strlen(path) - (is_packed(path) ? 3 : 0);
+    return strlen(path) - (host_is_packed(path) ? 3 : 0);
 }
 
 enum host_format host_format_of(const char *path)
@@ -176,7 +176,7 @@ static int unpack(struct host_source *source, struct host_error *error)
 
 static int finish(struct host_source *source, struct host_error *error)
 {
-    if (error->code == 0 && source->bytes > 0 && is_packed(source->path)) {
+    if (error->code == 0 && source->bytes > 0 && host_is_packed(source->path)) {
         unpack(source, error);
     }
     if (error->code == 0 && source->bytes == 0) {

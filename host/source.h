@@ -41,6 +41,9 @@ enum host_format {
     HOST_UNKNOWN
 };
 
+/* Whether it ends in .gz, in letters of either case. */
+bool host_is_packed(const char *path);
+
 /* By the extension, .gz apart; "-" is HOST_UNKNOWN. */
 enum host_format host_format_of(const char *path);
 

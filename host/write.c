@@ -201,8 +201,9 @@ const char *host_write_file(const char *path, unsigned k, char *name,
                             size_t size)
 {
     size_t length = strlen(path);
+    bool more = host_format_of(path) == HOST_ELE && !host_is_packed(path);
     if (strcmp(path, "-") == 0 || length + 8 > size ||
-        k > (host_format_of(path) == HOST_ELE ? BESIDE : 0)) {
+        k > (more ? BESIDE : 0)) {
         return NULL;
     }
     if (k == 0) {
@@ -435,11 +436,10 @@ typedef void writer(struct host_output *out, const struct host_points *points,
 
 static writer *writer_of(const char *path)
 {
-    size_t n = strlen(path);
     if (strcmp(path, "-") == 0) {
         return write_ele;
     }
-    if (n > 3 && strcmp(path + n - 3, ".gz") == 0) {
+    if (host_is_packed(path)) {
         return NULL;
     }
     switch (host_format_of(path)) {

@@ -160,9 +160,8 @@ static void write_format(struct host_output *out, const char *path,
 static bool is_known(const char *path)
 {
     enum host_format format = host_format_of(path);
-    size_t n = strlen(path);
-    bool packed = n > 3 && strcmp(path + n - 3, ".gz") == 0;
-    return strcmp(path, "-") == 0 || (!packed && format <= HOST_VTP);
+    return strcmp(path, "-") == 0 ||
+           (!host_is_packed(path) && format <= HOST_VTP);
 }
 
 int host_points_write(const char *path, const struct host_points *points,

@@ -306,6 +306,9 @@ usage 'memory enough without --window' 'give that, fewer --nodes, or no --window
     --nodes 64 --window 64 --memory 1M -o "$out"
 usage 'memory no number' 'memory' run "$good" --memory lots -o "$out"
 usage 'unknown output format' 'vtu' run "$good" -o "$left/o.xls"
+usage 'packed tetrahedra' 'vtu' run "$good" -o "$left/o.vtu.GZ"
+usage 'packed tetrahedra, .ele' 'vtu' run "$good" -o "$left/o.ele.GZ"
+usage 'packed points' 'xyz' gen uniform 9 -o "$left/o.xyz.Gz"
 usage 'unknown kind' 'uniform' gen cheese 100 -o "$left/o.xyz"
 usage 'too few to generate' 'give 4 to 4294901760$' gen uniform 3 -o "$left/o.xyz"
 check 'as many as are triangulated' 'the limits differ' test \
@@ -328,6 +331,16 @@ check 'duplicates and -0.0 are counted' "$(cat "$scratch/four.json")" \
 check 'duplicates and -0.0 are told' "$(tr '\n' ' ' < "$scratch/output")" \
     test "$(grep -cE ': 4 distinct points, 1 tetra|2 of 6 points are dup|-0\.0.*: 1$' \
     "$scratch/output")" = 3
+mkdir "$in/packed"
+"$INCODE" run "$good" -q -o "$in/packed/a.ele" -o "$scratch/plain.vtu"
+gzip "$in/packed/a.ele"
+succeeds 'packed tetrahedra and the points beside them' "$INCODE" convert \
+    "$in/packed/a.ele.gz" "$scratch/packed.vtu"
+check 'packed tetrahedra are the same' 'another file' \
+    cmp "$scratch/packed.vtu" "$scratch/plain.vtu"
+gzip "$in/packed/a.node"
+succeeds 'packed tetrahedra and packed points' "$INCODE" convert \
+    "$in/packed/a.ele.gz" "$scratch/packed.vtu"
 for arguments in --help --version 'run --help' 'gen --help' 'verify --help' \
     'digest --help' 'convert --help'; do
     # shellcheck disable=SC2086
