@@ -178,6 +178,28 @@ refuses 'errors/ends of children are ignored' 4 'ended 3 times, .*status 1;' tim
     env --ignore-signal=CHLD "$INCODE" run "$good" -q --nodes 2 \
     --node-program /bin/false -o "$left/o.vtu"
 
+# Pseudo-terminals of the same numbers in a container, seen from outside it.
+name='errors/terminals of a container'
+user=$([ "$(id -u)" = 0 ] || echo -r)
+# shellcheck disable=SC2016
+contained=(unshare ${user:+"$user"} -m bash -c 'mount -t devpts -o \
+    newinstance,ptmxmode=666 none /dev/pts &&
+    mount --bind /dev/pts/ptmx /dev/ptmx && exec "$@"' -)
+if "${contained[@]}" true 2> /dev/null; then
+    "${contained[@]}" "$INCODE" run "$in/many.xyz" -q --nodes 16 \
+        --link serial --host-rate 2000 &
+    for _ in $(seq 100); do
+        [ "$(pgrep -c -P $! incode-node)" = 16 ] && break
+        sleep 0.05
+    done
+    succeeds "$name" timeout 20 "$INCODE" run "$good" -q --nodes 16 \
+        --link serial
+    kill $!
+    wait $! 2> /dev/null
+else
+    skip "$name" 'no right to mount here'
+fi
+
 # Root may write anywhere: nobody tries.
 name='errors/output in a directory without permission'
 nobody=
@@ -201,7 +223,6 @@ full_disk() {
         [ -z \"\$(ls -A '$left')\" ] || exit 98
         exit \$status"
 }
-user=$([ "$(id -u)" = 0 ] || echo -r)
 for format in vtu ele npy vtk msh mesh; do
     name="errors/disk fills under .$format"
     if ! unshare ${user:+"$user"} -m mount -t tmpfs -o size=64k none "$in" \

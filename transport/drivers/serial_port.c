@@ -17,9 +17,21 @@
 #include <time.h>
 #include <unistd.h>
 
+enum { PSEUDO_FIRST = 136, PSEUDO_LAST = 143 }; /* major numbers, for ever */
+
 /* --- who has it ---------------------------------------------------------- */
 
-static bool has_open(const char *pid, dev_t device)
+/* Pseudo-terminals have numbers of their own in every container, where another
+ * file system makes them. */
+static bool is_same(const struct stat *a, const struct stat *b)
+{
+    unsigned kind = major(a->st_rdev);
+    bool pseudo = kind >= PSEUDO_FIRST && kind <= PSEUDO_LAST;
+    return S_ISCHR(a->st_mode) && a->st_rdev == b->st_rdev &&
+           (!pseudo || a->st_dev == b->st_dev);
+}
+
+static bool has_open(const char *pid, const struct stat *device)
 {
     char path[PATH_MAX];
     struct dirent *entry;
@@ -30,7 +42,7 @@ static bool has_open(const char *pid, dev_t device)
     while (fds != NULL && !found && (entry = readdir(fds)) != NULL) {
         found = entry->d_name[0] != '.' &&
                 fstatat(dirfd(fds), entry->d_name, &about, 0) == 0 &&
-                S_ISCHR(about.st_mode) && about.st_rdev == device;
+                is_same(&about, device);
     }
     if (fds != NULL) {
         closedir(fds);
@@ -65,8 +77,7 @@ int serial_port_holder(const char *device, char *name, size_t size)
         int pid = isdigit((unsigned char)entry->d_name[0])
                       ? (int)strtol(entry->d_name, NULL, 10)
                       : 0;
-        if (pid > 0 && pid != getpid() &&
-            has_open(entry->d_name, about.st_rdev)) {
+        if (pid > 0 && pid != getpid() && has_open(entry->d_name, &about)) {
             read_name(entry->d_name, name, size);
             holder = pid;
         }
