@@ -49,6 +49,29 @@ static int check_names(const struct host_cube_file *file,
     return 0;
 }
 
+/* A whole number from lo to hi.  What libconfig reads of a setting of another
+ * type, or of one beyond an int, is 0. */
+static bool is_number(const config_setting_t *setting, int lo, int hi,
+                      int *value)
+{
+    long long n = config_setting_get_int64(setting);
+    int type = config_setting_type(setting);
+    if ((type != CONFIG_TYPE_INT && type != CONFIG_TYPE_INT64) || n < lo ||
+        n > hi) {
+        return false;
+    }
+    *value = (int)n;
+    return true;
+}
+
+/* The same of a member, which may be left out: *value stays as it is. */
+static bool take_number(const config_setting_t *group, const char *name, int lo,
+                        int hi, int *value)
+{
+    const config_setting_t *member = config_setting_get_member(group, name);
+    return member == NULL || is_number(member, lo, hi, value);
+}
+
 /* "HOST:PORT", "[ADDRESS]:PORT": looked up once, before the run. */
 static int resolve(const struct host_cube_file *file,
                    const config_setting_t *where, struct tcp_address *address,
@@ -138,7 +161,8 @@ static int read_device(const struct host_cube_file *file,
                        char device[SERIAL_NAME_MAX], struct host_error *error)
 {
     const char *name = config_setting_get_string_elem(pair, end);
-    if (name == NULL || strlen(name) >= SERIAL_NAME_MAX) {
+    if (name == NULL || strlen(name) >= SERIAL_NAME_MAX ||
+        config_setting_length(pair) != 2) {
         return wrong(file, pair, error,
                      "serial: not two devices; write [\"/dev/ttyS1\", "
                      "\"/dev/ttyUSB0\"], the first at `node`");
@@ -152,17 +176,20 @@ static int read_line(const struct host_cube_file *file,
                      struct host_error *error)
 {
     const config_setting_t *pair = config_setting_get_member(group, "serial");
-    int baud = 115200, flow = 0;
+    const config_setting_t *flow = config_setting_get_member(group, "rtscts");
+    int baud = 115200;
     wire->serial = true;
-    (void)config_setting_lookup_int(group, "baud", &baud);
-    (void)config_setting_lookup_bool(group, "rtscts", &flow);
-    wire->baud = baud < 0 ? 0 : (uint32_t)baud;
-    wire->rts_cts = flow != 0;
-    if (baud < 300 || baud > 20000000) {
-        return wrong(file, group, error,
+    if (!take_number(group, "baud", 300, 20000000, &baud)) {
+        return wrong(file, config_setting_get_member(group, "baud"), error,
                      "baud: not a rate of a serial line; give 300 to "
                      "20000000");
     }
+    if (flow != NULL && config_setting_type(flow) != CONFIG_TYPE_BOOL) {
+        return wrong(file, flow, error,
+                     "rtscts: neither true nor false; give one of them");
+    }
+    wire->baud = (uint32_t)baud;
+    wire->rts_cts = flow != NULL && config_setting_get_bool(flow) != 0;
     return read_device(file, pair, 0, wire->device[0], error) != 0 ||
                    read_device(file, pair, 1, wire->device[1], error) != 0
                ? error->code
@@ -198,13 +225,12 @@ static int read_end(const struct host_cube_file *file,
 {
     const config_setting_t *end = config_setting_get_member(group, name);
     const char *text = end == NULL ? NULL : config_setting_get_string(end);
-    int number = -1;
+    int number = 0;
     if (text != NULL && strcmp(text, "host") == 0 && strcmp(name, "to") == 0) {
         *node = CUBE_HOST;
         return 0;
     }
-    if (config_setting_lookup_int(group, name, &number) == CONFIG_FALSE ||
-        number < 0 || (unsigned)number >= file->nodes) {
+    if (end == NULL || !is_number(end, 0, (int)file->nodes - 1, &number)) {
         char message[120];
         snprintf(message, sizeof message,
                  "%s: not a node of this cube; give 0 to %u%s", name,
@@ -420,63 +446,74 @@ static int read_board(struct host_cube_file *file, const config_setting_t *root,
     return wrong(file, where, error, text);
 }
 
-static int read_nodes(struct host_cube_file *file, const config_t *config,
+/* The nodes that the host starts. */
+static int read_start(struct host_cube_file *file, const config_setting_t *root,
                       struct host_error *error)
 {
-    const config_setting_t *root = config_root_setting(config), *where;
-    const char *text = NULL;
-    int value = -1;
-    where = config_setting_get_member(root, "dimension");
-    if (config_lookup_int(config, "dimension", &value) == CONFIG_FALSE ||
-        value < 0 || value > CUBE_DIMENSION_MAX) {
-        return wrong(file, where, error,
+    const config_setting_t *start = config_setting_get_member(root, "start");
+    bool many = start != NULL && (config_setting_is_array(start) ||
+                                  config_setting_is_list(start));
+    bool good = start == NULL || many;
+    for (int i = 0; good && many && i < config_setting_length(start); i++) {
+        int node = 0;
+        good = is_number(config_setting_get_elem(start, (unsigned)i), 0,
+                         (int)file->nodes - 1, &node);
+        if (good && file->local[node]) {
+            return wrong(file, start, error,
+                         "start: a node twice; name each once");
+        }
+        file->local[node] |= good;
+    }
+    return good ? 0
+                : wrong(file, start, error,
+                        "start: not numbers of nodes; write [0, 1, 2]");
+}
+
+static int read_memory(struct host_cube_file *file,
+                       const config_setting_t *root, struct host_error *error)
+{
+    const config_setting_t *memory = config_setting_get_member(root, "memory");
+    const char *text =
+        memory == NULL ? "4M" : config_setting_get_string(memory);
+    return text != NULL && host_parse_bytes(text, &file->memory) == 0 &&
+                   file->memory >= 256 * 1024 &&
+                   file->memory <= UINT64_C(1) << 30
+               ? 0
+               : wrong(file, memory, error,
+                       "memory: not a size; write \"4M\", from 640K to "
+                       "1G, or less to a small cube");
+}
+
+static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
+                      struct host_error *error)
+{
+    const config_setting_t *key = config_setting_get_member(root, "key");
+    int dimension = -1, window = 0, dead = 30;
+    if (!take_number(root, "dimension", 0, CUBE_DIMENSION_MAX, &dimension) ||
+        dimension < 0) {
+        return wrong(file, config_setting_get_member(root, "dimension"), error,
                      "dimension: not given or not 0 to 10; a cube of 8 nodes "
                      "has dimension = 3;");
     }
-    file->dimension = (unsigned)value;
-    file->nodes = 1u << value;
-    file->memory = 4u << 20;
-    file->dead_s = 30;
-    if (config_lookup_string(config, "memory", &text) == CONFIG_TRUE &&
-        (host_parse_bytes(text, &file->memory) != 0 ||
-         file->memory < 256 * 1024 || file->memory > UINT64_C(1) << 30)) {
-        return wrong(file, config_lookup(config, "memory"), error,
-                     "memory: not a size; write \"4M\", from 640K to "
-                     "1G, or less to a small cube");
+    if (!take_number(root, "window", 1, LINK_WINDOW_MAX, &window)) {
+        return wrong(file, config_setting_get_member(root, "window"), error,
+                     "window: not a number of frames; give 1 to 64");
     }
-    if (config_lookup_int(config, "window", &value) == CONFIG_TRUE) {
-        if (value < 1 || value > LINK_WINDOW_MAX) {
-            return wrong(file, config_lookup(config, "window"), error,
-                         "window: not a number of frames; give 1 to 64");
-        }
-        file->window = (unsigned)value;
+    if (!take_number(root, "dead", 0, 3600, &dead)) {
+        return wrong(file, config_setting_get_member(root, "dead"), error,
+                     "dead: not seconds of silence; give 0 (never) to "
+                     "3600");
     }
-    if (config_lookup_int(config, "dead", &value) == CONFIG_TRUE) {
-        if (value < 0 || value > 3600) {
-            return wrong(file, config_lookup(config, "dead"), error,
-                         "dead: not seconds of silence; give 0 (never) to "
-                         "3600");
-        }
-        file->dead_s = (unsigned)value;
-    }
-    if (read_board(file, root, error) != 0) {
+    file->dimension = (unsigned)dimension;
+    file->nodes = 1u << dimension;
+    file->window = (unsigned)window;
+    file->dead_s = (unsigned)dead;
+    if (read_memory(file, root, error) != 0 ||
+        read_board(file, root, error) != 0 ||
+        read_start(file, root, error) != 0) {
         return error->code;
     }
-    where = config_setting_get_member(root, "start");
-    for (int i = 0; where != NULL && i < config_setting_length(where); i++) {
-        int node = config_setting_get_int_elem(where, i);
-        if (node < 0 || (unsigned)node >= file->nodes) {
-            return wrong(file, where, error,
-                         "start: not numbers of nodes; write [0, 1, 2]");
-        }
-        if (file->local[node]) {
-            return wrong(file, where, error,
-                         "start: a node twice; name each once");
-        }
-        file->local[node] = true;
-    }
-    where = config_setting_get_member(root, "key");
-    return where == NULL ? 0 : read_key(file, where, error);
+    return key == NULL ? 0 : read_key(file, key, error);
 }
 
 static int read_settings(struct host_cube_file *file, const config_t *config,
@@ -488,7 +525,7 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
     const config_setting_t *root = config_root_setting(config);
     const config_setting_t *links = config_setting_get_member(root, "links");
     if (check_names(file, root, names, error) != 0 ||
-        read_nodes(file, config, error) != 0) {
+        read_nodes(file, root, error) != 0) {
         return error->code;
     }
     if (links == NULL || !config_setting_is_list(links)) {

@@ -97,6 +97,17 @@ static void nodes_are_started_as_it_says(void **unused)
     host_cube_file_free(&file);
 }
 
+/* Writes the good file with another text in place of one of it. */
+static void write_changed(const char *old, const char *new)
+{
+    char text[1024];
+    const char *at = strstr(good, old);
+    assert_non_null(at);
+    snprintf(text, sizeof text, "%.*s%s%s", (int)(at - good), good, new,
+             at + strlen(old));
+    write_file(path, text);
+}
+
 /* A text of the good file, another in its place, and where and what the error
  * must say, if it is one. */
 static void mistakes_are_named(void **unused)
@@ -134,7 +145,7 @@ static void mistakes_are_named(void **unused)
          ":2: ", "no link between nodes 0 and 1", 3},
         {"node = 0; to = \"host\"", "node = 1; to = \"host\"", ":2: ", "node 0",
          3},
-        {"baud = 921600", "baud = 12", ":5: ", "baud", 3},
+        {"baud = 921600", "baud = 12", ":6: ", "300 to 20000000", 3},
         {"rtscts", "ctsrts", ":6: ", "ctsrts: no such setting", 3},
         {"[\"/dev/ttyS1\", \"/dev/ttyUSB0\"]", "[\"/dev/ttyS1\"]",
          ":5: ", "two devices", 3},
@@ -146,13 +157,9 @@ static void mistakes_are_named(void **unused)
     static struct host_cube_file file;
     (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        char text[1024], where[96];
+        char where[96];
         struct host_error error = {0};
-        const char *at = strstr(good, cases[i].old);
-        assert_non_null(at);
-        snprintf(text, sizeof text, "%.*s%s%s", (int)(at - good), good,
-                 cases[i].new, at + strlen(cases[i].old));
-        write_file(path, text);
+        write_changed(cases[i].old, cases[i].new);
         snprintf(where, sizeof where, "%s%s", path, cases[i].where);
         int status = host_cube_file_read(&file, path, &error);
         if (status != cases[i].code ||
@@ -162,6 +169,66 @@ static void mistakes_are_named(void **unused)
         }
         if (status == 0) {
             host_cube_file_free(&file);
+        }
+    }
+}
+
+/* Of each setting a value of another type, and one that is another number
+ * where it is cut to an int.  Lines as in the good file. */
+static void other_types_are_no_values(void **unused)
+{
+    static const struct {
+        const char *old, *new, *what;
+    } cases[] = {
+        {"dimension = 1", "dimension = \"1\"", ":1: dimension: "},
+        {"dimension = 1", "dimension = 1.0", ":1: dimension: "},
+        {"dimension = 1", "dimension = 4294967297L", ":1: dimension: "},
+        {"\"512K\"", "1048576", ":1: memory: "},
+        {"\"512K\"", "[\"512K\"]", ":1: memory: "},
+        {"\"lab.key\"", "7", ":1: key: "},
+        {"start = [1]", "window = \"8\"", ":1: window: "},
+        {"start = [1]", "window = 8.0", ":1: window: "},
+        {"start = [1]", "window = 4294967304L", ":1: window: "},
+        {"start = [1]", "dead = 2.5", ":1: dead: "},
+        {"start = [1]", "dead = true", ":1: dead: "},
+        {"start = [1]", "dead = 4294967296L", ":1: dead: "},
+        {"start = [1]", "board = [\"linux\"]", ":1: board: "},
+        {"start = [1]", "start = 1", ":1: start: "},
+        {"start = [1]", "start = \"1\"", ":1: start: "},
+        {"start = [1]", "start = { node = 1; }", ":1: start: "},
+        {"start = [1]", "start = [\"1\"]", ":1: start: "},
+        {"start = [1]", "start = [1.0]", ":1: start: "},
+        {"start = [1]", "start = (1, \"host\")", ":1: start: "},
+        {"start = [1]", "start = [4294967297L]", ":1: start: "},
+        {"node = 0;", "node = \"0\";", ":3: node: "},
+        {"node = 0;", "node = 0.0;", ":3: node: "},
+        {"to = 0;", "to = \"0\";", ":5: to: "},
+        {"to = 0;", "to = 4294967296L;", ":5: to: "},
+        {"tcp = \"10.0.0.1:7000\"", "tcp = 7000", ":3: not a host"},
+        {"7000\";", "7000\"; via = 7000;", ":3: not a host"},
+        {"[\"/dev/ttyS1\", \"/dev/ttyUSB0\"]", "\"/dev/ttyS1\"",
+         ":5: serial: "},
+        {"[\"/dev/ttyS1\", \"/dev/ttyUSB0\"]", "(\"/dev/ttyS1\", 1)",
+         ":5: serial: "},
+        {"\"/dev/ttyUSB0\"]", "\"/dev/ttyUSB0\", \"/dev/ttyS2\"]",
+         ":5: serial: "},
+        {"baud = 921600", "baud = \"9600\"", ":6: baud: "},
+        {"baud = 921600", "baud = 9600.0", ":6: baud: "},
+        {"baud = 921600", "baud = 4294976896L", ":6: baud: "},
+        {"rtscts = true", "rtscts = 1", ":6: rtscts: "},
+        {"rtscts = true", "rtscts = \"true\"", ":6: rtscts: "},
+    };
+    static struct host_cube_file file;
+    (void)unused;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char expected[128];
+        struct host_error error = {0};
+        write_changed(cases[i].old, cases[i].new);
+        snprintf(expected, sizeof expected, "%s%s", path, cases[i].what);
+        if (host_cube_file_read(&file, path, &error) != HOST_INPUT ||
+            strstr(error.text, expected) == NULL ||
+            strstr(error.text, "; ") == NULL) {
+            fail_msg("%s: exit %d: %s", cases[i].new, error.code, error.text);
         }
     }
 }
@@ -185,6 +252,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nodes_are_started_as_it_says),
         cmocka_unit_test(mistakes_are_named),
+        cmocka_unit_test(other_types_are_no_values),
         cmocka_unit_test(files_that_are_not_taken),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
