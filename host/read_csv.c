@@ -1,6 +1,7 @@
 #include "read_csv.h"
 
 #include <string.h>
+#include <strings.h>
 
 /* What stands between two delimiters, without blanks and quotes around it. */
 struct field {
@@ -87,14 +88,32 @@ static unsigned axis_of(struct field f)
     return c >= 'x' && c <= 'z' ? (unsigned)(c - 'x') : 3;
 }
 
-/* Whether no word of the line begins like a number. */
+/* Whether a word begins like a number, or is one that is not finite: such a
+ * line is a point that is wrong, and no header. */
+static bool is_numeric(const char *word)
+{
+    static const char *const others[] = {"nan", "inf", "infinity"};
+    bool quoted = word[0] == '"';
+    size_t n = strlen(word += quoted);
+    if (n > 0 && strchr("+-.0123456789", word[0]) != NULL) {
+        return true;
+    }
+    n -= quoted && n > 0 && word[n - 1] == '"';
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        if (n == strlen(others[i]) && strncasecmp(word, others[i], n) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether no word of the line is a number. */
 static bool names_columns(struct host_scan s)
 {
     while (host_scan_more(&s)) {
         char word[64];
         host_scan_word(&s, word, sizeof word);
-        char first = word[word[0] == '"'];
-        if (first != '\0' && strchr("+-.0123456789", first) != NULL) {
+        if (is_numeric(word)) {
             return false;
         }
     }

@@ -166,6 +166,11 @@ static void text_faults_have_their_place(void **unused)
     refused("a.csv", "x,t,y,z\n1,2,3,q\n", "a.csv:2:7: 'q' is no number");
     refused("a.csv", "z,y,x\n1,2,3,4\n", "a.csv:2:7: more than 3 columns");
     refused("a.csv", "\"1\",\"2\",\"3\"\n", "a.csv:1:1: '\"1\"' is no number");
+    refused("a.csv", "nan,nan,nan\n1,2,3\n", "a.csv:1:1: NaN is no");
+    refused("a.csv", "inf;inf;inf\n1;2;3\n", "a.csv:1:1: infinity is no");
+    refused("a.csv", "Infinity NaN INF\n1 2 3\n", "a.csv:1:1: infinity");
+    refused("a.csv", "\"nan\",\"nan\",\"nan\"\n1,2,3\n",
+            "a.csv:1:1: '\"nan\"'");
     refused("a.xyz", "# nothing\n", "holds no point");
     refused("a.xyz", "", "is empty");
     refused("-", "1 2 x\n", "stdin:1:5: 'x'");
