@@ -13,6 +13,16 @@ static bool is_blank(char c)
     return c == ' ' || c == '\t' || c == '\r';
 }
 
+static bool is_mark(char c)
+{
+    return c == ',' || c == ';';
+}
+
+static bool begins_number(char c)
+{
+    return (c >= '0' && c <= '9') || c == '-' || c == '+' || c == '.';
+}
+
 static const char *line_end(const struct host_scan *s)
 {
     const char *end = memchr(s->at, '\n', (size_t)(s->end - s->at));
@@ -24,29 +34,59 @@ static const char *line_end(const struct host_scan *s)
 static const char *line_begin(const struct host_scan *s)
 {
     const char *at = s->at;
-    while (at > s->start && at[-1] != '\0' &&
-           strchr(" \t\r,;", at[-1]) != NULL) {
+    while (at > s->start && (is_blank(at[-1]) || is_mark(at[-1]))) {
         at--;
     }
     return at;
+}
+
+bool host_csv_begins_empty(const struct host_scan *s)
+{
+    const char *at = s->at;
+    while (at > s->start && is_blank(at[-1])) {
+        at--;
+    }
+    return at > s->start && is_mark(at[-1]);
+}
+
+/* Where blanks part fields, any of them does. */
+static bool is_delimiter(char c, char delimiter)
+{
+    return c == delimiter || (delimiter == ' ' && is_blank(c));
+}
+
+static const char *skip_blanks(const char *c, const char *end, char delimiter)
+{
+    while (c < end && is_blank(*c) && (delimiter == ' ' || *c != delimiter)) {
+        c++;
+    }
+    return c;
+}
+
+/* Where the field behind the one that ends at c begins; NULL: nowhere. */
+static const char *behind(const char *c, const char *end, char delimiter)
+{
+    if (c == end) {
+        return NULL;
+    }
+    c++;
+    if (delimiter == ' ') { /* many are one */
+        c = skip_blanks(c, end, delimiter);
+        return c == end ? NULL : c;
+    }
+    return c;
 }
 
 /* Takes a field off the line; *at is NULL behind the last. */
 static struct field next_field(const char **at, const char *end, char delimiter)
 {
     bool quoted = false;
-    const char *c = *at;
-    while (c < end && is_blank(*c) && (delimiter == ' ' || *c != delimiter)) {
-        c++;
-    }
+    const char *c = skip_blanks(*at, end, delimiter);
     struct field f = {c, c};
-    for (; c < end && (quoted || *c != delimiter); c++) {
+    for (; c < end && (quoted || !is_delimiter(*c, delimiter)); c++) {
         quoted = quoted != (*c == '"');
     }
-    *at = c < end ? c + 1 : NULL;
-    while (delimiter == ' ' && *at != NULL && (*at == end || is_blank(**at))) {
-        *at = *at < end ? *at + 1 : NULL; /* many are one */
-    }
+    *at = behind(c, end, delimiter);
     while (c > f.first && is_blank(c[-1])) {
         c--;
     }
@@ -95,7 +135,7 @@ static bool is_numeric(const char *word)
     static const char *const others[] = {"nan", "inf", "infinity"};
     bool quoted = word[0] == '"';
     size_t n = strlen(word += quoted);
-    if (n > 0 && strchr("+-.0123456789", word[0]) != NULL) {
+    if (begins_number(word[0])) {
         return true;
     }
     n -= quoted && n > 0 && word[n - 1] == '"';
@@ -158,13 +198,34 @@ int host_csv_header(struct host_csv *csv, struct host_scan *s,
     return 0;
 }
 
-/* The number in a field, which is part of s. */
-static int take_number(const struct host_scan *s, struct field f, double *value,
+/* The number in the field at *at, which is part of s.  Goes to the next field;
+ * behind the last, or a comment, *at is NULL. */
+static int take_number(const struct host_scan *s, const char **at,
+                       const char *end, char delimiter, double *value,
                        struct host_error *error)
 {
     struct host_scan part = *s;
+    part.at = skip_blanks(*at, end, delimiter);
+    part.end = end;
+    if (part.at < end && begins_number(*part.at)) {
+        if (host_scan_double(&part, value, error) != 0) {
+            return error->code;
+        }
+        const char *c = part.at;
+        while (c < end && is_blank(*c) && !is_delimiter(*c, delimiter)) {
+            c++;
+        }
+        if (c == end || *c == '#' || is_delimiter(*c, delimiter)) {
+            *at = c < end && *c == '#' ? NULL : behind(c, end, delimiter);
+            return 0;
+        }
+    }
+    struct field f = next_field(at, end, delimiter);
     part.at = f.first;
     part.end = f.last;
+    if (f.first == f.last) {
+        return host_scan_fail(s, f.first, error, HOST_CSV_EMPTY);
+    }
     if (host_scan_double(&part, value, error) != 0) {
         return error->code;
     }
@@ -174,26 +235,39 @@ static int take_number(const struct host_scan *s, struct field f, double *value,
                : 0;
 }
 
+/* Whether what stands at `at`, behind the last column, is none more: a comment,
+ * or nothing behind a delimiter that ends the line. */
+static bool is_end(const char *at, const char *end, char delimiter)
+{
+    struct field f = next_field(&at, end, delimiter);
+    return f.first == f.last ? at == NULL : *f.first == '#';
+}
+
 int host_csv_row(const struct host_csv *csv, struct host_scan *s, double xyz[3],
                  struct host_error *error)
 {
-    const char *at = line_begin(s), *end = line_end(s);
-    for (uint64_t i = 0; at != NULL; i++) {
-        struct field f = next_field(&at, end, csv->delimiter);
-        bool last = at == NULL;
-        if (last && i == csv->fields && f.first == f.last) {
-            break; /* a delimiter ends the line */
+    const char *at = line_begin(s), *end = line_end(s), *field = at;
+    char delimiter = csv->delimiter;
+    uint64_t columns = 0;
+    if (memchr(at, delimiter, (size_t)(end - at)) == NULL) {
+        delimiter = delimiter_of(at, end); /* rows may have one of their own */
+    }
+    for (; at != NULL && columns < csv->fields; columns++) {
+        unsigned d = 0;
+        field = at;
+        while (d < 3 && csv->column[d] != columns) {
+            d++;
         }
-        if (i >= csv->fields || (last && i + 1 < csv->fields)) {
-            return host_scan_fail(s, f.first, error,
-                                  "more or fewer columns than the first line "
-                                  "names; correct this line or that");
+        if (d == 3) {
+            (void)next_field(&at, end, delimiter);
+        } else if (take_number(s, &at, end, delimiter, &xyz[d], error) != 0) {
+            return error->code;
         }
-        for (int d = 0; d < 3; d++) {
-            if (csv->column[d] == i && take_number(s, f, &xyz[d], error) != 0) {
-                return error->code;
-            }
-        }
+    }
+    if (columns < csv->fields || (at != NULL && !is_end(at, end, delimiter))) {
+        return host_scan_fail(s, at == NULL ? field : at, error,
+                              "more or fewer columns than the first line "
+                              "names; correct this line or that");
     }
     s->at = end;
     return 0;

@@ -4,13 +4,15 @@
  *
  *     struct host_csv csv = {0};
  *     if (host_csv_header(&csv, &scan, &error) != 0) ...
- *     while (csv.fields > 3 && host_scan_skip_blank_lines(&scan))
+ *     while (csv.fields > 0 && host_scan_skip_blank_lines(&scan))
  *         host_csv_row(&csv, &scan, xyz, &error);
  */
 #ifndef HOST_READ_CSV_H
 #define HOST_READ_CSV_H
 
 #include "scan.h"
+
+#define HOST_CSV_EMPTY "an empty field where a number is due; fill it in"
 
 struct host_csv {
     char delimiter;
@@ -24,7 +26,12 @@ struct host_csv {
 int host_csv_header(struct host_csv *csv, struct host_scan *s,
                     struct host_error *error);
 
-/* Takes a line of as many fields as the header has. */
+/* Whether an empty field comes before the word at hand, the line's first. */
+bool host_csv_begins_empty(const struct host_scan *s);
+
+/* Takes a line of as many fields as the header has, parted as it is, or by
+ * another delimiter throughout.  A comment may follow x, y and z, or the last
+ * field. */
 int host_csv_row(const struct host_csv *csv, struct host_scan *s, double xyz[3],
                  struct host_error *error);
 

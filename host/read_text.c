@@ -1,30 +1,64 @@
 /* Points as text: .xyz .txt .csv, TetGen's .node, .off. */
+#include <limits.h>
 #include <string.h>
 
 #include "read_csv.h"
 #include "readers.h"
 #include "scan.h"
 
-/* Three numbers and no more on a line. */
-static int take_three(struct host_scan *s, double v[3],
-                      struct host_error *error)
+enum next { NEXT_FIELD, NEXT_EMPTY, NEXT_NONE };
+
+/* Goes to the next field of the line; one with more than `most` delimiters
+ * before it comes after an empty one. */
+static enum next go_to_field(struct host_scan *s, unsigned most)
 {
-    for (int d = 0; d < 3; d++) {
-        if (d > 0 && !host_scan_more(s)) {
-            return host_scan_fail(s, s->at, error,
-                                  d == 1 ? "1 column where x, y and z are "
-                                           "due; complete the line"
-                                         : "2 columns where x, y and z "
-                                           "are due; complete the line");
-        }
-        if (host_scan_double(s, &v[d], error) != 0) {
-            return error->code;
+    const char *c = s->at;
+    for (unsigned delimiters = 0; c < s->end; c++) {
+        if (*c == ',' || *c == ';') {
+            if (++delimiters > most) {
+                s->at = c;
+                return NEXT_EMPTY;
+            }
+        } else if (*c != ' ' && *c != '\t' && *c != '\r') {
+            s->at = c;
+            return *c == '\n' || *c == '#' ? NEXT_NONE : NEXT_FIELD;
         }
     }
-    return host_scan_more(s)
-               ? host_scan_fail(s, s->at, error,
-                                "more than 3 columns; leave only x, y and z")
-               : 0;
+    s->at = c;
+    return NEXT_NONE;
+}
+
+static int wrong_columns(struct host_scan *s, int columns, enum next next,
+                         struct host_error *error)
+{
+    static const char *const few[] = {
+        "", "1 column where x, y and z are due; complete the line",
+        "2 columns where x, y and z are due; complete the line"};
+    return host_scan_fail(s, s->at, error,
+                          next == NEXT_EMPTY ? HOST_CSV_EMPTY
+                          : columns == 3
+                              ? "more than 3 columns; leave only x, y and z"
+                              : few[columns]);
+}
+
+/* Three numbers and no more on a line; in a .csv no field is empty. */
+static int take_three(struct host_scan *s, bool is_csv, double xyz[3],
+                      struct host_error *error)
+{
+    unsigned most = is_csv ? 1 : UINT_MAX;
+    if (is_csv && host_csv_begins_empty(s)) {
+        return wrong_columns(s, 0, NEXT_EMPTY, error);
+    }
+    for (int d = 0; d < 3; d++) {
+        if (host_scan_double(s, &xyz[d], error) != 0) {
+            return error->code;
+        }
+        enum next next = go_to_field(s, most);
+        if (next != (d < 2 ? NEXT_FIELD : NEXT_NONE)) {
+            return wrong_columns(s, d + 1, next, error);
+        }
+    }
+    return 0;
 }
 
 int host_read_xyz(const struct host_source *source, struct host_mesh *mesh,
@@ -32,23 +66,16 @@ int host_read_xyz(const struct host_source *source, struct host_mesh *mesh,
 {
     struct host_scan s =
         host_scan_start(source->path, source->data, source->bytes);
-    struct host_csv csv = {.column = {0, 1, 2}};
-    if (host_is_csv(source->path) && host_csv_header(&csv, &s, error) != 0) {
+    struct host_csv csv = {0};
+    bool is_csv = host_is_csv(source->path);
+    if (is_csv && host_csv_header(&csv, &s, error) != 0) {
         return error->code;
     }
     while (host_scan_skip_blank_lines(&s)) {
-        double v[3], xyz[3];
-        if (csv.fields > 3) {
-            host_csv_row(&csv, &s, xyz, error);
-        } else if (take_three(&s, v, error) == 0) {
-            for (int d = 0; d < 3; d++) {
-                xyz[d] = v[csv.column[d]];
-            }
-        }
-        if (error->code != 0) {
-            return error->code;
-        }
-        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+        double xyz[3];
+        int status = csv.fields > 0 ? host_csv_row(&csv, &s, xyz, error)
+                                    : take_three(&s, is_csv, xyz, error);
+        if (status != 0 || host_points_append(mesh->points, xyz, 1, error)) {
             return error->code;
         }
     }

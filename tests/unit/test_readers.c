@@ -107,6 +107,9 @@ static void text_in_all_its_habits(void **unused)
     expect_rows("-", &b, 3);
     expect_rows("A.TXT", &b, 3);
     b.n = 0;
+    put_text(&b, ",-3,,-2.5;,-2,,\n;;\n-1.5,;-1 -.5");
+    expect_rows("a.xyz", &b, 2);
+    b.n = 0;
     put_text(&b, "x,\"y [m]\",z\n-3,-2.5,-2\n");
     expect_rows("a.csv", &b, 1);
     static const char quoted[] =
@@ -120,7 +123,12 @@ static void text_in_all_its_habits(void **unused)
         "id  z   y/mm x\n0 -2  -2.5   -3\nb#c -.5 -1 -1.5  \n",
         "\xef\xbb\xbf,x,y,z\n0,-3,-2.5,-2\n,-1.5,-1,-.5\n",
         "east,north,height,\n-3,-2.5,-2\n-1.5,-1,-.5,\n",
-        "t\tx\ty\tz\t\n\t-3\t-2.5\t-2\n1\t-1.5\t-1\t-.5\t\n"};
+        "t\tx\ty\tz\t\n\t-3\t-2.5\t-2\n1\t-1.5\t-1\t-.5\t\n",
+        "x,y,z\n\"-3\",\"-2.5\" ,-2, # one, two\n-1.5,-1,-.5 # x, y, z\n",
+        "x,y,z\n-3 -2.5 -2\r\n\r\n,,\r\n-1.5\t-1\t-.5\r\n",
+        "x y z\n-3, -2.5, -2\n-1.5;-1;-.5;\n",
+        "-3,-2.5,-2,\n-1.5 , -1 ;-.5 # behind\n",
+        "  -3\t\t-2.5  -2\n -1.5 -1,-.5"};
     for (size_t i = 0; i < sizeof named / sizeof named[0]; i++) {
         b.n = 0;
         put_text(&b, named[i]);
@@ -164,7 +172,21 @@ static void text_faults_have_their_place(void **unused)
     refused("a.csv", "x,t,y,z\n1,2,,4\n", "a.csv:2:5: ");
     refused("a.csv", "x,t,y,z\n1,2,3 3,4\n", "a.csv:2:7: more than one number");
     refused("a.csv", "x,t,y,z\n1,2,3,q\n", "a.csv:2:7: 'q' is no number");
-    refused("a.csv", "z,y,x\n1,2,3,4\n", "a.csv:2:7: more than 3 columns");
+    refused("a.csv", "z,y,x\n1,2,3,4\n", "a.csv:2:7: more or fewer columns");
+    refused("a.csv", "x,y,z\n1,,2,3\n", "a.csv:2:3: an empty field");
+    refused("a.csv", "x y z\n4 5 6\n1,,2\n", "a.csv:3:3: an empty field");
+    refused("a.csv", "x,y,z\n,1,2\n", "a.csv:2:1: an empty field");
+    refused("a.csv", "x,y,z\n1,2,\"\"\n", "a.csv:2:6: an empty field");
+    refused("a.csv", "x,y,z\n1,2, # 3\n", "a.csv:2:6: ");
+    refused("a.csv", "x,y,z\n1,2,3,,\n", "a.csv:2:7: more or fewer columns");
+    refused("a.csv", "x,y,z\n1,2 # 5,3\n", "a.csv:2:3: more or fewer columns");
+    refused("a.csv", "x;y;z\n1,5;2\n", "a.csv:2:3: more than one number");
+    refused("a.csv", "1,2,3\n1,,2,3\n", "a.csv:2:3: an empty field");
+    refused("a.csv", "1,2,3\n1, ;2\n", "a.csv:2:4: an empty field");
+    refused("a.csv", "1,2,3\n ,1,2,3\n", "a.csv:2:3: an empty field");
+    refused("a.csv", "1,2,3,,\n", "a.csv:1:7: an empty field");
+    refused("a.csv", "1,2\n", "a.csv:1:4: 2 columns");
+    refused("a.csv", "1,2,3,4\n", "a.csv:1:7: more than 3 columns");
     refused("a.csv", "\"1\",\"2\",\"3\"\n", "a.csv:1:1: '\"1\"' is no number");
     refused("a.csv", "nan,nan,nan\n1,2,3\n", "a.csv:1:1: NaN is no");
     refused("a.csv", "inf;inf;inf\n1;2;3\n", "a.csv:1:1: infinity is no");
