@@ -134,6 +134,18 @@ static int msh_nodes(struct host_scan *s, struct host_mesh *mesh,
     return check_section_end(s, error);
 }
 
+/* A whole number of the row at hand: a row that is short takes none of the
+ * next. */
+static int msh_number(struct host_scan *s, uint64_t most, uint64_t *value,
+                      struct host_error *error)
+{
+    return host_scan_more(s)
+               ? host_scan_unsigned(s, most, value, error)
+               : host_scan_fail(s, s->at, error,
+                                "an element with fewer numbers than its type "
+                                "and tags have; complete the line");
+}
+
 static int msh_elements(const struct host_source *source, struct host_scan *s,
                         struct host_mesh *mesh, struct host_error *error)
 {
@@ -143,10 +155,10 @@ static int msh_elements(const struct host_source *source, struct host_scan *s,
         return error->code;
     }
     for (; count > 0; count--) {
-        uint64_t number, type, tags, v[4];
+        uint64_t number, type = 0, tags = 0, v[4];
         if (host_scan_unsigned(s, UINT64_MAX / 16, &number, error) != 0 ||
-            host_scan_unsigned(s, UINT32_MAX, &type, error) != 0 ||
-            host_scan_unsigned(s, 64, &tags, error) != 0) {
+            msh_number(s, UINT32_MAX, &type, error) != 0 ||
+            msh_number(s, 64, &tags, error) != 0) {
             return error->code;
         }
         if (type != TETRAHEDRON) {
@@ -154,12 +166,12 @@ static int msh_elements(const struct host_source *source, struct host_scan *s,
             continue;
         }
         for (; tags > 0; tags--) {
-            if (host_scan_unsigned(s, UINT64_MAX / 16, &number, error) != 0) {
+            if (msh_number(s, UINT64_MAX / 16, &number, error) != 0) {
                 return error->code;
             }
         }
         for (int k = 0; k < 4; k++) {
-            if (host_scan_unsigned(s, UINT64_MAX / 16, &v[k], error) != 0) {
+            if (msh_number(s, UINT64_MAX / 16, &v[k], error) != 0) {
                 return error->code;
             }
         }

@@ -427,6 +427,19 @@ static void faults_have_their_place(void **unused)
             "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Elements\n1\n"
             "1 4 2 1 1 1 2 3 4\n2 4 2 1 1 1 2 3 5\n$EndElements\n",
             "a.msh:7:1: a row beyond the number");
+    static const char *const rows[] = {"1 4 2 1 1 1 2 3", "1 4 2 1", "1 4",
+                                       "1"};
+    static const int columns[] = {16, 8, 4, 2};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char text[160], where[64];
+        (void)snprintf(text, sizeof text,
+                       "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Elements\n2\n"
+                       "%s\n2 15 2 0 1 4\n$EndElements\n",
+                       rows[i]);
+        (void)snprintf(where, sizeof where,
+                       "a.msh:6:%d: an element with fewer numbers", columns[i]);
+        refused("a.msh", text, where);
+    }
     refused("a.mesh",
             "MeshVersionFormatted 2\nDimension 3\nTetrahedra\n1\n"
             "1 2 3 4 0\n1 2 3 5 0\nEnd\n",
