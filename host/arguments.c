@@ -232,36 +232,30 @@ static void parse_output(struct parse *p, const char *value)
     p->options->output[p->options->outputs++] = value;
 }
 
-const char *const host_boards[] = {"linux", NULL};
-
 static bool parse_names(int key, const char *value, struct parse *p)
 {
-    static const char *const strategies[] = {"sequential", "spatial", "auto",
-                                             NULL};
-    static const char *const partitions[] = {"adaptive", "uniform", NULL};
-    static const char *const indexes[] = {"naive", "grid", "kd", NULL};
-    static const char *const rules[] = {"own", "paper", NULL};
-    static const char *const links[] = {"tcp", "serial", "mpi", NULL};
     struct host_run_options *o = p->options;
     switch (key) {
     case KEY_STRATEGY:
         o->strategy =
-            (enum host_strategy)choose(p, "strategy", value, strategies,
+            (enum host_strategy)choose(p, "strategy", value, host_strategies,
                                        ",master-slaves,linda,hybrid,exchange,");
         return true;
     case KEY_PARTITION:
         o->partition = (enum host_partition)choose(p, "partition", value,
-                                                   partitions, NULL);
+                                                   host_partitions, NULL);
         return true;
     case KEY_INDEX:
-        o->index = (enum incode_index)choose(p, "index", value, indexes, NULL);
+        o->index =
+            (enum incode_index)choose(p, "index", value, host_indexes, NULL);
         return true;
     case KEY_FACE_RULE:
-        o->face_rule =
-            (enum incode_face_rule)choose(p, "face-rule", value, rules, NULL);
+        o->face_rule = (enum incode_face_rule)choose(p, "face-rule", value,
+                                                     host_face_rules, NULL);
         return true;
     case KEY_LINK:
-        o->link = (enum host_wire_kind)choose(p, "link", value, links, NULL);
+        o->link =
+            (enum host_wire_kind)choose(p, "link", value, host_links, NULL);
         return true;
     case KEY_BOARD:
         (void)choose(p, "board", value, host_boards, ",mps2-an500,mps2-an385,");
@@ -380,8 +374,7 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     case KEY_JOBS_PER_WORKER:
         host_fail(p->error, HOST_USAGE,
                   "--cluster, --faces-per-job, --jobs-per-worker: belong to "
-                  "strategies that are not in this version; allowed "
-                  "strategies: sequential, spatial, auto");
+                  "strategies that are not in this version; leave them out");
         return 0;
     default:
         return parse_report(key, value, state, p->options);

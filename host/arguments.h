@@ -18,9 +18,6 @@ int host_arguments_run(int argc, char **argv, struct host_run_options *options,
 /* The same where somebody else says what is wrong: prints nothing. */
 int host_arguments_try(int argc, char **argv, struct host_run_options *options);
 
-/* What a node may run on: names, a NULL behind them. */
-extern const char *const host_boards[];
-
 /* A count of bytes with an optional K, M or G: 4M.  0, or -1. */
 int host_parse_bytes(const char *text, uint64_t *bytes);
 

@@ -143,7 +143,7 @@ void host_report_run(FILE *file, const struct host_run_options *options,
     fprintf(file,
             "%s on %u node%s: %.3f s to triangulate (%.3f Mtet/s), %.3f s "
             "in all%s\n",
-            host_strategy_name(r->strategy), r->nodes, r->nodes == 1 ? "" : "s",
+            host_strategies[r->strategy], r->nodes, r->nodes == 1 ? "" : "s",
             r->time_triangulation_s,
             1e-6 * ratio((double)r->tetrahedra, r->time_triangulation_s),
             r->time_total_s, r->verified ? "; verified" : "");
@@ -152,7 +152,7 @@ void host_report_run(FILE *file, const struct host_run_options *options,
         snprintf(title, sizeof title, "%s, %s partition, index %s",
                  r->strategy == HOST_SPATIAL ? "Spatial decomposition"
                                              : "Sequential",
-                 host_partition_name(r->partition), host_index_name(r->index));
+                 host_partitions[r->partition], host_indexes[r->index]);
         table_head(file, title);
         table_row(file, alone, alone);
         table_row(file, r, alone);
@@ -189,7 +189,7 @@ static int bench_table(const struct host_run_options *options, const char *kind,
     char title[128];
     int status = host_gen(kind, n, 1, &points, error);
     snprintf(title, sizeof title, "%s, %llu points, %s partition", name,
-             (unsigned long long)n, host_partition_name(options->partition));
+             (unsigned long long)n, host_partitions[options->partition]);
     table_head(stdout, title);
     for (unsigned nodes = 1; status == 0 && nodes <= nodes_max; nodes *= 2) {
         status = bench_row(options, &points, nodes, &result, error);

@@ -14,30 +14,21 @@
 #include "stats.h"
 #include "write.h"
 
-static const char *const strategies[] = {"sequential", "spatial", "auto"};
-static const char *const partitions[] = {"adaptive", "uniform"};
-static const char *const indexes[] = {"naive", "grid", "kd"};
-static const char *const links[] = {"tcp", "serial", "mpi"};
-
-const char *host_strategy_name(enum host_strategy strategy)
-{
-    return strategies[strategy];
-}
-
-const char *host_partition_name(enum host_partition partition)
-{
-    return partitions[partition];
-}
-
-const char *host_index_name(enum incode_index index)
-{
-    return indexes[index];
-}
-
-const char *host_link_name(enum host_wire_kind link)
-{
-    return links[link];
-}
+const char *const host_strategies[] = {[HOST_SEQUENTIAL] = "sequential",
+                                       [HOST_SPATIAL] = "spatial",
+                                       [HOST_AUTO] = "auto",
+                                       NULL};
+const char *const host_partitions[] = {
+    [HOST_ADAPTIVE] = "adaptive", [HOST_UNIFORM] = "uniform", NULL};
+const char *const host_indexes[] = {
+    [INCODE_NAIVE] = "naive", [INCODE_GRID] = "grid", [INCODE_KD] = "kd", NULL};
+const char *const host_face_rules[] = {
+    [INCODE_FACE_OWN] = "own", [INCODE_FACE_PAPER] = "paper", NULL};
+const char *const host_links[] = {[HOST_WIRE_TCP] = "tcp",
+                                  [HOST_WIRE_SERIAL] = "serial",
+                                  [HOST_WIRE_MPI] = "mpi",
+                                  NULL};
+const char *const host_boards[] = {"linux", NULL};
 
 void host_run_defaults(struct host_run_options *options)
 {

@@ -21,6 +21,7 @@
 #include "tetrahedra.h"
 #include "verify.h"
 
+/* HOST_AUTO is the last: one of those before it. */
 enum host_strategy { HOST_SEQUENTIAL, HOST_SPATIAL, HOST_AUTO };
 
 enum { HOST_OUTPUTS_MAX = 16 };
@@ -83,11 +84,11 @@ struct host_run_result {
 
 void host_run_defaults(struct host_run_options *options);
 
-/* The names of the enumerations, as options and statistics have them. */
-const char *host_strategy_name(enum host_strategy strategy);
-const char *host_partition_name(enum host_partition partition);
-const char *host_index_name(enum incode_index index);
-const char *host_link_name(enum host_wire_kind link);
+/* The names of the enumerations by their values, as options and statistics have
+ * them, and of what a node may run on; a NULL behind them. */
+extern const char *const host_strategies[], *const host_partitions[];
+extern const char *const host_indexes[], *const host_face_rules[];
+extern const char *const host_links[], *const host_boards[];
 
 /* How many nodes the cube gets. */
 unsigned host_run_nodes(const struct host_run_options *options);

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "run.h"
+
 const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
     "loss",      "flip",         "delete",     "insert", "repeat",
     "burst",     "stall",        "one-way",    "cut",    "partition",
@@ -212,12 +214,10 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
 
 void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)
 {
-    static const char *const indexes[] = {"naive", "grid", "kd"};
     fprintf(file, "%llu points %s, %u node%s, %s, %s, %s, %s;",
             (unsigned long long)plan->points, plan->kind, plan->nodes,
             plan->nodes == 1 ? "" : "s",
-            plan->sequential ? "sequential" : "spatial",
-            plan->partition == HOST_UNIFORM ? "uniform" : "adaptive",
-            indexes[plan->index],
-            plan->face_rule == INCODE_FACE_OWN ? "own" : "paper");
+            host_strategies[plan->sequential ? HOST_SEQUENTIAL : HOST_SPATIAL],
+            host_partitions[plan->partition], host_indexes[plan->index],
+            host_face_rules[plan->face_rule]);
 }

@@ -103,11 +103,11 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "tetrahedra", r->tetrahedra);
     put(o, "hull_facets", r->hull_facets);
     put_text(o, "digest", r->digest.text);
-    put_text(o, "strategy", host_strategy_name(r->strategy));
-    put_text(o, "partition", host_partition_name(r->partition));
-    put_text(o, "index", host_index_name(r->index));
-    put_text(o, "link", host_link_name(r->link));
-    put_text(o, "board", "linux");
+    put_text(o, "strategy", host_strategies[r->strategy]);
+    put_text(o, "partition", host_partitions[r->partition]);
+    put_text(o, "index", host_indexes[r->index]);
+    put_text(o, "link", host_links[r->link]);
+    put_text(o, "board", host_boards[0]);
     put(o, "nodes", r->nodes);
     put(o, "memory_bytes", r->memory);
     json_object_set_new(o, "memory_limited", json_boolean(r->limited));

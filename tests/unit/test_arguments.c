@@ -188,12 +188,42 @@ static void test_in_vain(void **unused)
     }
 }
 
+/* Each value of an enumeration has a name, which the options know it by. */
+static void test_names(void **unused)
+{
+    static const struct {
+        const char *option;
+        const char *const *names;
+        int last;
+    } tables[] = {{"--strategy", host_strategies, HOST_AUTO},
+                  {"--partition", host_partitions, HOST_UNIFORM},
+                  {"--index", host_indexes, INCODE_KD},
+                  {"--face-rule", host_face_rules, INCODE_FACE_PAPER},
+                  {"--link", host_links, HOST_WIRE_MPI}};
+    (void)unused;
+    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
+        for (int value = 0; value <= tables[i].last; value++) {
+            struct host_run_options o;
+            struct host_error error;
+            const char *words[] = {tables[i].option, tables[i].names[value],
+                                   "a.xyz", NULL};
+            assert_non_null(words[1]);
+            assert_int_equal(parse(words, &o, &error), 0);
+            const int found[] = {(int)o.strategy, (int)o.partition,
+                                 (int)o.index, (int)o.face_rule, (int)o.link};
+            assert_int_equal(found[i], value);
+        }
+        assert_null(tables[i].names[tables[i].last + 1]);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bytes),    cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_defaults), cmocka_unit_test(test_options),
         cmocka_unit_test(test_refused),  cmocka_unit_test(test_in_vain),
+        cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
