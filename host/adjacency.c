@@ -44,8 +44,9 @@ int host_adjacency_make(struct host_adjacency *a,
     *a = (struct host_adjacency){.tets = tets, .vertices = vertices};
     if (tets->count >= UINT32_MAX) {
         return host_fail(error, HOST_BROKEN,
-                         "host: neighbours of more than 2^32 tetrahedra are "
-                         "not supported; write another format");
+                         "host: the neighbours of 2^32 - 1 tetrahedra or more "
+                         "cannot be numbered, for .ele or a verification; do "
+                         "without these, or take fewer points");
     }
     size_t first = ((size_t)vertices + 1) * sizeof(uint32_t);
     size_t order = (size_t)tets->count * sizeof(uint32_t);

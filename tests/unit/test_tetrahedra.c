@@ -332,6 +332,19 @@ static void neighbours_are_right(void **unused)
     assert_int_equal(remove_folder(&folder), 4);
 }
 
+/* Beyond what numbers a neighbour: told before a tetrahedron is looked at. */
+static void too_many_for_neighbours(void **unused)
+{
+    (void)unused;
+    const struct host_tetrahedra tets = {.count = UINT32_MAX};
+    struct host_adjacency adjacency;
+    struct host_error error = {0};
+    assert_int_equal(host_adjacency_make(&adjacency, &tets, 4, &error),
+                     HOST_BROKEN);
+    assert_non_null(strstr(error.text, "2^32 - 1 tetrahedra or more"));
+    assert_non_null(strstr(error.text, "; do without these"));
+}
+
 static void failures_leave_nothing(void **unused)
 {
     (void)unused;
@@ -559,6 +572,7 @@ int main(void)
         cmocka_unit_test(mapping_and_cutting),
         cmocka_unit_test(written_and_read_back),
         cmocka_unit_test(neighbours_are_right),
+        cmocka_unit_test(too_many_for_neighbours),
         cmocka_unit_test(failures_leave_nothing),
         cmocka_unit_test(links_are_followed),
         cmocka_unit_test(faults_have_their_place),
