@@ -16,9 +16,9 @@ seeds() {
 }
 
 seeds 1 1000
-tail -n 16 "$said"
+tail -n 19 "$said"
 for kind in loss flip delete insert repeat burst stall one-way cut partition \
-    pause crash slow-host tiny dead-wire dead-node; do
+    pause crash slow-host tiny dead-wire dead-node missing-wire second-host; do
     strikes=$(awk -v kind="$kind" '$1 == kind { print $2 }' "$said" | tail -n 1)
     check "simulation/strikes $kind" "only ${strikes:-0} times" \
         [ "${strikes:-0}" -ge 100 ]
