@@ -41,12 +41,22 @@ last() { tail -n 1 "$1" 2>/dev/null | tr -d '\r' | cut -c 1-300; }
 
 # --- the real sets: data/INDEX.md --------------------------------------------
 
-# need_data NAME: ends the script where there is no index of real sets.
-need_data() {
-    [ -r "$INCODE_DATA/INDEX.md" ] && return
-    skip "$1" "there is no $INCODE_DATA/INDEX.md; INCODE_DATA names its folder"
-    exit 0
+# has_data NAME: whether there is an index of real sets; one in which none is
+# found is a failure.
+has_data() {
+    if [ ! -r "$INCODE_DATA/INDEX.md" ]; then
+        skip "$1" \
+            "there is no $INCODE_DATA/INDEX.md; INCODE_DATA names its folder"
+    elif [ -z "$(list_sets)" ]; then
+        fail "$1" "no set is found in $INCODE_DATA/INDEX.md: another layout"
+    else
+        return 0
+    fi
+    return 1
 }
+
+# need_data NAME: ends the script where there are no real sets.
+need_data() { has_data "$1" || exit 0; }
 
 # "name file points distinct tetrahedra digest" for each set of the index.
 list_sets() {
@@ -83,7 +93,7 @@ needs_memory() { grep -q 'needs at least' "$1"; }
 
 # triangulates NAME SET FILE DIGEST [OPTION...]: the run's digest is the one
 # given, and its output the same, byte for byte, as that of SET's first run
-# here.  An index that states a need for more memory gets what it states.
+# here.  `grid` and `naive`, which state what memory they need, get as much.
 triangulates() {
     local name=$1 set=$2 file=$3 digest=$4 out=$scratch/out.npy
     local stats=$scratch/stats.json errors=$scratch/errors found status
@@ -92,7 +102,8 @@ triangulates() {
     rm -f "$out" "$stats"
     incode run "$file" -q --stats "$stats" -o "$out" "$@" 2> "$errors"
     status=$?
-    if [ $status = 2 ] && needs_memory "$errors"; then
+    if [ $status = 2 ] && needs_memory "$errors" &&
+        [[ " $* " =~ ' --index '(grid|naive)' ' ]]; then
         local need
         need=$(sed -n 's/.*needs at least \([0-9]*[KMG]*\).*/\1/p' "$errors")
         incode run "$file" -q --stats "$stats" -o "$out" "$@" \

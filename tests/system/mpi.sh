@@ -46,7 +46,7 @@ incode run - -q --link mpi --nodes 2 -o - < "$scratch/points.xyz" \
 check 'mpi/standard input and output' "exit $?: $(last "$scratch/errors")" \
     cmp -s "$scratch/first.ele" "$scratch/out.ele"
 
-if [ -r "$INCODE_DATA/INDEX.md" ]; then
+if has_data mpi/digests; then
     # Ties, duplicates, curves: the rest is link by link the same.
     while read -r name file count _ _ digest; do
         case $name in
@@ -61,8 +61,6 @@ if [ -r "$INCODE_DATA/INDEX.md" ]; then
         triangulates "mpi/digest of $name" "$name" "$INCODE_DATA/$file" \
             "$digest" --link mpi --nodes 8
     done < <(list_sets)
-else
-    skip 'mpi/digests' "there is no $INCODE_DATA/INDEX.md"
 fi
 
 # --- under mpirun -------------------------------------------------------------
