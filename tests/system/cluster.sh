@@ -12,10 +12,12 @@ check 'cluster/one node' "$(last "$scratch/errors")" \
     test -f "$scratch/first.npy"
 
 # start [OPTION...]: a run in the background; $host its process, $nodes those
-# of its nodes.
+# of its nodes.  The host reads a small part of the result in the first two
+# seconds, so that it is at work for so long, whatever the processors.
 start() {
     rm -f "$scratch/out.npy"
     "$INCODE" run "$points" -q --strategy spatial --nodes 8 \
+        --host-rate 100000 --host-rate-time 2 \
         -o "$scratch/out.npy" "$@" 2> "$scratch/errors" &
     host=$!
     for _ in $(seq 200); do
@@ -25,11 +27,16 @@ start() {
     done
     read -r node _ <<< "$nodes"
 }
+at_work() { # NAME
+    check "cluster/$1: the run was at work" "it had ended: \
+$(last "$scratch/errors")" kill -0 $host
+}
 
 start
 sleep 0.2
 kill -STOP "$node"
 sleep 10
+at_work 'a node stopped for 10 s'
 kill -CONT "$node"
 wait $host
 status=$?
@@ -40,6 +47,7 @@ check 'cluster/the same bytes after it' 'the output differs' \
 
 start
 sleep 0.1
+at_work 'no node outlives the host'
 kill -KILL $host
 wait $host 2> /dev/null
 for _ in $(seq 100); do
@@ -53,6 +61,7 @@ check 'cluster/no node outlives the host' "alive:$alive" test -z "$alive"
 
 start
 sleep 0.1
+at_work 'a terminated run'
 kill -TERM $host
 wait $host
 status=$?

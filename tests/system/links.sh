@@ -33,19 +33,23 @@ same "the host's end closed and reopened" --nodes 8 --link serial \
 base=$((10000 + RANDOM % 20000))
 
 # beside NAME: the function of that name, in a scratch of its own; `gather` says
-# what it has said.
+# what it has said, and whether it came to its end.
 sides=
 beside() {
     mkdir "$scratch/$1"
     openssl rand -hex 32 > "$scratch/$1/cube.key"
-    (scratch=$scratch/$1; "$1") > "$scratch/$1.said" 2> /dev/null &
+    (scratch=$scratch/$1; "$1"; echo 'done') \
+        > "$scratch/$1.said" 2> "$scratch/$1.errors" &
     sides="$sides $1:$!"
 }
 gather() {
     local side
     for side in $sides; do
         wait "${side#*:}"
-        cat "$scratch/${side%:*}.said"
+        grep -vx 'done' "$scratch/${side%:*}.said"
+        check "links/all of ${side%:*} was run" \
+            "it ended before: $(last "$scratch/${side%:*}.errors")" \
+            test "$(tail -n 1 "$scratch/${side%:*}.said")" = 'done'
     done
 }
 # start_nodes CUBE [PATTERN]: those that the user starts; $nodes.
