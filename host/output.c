@@ -392,14 +392,11 @@ void host_output_double(struct host_output *out, double value)
 
 /* --- the end -------------------------------------------------------------- */
 
-/* What the disk cannot take, it may say as late as this. */
+/* What a disk cannot take, it may say as late as this. */
 static void finish(struct host_output *out, struct host_error *error)
 {
     if (out->file >= 0) {
         flush(out);
-        if (out->part != NULL && out->failure == 0 && fsync(out->file) != 0) {
-            out->failure = errno;
-        }
         if (out->file != STDOUT_FILENO && close(out->file) != 0 &&
             out->failure == 0) {
             out->failure = errno;

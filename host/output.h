@@ -4,7 +4,7 @@
  * what was there before stays as it was.
  *
  * Memory: a buffer of 1 MiB an output that is open; its names until the end.
- * Work: one copy, a write a MiB, one wait for the disk.
+ * Work: one copy, a write a MiB.
  *
  *     if (host_output_open(&out, "a.ele", &error) != 0) ...
  *     host_output_unsigned(&out, 7); host_output_text(&out, "\n");
@@ -63,9 +63,8 @@ void host_output_unsigned(struct host_output *out, uint64_t value);
 /* So that reading it gives the same double. */
 void host_output_double(struct host_output *out, double value);
 
-/* Ends the writing of n outputs, which are on the disk then; where one of them
- * is not whole or error->code is not 0, removes their parts.  Returns
- * error->code. */
+/* Ends the writing of n outputs; where one of them is not whole or error->code
+ * is not 0, removes their parts.  Returns error->code. */
 int host_output_close(struct host_output *out, size_t n,
                       struct host_error *error);
 
