@@ -266,7 +266,7 @@ clean:
 help:
 	@echo 'make run [POINTS=FILE]   the main job: set up, build, triangulate'
 	@echo '                         on 8 nodes, verify, write out/, report'
-	@echo 'make test                set up, build, pass all tests (16 minutes)'
+	@echo 'make test                set up, build, pass all tests (16 to 20 minutes)'
 	@echo 'make                     build/incode, build/incode-node, and both for'
 	@echo '                         ranks of MPI'
 	@echo 'make deps                install missing Debian packages'

@@ -561,7 +561,7 @@ static char *read_text(const char *path, struct host_error *error)
     size_t size = text == NULL ? 0 : fread(text, 1, TEXT_MAX + 1, stream);
     int status = 0;
     if (stream == NULL || ferror(stream)) {
-        status = host_fail(error, HOST_INPUT, "%s: %s; give the cube's file",
+        status = host_fail(error, HOST_INPUT, "%s: %s; check name and rights",
                            path, strerror(errno));
     } else if (text == NULL) {
         status = host_fail_memory(error, "the cube file");

@@ -513,6 +513,7 @@ int host_output_printed(struct host_error *error)
     clearerr(stdout);
     return host_fail(error, HOST_INPUT, "standard output: %s; %s",
                      reason != 0 ? strerror(reason) : "writing failed",
-                     reason == EPIPE ? "let its reader read on"
-                                     : "make room and run again");
+                     reason == EPIPE   ? "let its reader read on"
+                     : reason == EBADF ? "give an open one"
+                                       : "make room and run again");
 }
