@@ -26,7 +26,7 @@ SANITIZE = $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all \
 	-fno-omit-frame-pointer -DINCODE_SANITIZED)
 CFLAGS  ?= -g
 MACHINE  = -march=$(ARCH)
-BASE     = -std=c11 $(WARNINGS) $(OPT) $(MACHINE) $(FLOATING) $(SANITIZE) \
+BASE     = -std=c11 -I. $(WARNINGS) $(OPT) $(MACHINE) $(FLOATING) $(SANITIZE) \
 	$(CFLAGS)
 HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
 # V=1 shows every command.
@@ -43,29 +43,28 @@ NODE_INCLUDE = -I$(BUILD)/include
 
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
 # drivers, boards and the host have a system beneath them.
-freestanding := $(wildcard incode/*.c transport/*.c node/*.c)
+files = $(shell find $(1) -name '*.c' | LC_ALL=C sort)
+freestanding := $(call files,incode node) $(wildcard transport/*.c)
 drivers      := $(filter-out %/mpi.c,$(wildcard transport/drivers/*.c))
 # Those that need what a static node has not.
 host_drivers := transport/drivers/serial_port.c
 node_drivers := $(filter-out $(host_drivers),$(drivers))
 board        := $(wildcard boards/*.c boards/linux/*.c)
-host         := $(wildcard host/*.c)
-unit         := $(wildcard tests/unit/test_*.c)
+# Host and node as ranks of Open MPI: no other program is linked with it.
+host_mpi     := host/main_mpi.c $(wildcard host/*/mpi/*.c)
+host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
+unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
 obj          := $(BUILD)/obj
 core_objects := $(freestanding:%.c=$(obj)/%.o)
-host_objects := $(filter-out $(obj)/host/main.o,$(host:%.c=$(obj)/%.o)) \
-	$(drivers:%.c=$(obj)/%.o)
+host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 	$(node_drivers:%.c=$(BUILD)/node/%.o)
-# Host and node as ranks of Open MPI; no other program is linked with it.
-mpi_host     := $(obj)/host/mpi/main.o $(obj)/host/mpi/ranks.o \
-	$(obj)/host/mpi/bench.o \
-	$(obj)/transport/drivers/mpi.o
+mpi_host     := $(host_mpi:%.c=$(obj)/%.o) $(obj)/transport/drivers/mpi.o
 mpi_node     := $(obj)/boards/mpi/main.o $(obj)/boards/process.o \
 	$(obj)/transport/drivers/mpi.o
-unit_tests   := $(unit:tests/unit/%.c=$(BUILD)/tests/%)
+unit_tests   := $(addprefix $(BUILD)/tests/,$(notdir $(unit:.c=)))
 fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
@@ -122,7 +121,7 @@ $(obj)/node/%.o: node/%.c $(BUILD)/flags
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
 $(mpi_host) $(mpi_node) $(obj)/tests/bench/mpi_hops.o \
-	$(obj)/tests/unit/test_mpi.o: private HOSTED += $(MPI_CFLAGS)
+	$(obj)/tests/unit/transport/drivers/test_mpi.o: private HOSTED += $(MPI_CFLAGS)
 $(obj)/transport/drivers/%.o: transport/drivers/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
@@ -131,7 +130,7 @@ $(obj)/transport/%.o: transport/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
-$(obj)/host/sim_seeds.o: host/sim_seeds.c $(BUILD)/flags $(BUILD)/commit
+$(obj)/host/sim/sim_seeds.o: host/sim/sim_seeds.c $(BUILD)/flags $(BUILD)/commit
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(HOSTED) -DINCODE_COMMIT='"$(COMMIT)"' -MMD -MP -c $< -o $@
@@ -148,11 +147,14 @@ $(BUILD)/include/sodium.h:
 	@ln -sfn /usr/include/sodium $(@D)/sodium
 	@ln -sfn /usr/include/sodium.h $@
 
+# A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
-$(BUILD)/tests/%: $(obj)/tests/unit/%.o $(BUILD)/libhost.a $(BUILD)/libcore.a
+$(foreach t,$(unit),$(eval $(BUILD)/tests/$(notdir $(t:.c=)): $(obj)/$(t:.c=.o)))
+$(filter-out %/test_mpi,$(unit_tests)): $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@
-	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) -lcmocka -lgmp -o $@
+	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(HOST_LIBS) -lcmocka \
+		-lgmp -o $@
 
 fuzzers: $(fuzzers)
 $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
@@ -168,8 +170,8 @@ planted: $(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch
 $(BUILD)/tests/incode-twice: planted = incode/star.c -DINCODE_PLANT_TWICE
 $(BUILD)/tests/incode-twice: incode/star.c
 $(BUILD)/tests/incode-lost-batch: planted = \
-	host/intake.c -DINCODE_PLANT_LOST_BATCH
-$(BUILD)/tests/incode-lost-batch: host/intake.c
+	host/service/handlers.c -DINCODE_PLANT_LOST_BATCH
+$(BUILD)/tests/incode-lost-batch: host/service/handlers.c
 $(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch: \
 		$(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
@@ -184,7 +186,7 @@ $(BUILD)/tests/points $(BUILD)/tests/relay: $(BUILD)/tests/%: \
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
 
-$(BUILD)/tests/test_mpi: $(obj)/tests/unit/test_mpi.o \
+$(BUILD)/tests/test_mpi: $(obj)/tests/unit/transport/drivers/test_mpi.o \
 		$(obj)/transport/drivers/mpi.o $(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@
@@ -203,7 +205,7 @@ $(BUILD)/tests/cgal: tests/bench/cgal.cpp
 	$(Q)$(CXX) -std=c++17 -O3 -march=$(ARCH) -frounding-math $< -lgmp -o $@
 
 # The freestanding rooms for bare processors, as archives.
-bare      = -std=c11 $(WARNINGS) -Werror -Os -ffreestanding -ffp-contract=off \
+bare      = -std=c11 -I. $(WARNINGS) -Werror -Os -ffreestanding -ffp-contract=off \
 	-fno-math-errno -ffunction-sections -fdata-sections
 cortex_m3 = -mcpu=cortex-m3 -mthumb -mfloat-abi=soft
 cortex_m7 = -mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16

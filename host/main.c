@@ -5,20 +5,20 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "../incode/predicates.h"
-#include "arguments.h"
-#include "begin.h"
-#include "bench_links.h"
-#include "convert.h"
-#include "gen.h"
-#include "launch.h"
-#include "output.h"
-#include "remote.h"
-#include "report.h"
-#include "run.h"
-#include "sim.h"
-#include "tetrahedra.h"
-#include "verify.h"
+#include "incode/predicates/predicates.h"
+#include "host/run/arguments.h"
+#include "host/run/begin.h"
+#include "host/bench/bench_links.h"
+#include "host/formats/convert.h"
+#include "host/mesh/gen.h"
+#include "host/run/launch.h"
+#include "host/files/output.h"
+#include "host/machines/remote.h"
+#include "host/run/report.h"
+#include "host/run/run.h"
+#include "host/sim/sim.h"
+#include "host/mesh/tetrahedra.h"
+#include "host/check/verify.h"
 
 const char *argp_program_version = "incode 0.1.0";
 

@@ -1,6 +1,6 @@
 #include <string.h>
 
-#include "check.h"
+#include "incode/predicates/check.h"
 #include "state.h"
 
 /* The paper's InCoDe, face by face: any open face is taken, MakeTetra looks for

@@ -1,6 +1,6 @@
 #include <string.h>
 
-#include "check.h"
+#include "incode/predicates/check.h"
 #include "state.h"
 
 /* A first tetrahedron at a vertex v that none has reached (MakeFirstTetra).

@@ -1,7 +1,7 @@
 #include <string.h>
 
-#include "check.h"
-#include "simd.h"
+#include "incode/predicates/check.h"
+#include "incode/maker/simd.h"
 #include "state.h"
 
 /* Closing the star of a vertex: its open faces are taken out of the active face

@@ -8,10 +8,10 @@
 #ifndef INCODE_STATE_H
 #define INCODE_STATE_H
 
-#include "afl.h"
-#include "cells.h"
-#include "gather.h"
-#include "query.h"
+#include "incode/front/afl.h"
+#include "incode/maker/cells.h"
+#include "incode/maker/local_points.h"
+#include "incode/maker/query.h"
 #include "triangulator.h"
 
 enum {

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "check.h"
+#include "incode/predicates/check.h"
 #include "state.h"
 
 /* ---- memory ---- */

@@ -18,8 +18,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pages.h"
-#include "predicates.h"
+#include "incode/pages/pages.h"
+#include "incode/predicates/predicates.h"
 
 enum incode_index { INCODE_NAIVE, INCODE_GRID, INCODE_KD };
 enum incode_face_rule { INCODE_FACE_OWN, INCODE_FACE_PAPER };

@@ -17,7 +17,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "../transport/cube.h"
+#include "transport/cube.h"
 
 /* Who the node is: straps, in the language of boards. */
 struct node_identity {

@@ -15,8 +15,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "../incode/triangulator.h"
-#include "../transport/cube.h"
+#include "incode/triangulator.h"
+#include "transport/cube.h"
 
 enum {
     NODE_PROTOCOL = 3,         /* both ends must agree */

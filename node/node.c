@@ -2,10 +2,10 @@
 
 #include <string.h>
 
-#include "../incode/check.h"
-#include "holder.h"
+#include "incode/predicates/check.h"
+#include "node/roles/holder.h"
 #include "totals.h"
-#include "worker.h"
+#include "node/roles/worker.h"
 
 enum { IDLE_MAX_US = 1000000, FAREWELL_US = 500000 };
 

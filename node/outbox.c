@@ -1,6 +1,6 @@
 #include "outbox.h"
 
-#include "../incode/check.h"
+#include "incode/predicates/check.h"
 
 void node_outbox_init(struct node_outbox *box, void *memory, uint32_t slots)
 {

@@ -7,8 +7,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "../../transport/drivers/secure_sodium.h"
-#include "../../transport/drivers/wait.h"
+#include "transport/drivers/secure_sodium.h"
+#include "transport/drivers/wait.h"
 
 enum { LOOK_US = 500000 };
 

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "../../transport/drivers/mpi.h"
+#include "transport/drivers/mpi.h"
 
 enum { WINDOW = 8, MESSAGE = 1608, ROUNDS = 2000, BULK = 20000 };
 

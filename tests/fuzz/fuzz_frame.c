@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../../transport/check.h"
-#include "../../transport/frame.h"
-#include "../../transport/link.h"
+#include "transport/check.h"
+#include "transport/frame.h"
+#include "transport/link.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

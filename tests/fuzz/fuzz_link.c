@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../../transport/frame.h"
-#include "../../transport/link.h"
+#include "transport/frame.h"
+#include "transport/link.h"
 
 enum {
     PIPE = 4096,

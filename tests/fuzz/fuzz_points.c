@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "../../host/points.h"
+#include "host/mesh/points.h"
 
 static const char *const names[] = {
     "a.xyz", "a.csv", "a.node", "a.ply", "a.off", "a.npy", "a.vtk",   "a.vtu",

@@ -1,7 +1,7 @@
 /* Any bytes as a node's results: vertices in range, and an end. */
 #include <stdlib.h>
 
-#include "../../node/result.h"
+#include "node/result.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -2,8 +2,8 @@
  * can always be sorted and digested. */
 #include <stdlib.h>
 
-#include "../../host/points.h"
-#include "../../host/tetrahedra.h"
+#include "host/mesh/points.h"
+#include "host/mesh/tetrahedra.h"
 
 static const char *const names[] = {"a.ele", "a.vtu",  "a.vtk",
                                     "a.msh", "a.mesh", "a.npy"};

@@ -2,8 +2,8 @@
  * can be merged, settled and routed, and merging it again changes nothing. */
 #include <stdlib.h>
 
-#include "../../transport/learn.h"
-#include "../../transport/routes.h"
+#include "transport/learn.h"
+#include "transport/routes.h"
 
 static struct routes_altered table[2048];
 

@@ -16,9 +16,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../../host/adjacency.h"
-#include "../../host/points.h"
-#include "../../incode/predicates.h"
+#include "host/mesh/adjacency.h"
+#include "host/mesh/points.h"
+#include "incode/predicates/predicates.h"
 
 enum { REFERENCE_FACES = 1 << 18 };
 

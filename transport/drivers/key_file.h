@@ -10,7 +10,7 @@
 #ifndef TRANSPORT_DRIVERS_KEY_FILE_H
 #define TRANSPORT_DRIVERS_KEY_FILE_H
 
-#include "../secure.h"
+#include "transport/secure.h"
 
 enum key_file_state {
     KEY_FILE_GOOD,

@@ -29,7 +29,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "../link.h"
+#include "transport/link.h"
 
 enum {
     MPI_RANKS_MAX = 65,    /* the host and its nodes */

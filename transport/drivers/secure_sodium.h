@@ -7,7 +7,7 @@
 #ifndef TRANSPORT_DRIVERS_SECURE_SODIUM_H
 #define TRANSPORT_DRIVERS_SECURE_SODIUM_H
 
-#include "../secure.h"
+#include "transport/secure.h"
 
 extern const struct secure_suite secure_sodium;
 

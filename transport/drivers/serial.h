@@ -19,7 +19,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "../link.h"
+#include "transport/link.h"
 
 enum { SERIAL_AHEAD_BYTES = 512, SERIAL_AHEAD_US = 4000 };
 

@@ -15,7 +15,7 @@
 
 #include <stdbool.h>
 
-#include "../link.h"
+#include "transport/link.h"
 
 enum {
     SIM_SEGMENTS = 32, /* bursts of bytes on a line at a time */

@@ -15,7 +15,7 @@
 
 #include <stdbool.h>
 
-#include "../link.h"
+#include "transport/link.h"
 
 enum { TCP_BUFFER_BYTES = 65536 };
 

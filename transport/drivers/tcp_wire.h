@@ -28,7 +28,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-#include "../secure.h"
+#include "transport/secure.h"
 #include "tcp.h"
 
 enum {

@@ -1,0 +1,182 @@
+#include "options.h"
+
+#include <string.h>
+#include <unistd.h>
+
+static const char help[] =
+    "Usage: incode-node ARGUMENT VALUE ...\n"
+    "A node of a cube, as a process.  incode cube FILE prints the line for "
+    "each "
+    "node of\n"
+    "a cube file.\n"
+    "\n"
+    "  --node N           its number; without, a neighbour tells it\n"
+    "  --dimension N      of the cube: 2^N nodes, 0 to 10\n"
+    "  --memory BYTES     data memory in all, stack included (4194304)\n"
+    "  --stack BYTES      of it (65536)\n"
+    "  --window N         frames a link and direction, 1 to 64; by memory\n"
+    "  --lines BAUD       the cube has serial lines, the slowest so fast\n"
+    "  --host-wire 0|1    besides node 0, this node has a wire to the host\n"
+    "  --dead US          microseconds of silence after which a link is given "
+    "up; 0: never\n"
+    "  --key FILE         64 hexadecimal digits: the key of the cube\n"
+    "  --board linux      what this program is for: on another it does not "
+    "start\n"
+    "  --wire LINK=WIRE   opens the wire of that link, 0 to dimension (the "
+    "host's):\n"
+    "                     listen:ADDRESS:PORT, call:ADDRESS:PORT (in "
+    "numbers),\n"
+    "                     serial:DEVICE:BAUD or serial:DEVICE:BAUD:rtscts\n"
+    "\n"
+    "Of the host that starts nodes itself:\n"
+    "  --links FD,FD,..   the wires of links 0, 1, .. are these open files\n"
+    "  --epoch N          of this start, never repeated\n"
+    "  --watch US         microseconds to stay awake when there is nothing to "
+    "do\n"
+    "\n"
+    "Exit status: 0 done, 2 wrong usage, 4 it cannot start.\n";
+
+static const char no_such[] = "no such argument";
+static const char see_help[] = "see incode-node --help";
+
+void straps_help(void)
+{
+    (void)!write(STDOUT_FILENO, help, sizeof help - 1);
+}
+
+static bool read_number(const char **text, uint64_t *value)
+{
+    const char *at = *text;
+    *value = 0;
+    while (*at >= '0' && *at <= '9' && *value < UINT64_MAX / 100) {
+        *value = 10 * *value + (uint64_t)(*at++ - '0');
+    }
+    bool good = at != *text;
+    *text = at;
+    return good;
+}
+
+static const char *read_links(const char *text, struct straps *straps)
+{
+    uint64_t fd;
+    while (*text != '\0') {
+        if (straps->links_count == CUBE_LINKS_MAX || !read_number(&text, &fd) ||
+            fd > INT16_MAX || (*text != ',' && *text != '\0')) {
+            return "not open files as in 5,6,7";
+        }
+        straps->links[straps->links_count++] = (int)fd;
+        text += *text == ',';
+    }
+    return NULL;
+}
+
+static const char *read_wire(const char *text, struct straps *straps)
+{
+    const char *at = text;
+    uint64_t link;
+    if (!read_number(&at, &link) || *at != '=') {
+        return "not as in 2=call:10.0.0.1:7001";
+    }
+    if (link >= CUBE_LINKS_MAX) {
+        return "no such link";
+    }
+    if (straps->wire[link] != NULL) {
+        return "that link has a wire already";
+    }
+    straps->wire[link] = text;
+    straps->wires_count++;
+    return NULL;
+}
+
+/* An argument and its value; what is wrong with it, or NULL. */
+static const char *read_one(const char *name, const char *text,
+                            struct straps *straps)
+{
+    const struct {
+        const char *name;
+        uint64_t *value, most;
+    } known[] = {{"--node", &straps->node, (1u << CUBE_DIMENSION_MAX) - 1},
+                 {"--dimension", &straps->dimension, CUBE_DIMENSION_MAX},
+                 {"--memory", &straps->memory, UINT64_C(1) << 40},
+                 {"--stack", &straps->stack, UINT64_C(1) << 40},
+                 {"--window", &straps->window, LINK_WINDOW_MAX},
+                 {"--epoch", &straps->epoch, UINT32_MAX},
+                 {"--lines", &straps->lines, UINT32_MAX},
+                 {"--host-wire", &straps->host_wire, 1},
+                 {"--dead", &straps->dead, UINT32_MAX},
+                 {"--watch", &straps->watch, UINT32_MAX}};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        if (strcmp(name, known[i].name) == 0) {
+            bool good = read_number(&text, known[i].value) && *text == '\0';
+            return !good                             ? "not a number"
+                   : *known[i].value > known[i].most ? "too large"
+                                                     : NULL;
+        }
+    }
+    if (strcmp(name, "--links") == 0) {
+        return read_links(text, straps);
+    }
+    if (strcmp(name, "--wire") == 0) {
+        return read_wire(text, straps);
+    }
+    if (strcmp(name, "--board") == 0) {
+        return strcmp(text, "linux") == 0 ? NULL
+                                          : "another board's program starts it";
+    }
+    if (strcmp(name, "--key") == 0) {
+        straps->key = text;
+        return NULL;
+    }
+    return no_such;
+}
+
+/* Every link has a wire, and there are no others. */
+static bool wires_fit(const struct straps *straps)
+{
+    unsigned links = (unsigned)straps->dimension +
+                     (straps->node == 0 || straps->host_wire != 0 ? 1 : 0);
+    if (straps->node == STRAPS_UNNAMED) {
+        links = straps->links_count + straps->wires_count;
+        if (links == 0) {
+            return false; /* nobody could say who it is */
+        }
+    }
+    if (straps->wires_count == 0) {
+        return straps->links_count == links;
+    }
+    for (unsigned i = 0; i < links; i++) {
+        if (straps->wire[i] == NULL) {
+            return false;
+        }
+    }
+    return straps->links_count == 0 && straps->wires_count == links;
+}
+
+bool straps_read(char **argv, struct straps *straps, struct linux_fault *fault)
+{
+    memset(fault, 0, sizeof *fault);
+    fault->next = see_help;
+    for (; argv[0] != NULL; argv += 2) {
+        fault->where = argv[0];
+        fault->what = "wants a value";
+        if (argv[1] == NULL) {
+            return false;
+        }
+        fault->what = read_one(argv[0], argv[1], straps);
+        if (fault->what != NULL) {
+            fault->value = fault->what == no_such ? NULL : argv[1];
+            return false;
+        }
+    }
+    if (straps->node != STRAPS_UNNAMED &&
+        straps->node >= UINT64_C(1) << straps->dimension) {
+        fault->where = "--node";
+        fault->what = "there is no such node in a cube of that --dimension";
+        return false;
+    }
+    fault->where = straps->links_count > 0 ? "--links" : "--wire";
+    fault->what = "not one for each link: those to neighbours, and to the host "
+                  "from node 0 and with --host-wire 1";
+    fault->next = "incode cube FILE prints those of a cube";
+    return wires_fit(straps);
+}

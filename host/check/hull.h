@@ -1,0 +1,50 @@
+/* Whether facets are the surface of a convex body, each part of it covered
+ * once: exact.
+ *
+ * Two facets at each edge, from opposite sides, no dent at any of them, and
+ * seen from a point inside every facet faces away and one alone lies in a
+ * chosen direction.  That is the check of Mehlhorn and others (Computational
+ * Geometry 12:85-103, 1999): locally convex, and wound once.
+ *
+ * Memory: 56 bytes a facet.  Work: O(f log f).
+ *
+ *     struct host_hull hull = {.points = &points, .tets = &tets};
+ *     host_hull_add(&hull, tet, corner, &error);
+ *     faults = host_hull_check(&hull, &listener, &error);
+ */
+#ifndef HOST_HULL_H
+#define HOST_HULL_H
+
+#include "host/mesh/points.h"
+#include "host/mesh/tetrahedra.h"
+
+struct host_hull_facet {
+    uint32_t tet, corner;
+};
+
+/* What host_hull_check finds wrong, called once an offence. */
+struct host_hull_listener {
+    void *context;
+    void (*fault)(void *context, const uint32_t *vertices, int count,
+                  const char *what);
+};
+
+struct host_hull {
+    const struct host_points *points;
+    const struct host_tetrahedra *tets;
+    struct host_hull_facet *facet;
+    size_t count, capacity;
+    uint64_t vertices; /* found by the check */
+};
+
+int host_hull_add(struct host_hull *hull, uint32_t tet, uint32_t corner,
+                  struct host_error *error);
+
+/* Checks the facets; their tetrahedra must be positive. */
+int host_hull_check(struct host_hull *hull,
+                    const struct host_hull_listener *listener,
+                    struct host_error *error);
+
+void host_hull_free(struct host_hull *hull);
+
+#endif

@@ -1,0 +1,225 @@
+#include "source.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include "host/base/memory.h"
+
+static const struct {
+    const char *extension;
+    enum host_format format;
+} formats[] = {
+    {".xyz", HOST_XYZ},    {".txt", HOST_XYZ},    {".csv", HOST_XYZ},
+    {".node", HOST_NODE},  {".ply", HOST_PLY},    {".off", HOST_OFF},
+    {".npy", HOST_NPY},    {".vtk", HOST_VTK},    {".vtu", HOST_VTU},
+    {".vtp", HOST_VTP},    {".vts", HOST_VTS},    {".x", HOST_PLOT3D},
+    {".p3d", HOST_PLOT3D}, {".bin", HOST_PLOT3D}, {".ele", HOST_ELE},
+    {".msh", HOST_MSH},    {".mesh", HOST_MESH},
+};
+
+static bool ends_in(const char *path, size_t length, const char *extension)
+{
+    size_t n = strlen(extension);
+    return length > n && strncasecmp(path + length - n, extension, n) == 0;
+}
+
+bool host_is_packed(const char *path)
+{
+    return ends_in(path, strlen(path), ".gz");
+}
+
+static size_t plain_length(const char *path)
+{
+    return strlen(path) - (host_is_packed(path) ? 3 : 0);
+}
+
+enum host_format host_format_of(const char *path)
+{
+    size_t length = plain_length(path);
+    for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
+        if (ends_in(path, length, formats[i].extension)) {
+            return formats[i].format;
+        }
+    }
+    return HOST_UNKNOWN;
+}
+
+bool host_is_csv(const char *path)
+{
+    return ends_in(path, plain_length(path), ".csv");
+}
+
+int host_source_fail(const struct host_source *source, struct host_error *error,
+                     const char *what)
+{
+    return host_fail(error, HOST_INPUT, "%s: %s", source->path, what);
+}
+
+static bool reserve(struct host_source *source, size_t more)
+{
+    if (source->capacity - source->bytes >= more) {
+        return true;
+    }
+    size_t capacity = source->capacity * 2 + more;
+    void *owned = host_remap(source->owned, source->capacity, capacity);
+    if (owned == NULL) {
+        return false;
+    }
+    source->owned = owned;
+    source->data = owned;
+    source->capacity = capacity;
+    return true;
+}
+
+static int read_all(struct host_source *source, int file,
+                    struct host_error *error)
+{
+    struct stat status;
+    size_t hint = (size_t)1 << 20;
+    if (fstat(file, &status) == 0) {
+        if (S_ISDIR(status.st_mode)) {
+            return host_source_fail(source, error,
+                                    "it is a directory; name a file in it");
+        }
+        if (S_ISREG(status.st_mode) && status.st_size > 0) {
+            hint = (size_t)status.st_size + 1;
+        }
+    }
+    for (;;) {
+        if (!reserve(source, hint)) {
+            return host_fail_memory(error, source->path);
+        }
+        ssize_t n = read(file, (char *)source->owned + source->bytes,
+                         source->capacity - source->bytes);
+        if (n < 0 && errno == EINTR) {
+            continue;
+        }
+        if (n < 0) {
+            return host_fail(error, HOST_INPUT,
+                             "%s: cannot be read (%s); check the disk",
+                             source->path, strerror(errno));
+        }
+        if (n == 0) {
+            return 0;
+        }
+        source->bytes += (size_t)n;
+        hint = (size_t)1 << 16;
+    }
+}
+
+static bool all_zero(const uint8_t *bytes, size_t n)
+{
+    while (n > 0 && bytes[n - 1] == 0) {
+        n--;
+    }
+    return n == 0;
+}
+
+static int inflate_members(struct host_source *out, z_stream *z,
+                           struct host_error *error)
+{
+    for (;;) {
+        if (!reserve(out, (size_t)1 << 16)) {
+            return host_fail_memory(error, out->path);
+        }
+        size_t room = out->capacity - out->bytes;
+        room = room > (size_t)1 << 30 ? (size_t)1 << 30 : room;
+        z->next_out = (uint8_t *)out->owned + out->bytes;
+        z->avail_out = (uInt)room;
+        int status = inflate(z, Z_NO_FLUSH);
+        out->bytes += room - z->avail_out;
+        if (status == Z_STREAM_END) {
+            if (all_zero(z->next_in, z->avail_in)) {
+                return 0; /* padding of a tape or a disk, if any */
+            }
+            status = inflateReset(z); /* another member follows */
+        }
+        if (status == Z_BUF_ERROR && z->avail_in == 0) {
+            return host_source_fail(out, error,
+                                    "the packed data is cut short; get the "
+                                    "file whole");
+        }
+        if (status != Z_OK && status != Z_BUF_ERROR) {
+            return host_source_fail(out, error,
+                                    "the packed data is damaged; test it with "
+                                    "gzip -t and get it again");
+        }
+    }
+}
+
+/* Replaces packed bytes by what they hold. */
+static int unpack(struct host_source *source, struct host_error *error)
+{
+    struct host_source out = {.path = source->path};
+    z_stream z;
+    memset(&z, 0, sizeof z);
+    if (source->bytes > UINT32_MAX) {
+        return host_source_fail(source, error,
+                                "more than 4 GiB packed; unpack it first");
+    }
+    z.next_in = (z_const Bytef *)source->data;
+    z.avail_in = (uInt)source->bytes;
+    if (inflateInit2(&z, 15 + 16) != Z_OK) {
+        return host_fail_memory(error, "unpacking");
+    }
+    int code = inflate_members(&out, &z, error);
+    (void)inflateEnd(&z);
+    host_source_close(source);
+    *source = out;
+    return code;
+}
+
+static int finish(struct host_source *source, struct host_error *error)
+{
+    if (error->code == 0 && source->bytes > 0 && host_is_packed(source->path)) {
+        unpack(source, error);
+    }
+    if (error->code == 0 && source->bytes == 0) {
+        host_source_fail(source, error,
+                         "the file is empty; give one with points");
+    }
+    if (error->code != 0) {
+        host_source_close(source);
+    }
+    return error->code;
+}
+
+int host_source_open(struct host_source *source, const char *path,
+                     struct host_error *error)
+{
+    bool standard = strcmp(path, "-") == 0;
+    *source = (struct host_source){.path = standard ? "stdin" : path};
+    int file = standard ? 0 : open(path, O_RDONLY | O_CLOEXEC);
+    if (file < 0) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: cannot be opened (%s); check name and rights",
+                         path, strerror(errno));
+    }
+    read_all(source, file, error);
+    if (!standard) {
+        (void)close(file);
+    }
+    return finish(source, error);
+}
+
+int host_source_wrap(struct host_source *source, const char *path,
+                     const void *data, size_t bytes, struct host_error *error)
+{
+    bool standard = strcmp(path, "-") == 0;
+    *source = (struct host_source){
+        .path = standard ? "stdin" : path, .data = data, .bytes = bytes};
+    return finish(source, error);
+}
+
+void host_source_close(struct host_source *source)
+{
+    host_unmap(source->owned, source->capacity);
+    source->owned = NULL;
+    source->data = NULL;
+    source->bytes = source->capacity = 0;
+}

@@ -1,0 +1,141 @@
+#include "convert.h"
+
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "claims.h"
+#include "host/files/output.h"
+#include "host/mesh/points.h"
+#include "host/files/source.h"
+#include "host/mesh/tetrahedra.h"
+#include "write.h"
+
+/* Whether `out` leaves `in`, which is read, as it is. */
+static int check_claims(const char *in, const char *out,
+                        struct host_error *error)
+{
+    struct host_claims claims = {0};
+    host_claims_read(&claims, in, error);
+    host_claims_write(&claims, "", out, error);
+    host_claims_free(&claims);
+    return error->code;
+}
+
+/* The points of a file of tetrahedra that holds none: the .node beside it. */
+static int points_beside(const char *in, const char *out,
+                         struct host_points *points, struct host_error *error)
+{
+    size_t n = strlen(in) - (host_is_packed(in) ? strlen(".gz") : 0);
+    char *name = malloc(n + sizeof ".node.gz");
+    if (name == NULL) {
+        return host_fail_memory(error, "a name");
+    }
+    memcpy(name, in, n);
+    name[n] = '\0';
+    char *end = strrchr(name, '.'); /* the format was known by it */
+    end = end == NULL ? name + n : end;
+    strcpy(end, ".node");
+    if (access(name, R_OK) != 0) {
+        strcpy(end, ".node.gz");
+    }
+    if (access(name, R_OK) != 0) {
+        strcpy(end, ".node");
+        host_fail(error, HOST_INPUT,
+                  "%s: it holds no points and there is no %s; put the points "
+                  "there",
+                  in, name);
+    } else if (check_claims(name, out, error) == 0) {
+        host_points_read(name, points, error);
+    }
+    free(name);
+    return error->code;
+}
+
+static int check_rows(const char *in, const struct host_tetrahedra *tets,
+                      const struct host_points *points,
+                      struct host_error *error)
+{
+    for (uint64_t i = 0; i < tets->count; i++) {
+        for (int k = 0; k < 4; k++) {
+            if (tets->v[i][k] >= points->count) {
+                return host_fail(error, HOST_INPUT,
+                                 "%s: tetrahedron %llu has vertex %u of %llu "
+                                 "points; give the points that belong to it",
+                                 in, (unsigned long long)i, tets->v[i][k],
+                                 (unsigned long long)points->count);
+            }
+        }
+    }
+    return 0;
+}
+
+static int convert_tetrahedra(const char *in, const char *out,
+                              struct host_error *error)
+{
+    struct host_tetrahedra tets;
+    struct host_points points;
+    if (host_tetrahedra_read(in, &tets, &points, error) != 0) {
+        return error->code;
+    }
+    bool needed = host_format_of(out) != HOST_NPY && strcmp(out, "-") != 0;
+    if (needed && points.count == 0) {
+        points_beside(in, out, &points, error);
+    }
+    if (error->code == 0 &&
+        (!needed || check_rows(in, &tets, &points, error) == 0)) {
+        host_tetrahedra_sort(&tets);
+        host_write(out, &points, &tets, error);
+    }
+    host_tetrahedra_free(&tets);
+    host_points_free(&points);
+    return error->code;
+}
+
+/* Formats that hold nothing but tetrahedra, on either side, decide. */
+static bool holds_tetrahedra(const char *path)
+{
+    enum host_format format = host_format_of(path);
+    return format == HOST_ELE || format == HOST_MSH || format == HOST_MESH;
+}
+
+/* .vtu, .vtk and .npy may hold either. */
+static bool has_tetrahedra(const char *path)
+{
+    enum host_format format = host_format_of(path);
+    if (format != HOST_VTU && format != HOST_VTK && format != HOST_NPY) {
+        return false;
+    }
+    struct host_tetrahedra tets;
+    struct host_error error = {0};
+    bool any =
+        host_tetrahedra_read(path, &tets, NULL, &error) == 0 && tets.count > 0;
+    host_tetrahedra_free(&tets);
+    return any;
+}
+
+static int convert(const char *in, const char *out, struct host_error *error)
+{
+    enum host_format to = host_format_of(out);
+    bool either = to == HOST_VTU || to == HOST_VTK || to == HOST_NPY;
+    if (check_claims(in, out, error) != 0) {
+        return error->code;
+    }
+    if (holds_tetrahedra(in) || holds_tetrahedra(out) ||
+        (either && has_tetrahedra(in))) {
+        return convert_tetrahedra(in, out, error);
+    }
+    struct host_points points;
+    if (host_points_read(in, &points, error) == 0) {
+        host_points_write(out, &points, error);
+        host_points_free(&points);
+    }
+    return error->code;
+}
+
+int host_convert(const char *in, const char *out, struct host_error *error)
+{
+    (void)convert(in, out, error);
+    return host_output_commit(error);
+}

@@ -1,0 +1,18 @@
+/* One file to another by their extensions: points to points, or tetrahedra to
+ * tetrahedra (which are brought into canonical order).
+ *
+ * Memory: the contents once.  Work: reading plus writing.
+ *
+ *     host_convert("bunny.ply", "bunny.npy", &error);
+ *     host_convert("a.ele", "a.vtu", &error);
+ */
+#ifndef HOST_CONVERT_H
+#define HOST_CONVERT_H
+
+#include "host/base/error.h"
+
+/* A tetrahedra file that holds no points (.ele, .npy) takes them from the
+ * .node beside it, packed or not, where the target needs them. */
+int host_convert(const char *in, const char *out, struct host_error *error);
+
+#endif

@@ -1,0 +1,65 @@
+/* The cube file: which nodes there are, and how they are wired.  README.md has
+ * the format, boards/linux/ an example for each kind of wire.
+ *
+ * Memory: about 600 bytes a wire.  Work: one pass over the file, and a look-up
+ * for each host name.
+ *
+ *     if (host_cube_file_read(&file, "lab.cube", &error) != 0) ... error.text
+ *     host_cube_straps(&file, 3, straps, sizeof straps);
+ *     host_cube_file_free(&file);
+ */
+#ifndef HOST_CUBE_FILE_H
+#define HOST_CUBE_FILE_H
+
+#include "transport/drivers/serial_port.h"
+#include "transport/drivers/tcp_wire.h"
+#include "host/base/error.h"
+#include "host/service/machine.h"
+
+enum { HOST_STRAPS_MAX = 64, HOST_STRAP_BYTES = 256 };
+
+/* From a node to another, or to the host: CUBE_HOST. */
+struct host_cube_wire {
+    uint16_t node, to;
+    unsigned line; /* of the file */
+    bool serial;   /* else TCP: `node` listens, `to` calls */
+    struct tcp_address at, via;
+    char device[2][SERIAL_NAME_MAX]; /* at either end */
+    uint32_t baud;
+    bool rts_cts;
+};
+
+struct host_cube_file {
+    const char *path;
+    unsigned nodes, dimension;
+    const char *board; /* one of host_boards */
+    uint64_t memory;
+    unsigned window;
+    unsigned dead_s; /* a link silent so long is given up; 0: never */
+    char key_path[HOST_STRAP_BYTES];
+    bool has_key;
+    uint8_t key[SECURE_KEY_BYTES];
+    uint32_t line_baud; /* of the slowest serial line; 0: there is none */
+    struct host_cube_wire *wire;
+    unsigned wires;
+    bool local[HOST_NODES_MAX]; /* the host starts this node itself */
+};
+
+/* 0, or HOST_INPUT with file and line, or HOST_CUBE for a name that is not
+ * found. */
+int host_cube_file_read(struct host_cube_file *file, const char *path,
+                        struct host_error *error);
+void host_cube_file_free(struct host_cube_file *file);
+
+/* The k-th wire of the host, 0 or 1; NULL: none. */
+const struct host_cube_wire *
+host_cube_host_wire(const struct host_cube_file *file, unsigned k);
+
+/* The arguments of a node's program, without its name: how many. */
+unsigned host_cube_straps(const struct host_cube_file *file, unsigned node,
+                          char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES]);
+
+/* `incode cube FILE`: prints how each node is started. */
+int host_cube_print(const char *path, struct host_error *error);
+
+#endif

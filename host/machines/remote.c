@@ -1,0 +1,291 @@
+#include "remote.h"
+
+#include <errno.h>
+#include <sodium.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+#include "transport/drivers/secure_sodium.h"
+#include "cluster.h"
+#include "host/base/progress.h"
+#include "host/run/run.h"
+
+/* In the child: becomes the node. */
+static void become_node(const void *context, unsigned node)
+{
+    static char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES];
+    const struct host_remote *r = context;
+    char *argv[HOST_STRAPS_MAX + 2] = {(char[]){"incode-node"}};
+    char *no_environment[] = {NULL};
+    unsigned count = host_cube_straps(r->file, node, straps);
+    for (unsigned i = 0; i < count; i++) {
+        argv[1 + i] = straps[i];
+    }
+    execve(r->program, argv, no_environment);
+}
+
+static int start_node(struct host_remote *r, unsigned node,
+                      struct host_error *error)
+{
+    const struct host_child child = {node, r->program,
+                                     "start it yourself and take it from start",
+                                     become_node, r};
+    return host_child_start(&r->process[node], &child, error);
+}
+
+static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
+                     struct host_error *error)
+{
+    const struct host_cube_file *file = r->file;
+    struct host_port *port = &r->port[r->ports];
+    if (wire->serial) {
+        struct serial_port_settings s = {.baud = wire->baud,
+                                         .rts_cts = wire->rts_cts,
+                                         .dtr = true,
+                                         .rts = true};
+        memcpy(s.name, wire->device[1], sizeof s.name);
+        if (host_port_serial(port, &s, error) != 0) {
+            return error->code;
+        }
+    } else {
+        struct tcp_wire_config config = {.address = wire->via};
+        config.suite = file->has_key ? &secure_sodium : NULL;
+        config.key = file->key;
+        if (host_port_net(port, &config, error) != 0) {
+            return error->code;
+        }
+    }
+    r->ports++;
+    return 0;
+}
+
+int host_remote_start(struct host_remote *remote,
+                      const struct host_cube_file *file, const char *program,
+                      struct host_error *error)
+{
+    int status = 0;
+    if (sodium_init() < 0) { /* the fastest code for this processor */
+        return host_fail(error, HOST_BROKEN,
+                         "libsodium does not start; install it anew");
+    }
+    memset(remote, 0, sizeof *remote);
+    remote->file = file;
+    remote->program = program;
+    for (unsigned i = 0; i < file->nodes && status == 0; i++) {
+        if (file->local[i]) {
+            status = start_node(remote, i, error);
+        }
+    }
+    for (unsigned k = 0; k < HOST_PORTS_MAX && status == 0; k++) {
+        const struct host_cube_wire *wire = host_cube_host_wire(file, k);
+        if (wire != NULL) {
+            status = open_port(remote, wire, error);
+        }
+    }
+    if (status != 0) {
+        host_remote_stop(remote);
+    }
+    return status;
+}
+
+void host_remote_stop(struct host_remote *remote)
+{
+    for (unsigned i = 0; i < remote->file->nodes; i++) {
+        (void)host_child_kill(&remote->process[i]);
+        host_child_wait(&remote->process[i]);
+    }
+    while (remote->ports > 0) {
+        host_port_close(&remote->port[--remote->ports]);
+    }
+}
+
+/* --- as a machine --------------------------------------------------------- */
+
+static uint64_t machine_now_us(void *context)
+{
+    (void)context;
+    return host_now_us();
+}
+
+static void machine_idle(void *context, uint64_t wait_us)
+{
+    struct host_remote *r = context;
+    host_port_idle(r->port, r->ports, wait_us, 0);
+}
+
+static int machine_check(void *context, struct host_error *error)
+{
+    struct host_remote *r = context;
+    if (!host_child_any_died()) {
+        return 0;
+    }
+    for (unsigned i = 0; i < r->file->nodes; i++) {
+        unsigned link = host_link_to(i, 0, r->file->dimension);
+        if (!host_child_died(&r->process[i])) {
+            continue;
+        }
+        if (host_child_check(&r->process[i], i, link, error) != 0 ||
+            start_node(r, i, error) != 0) {
+            return error->code;
+        }
+        r->restarts++;
+    }
+    return 0;
+}
+
+static unsigned machine_restarts(void *context)
+{
+    return ((struct host_remote *)context)->restarts;
+}
+
+static bool machine_kill(void *context, unsigned node)
+{
+    const struct host_remote *r = context;
+    return host_child_kill(&r->process[node]);
+}
+
+/* The host hears of the keys on its own wires alone. */
+static const char *machine_doubt(void *context, unsigned node)
+{
+    const struct host_remote *r = context;
+    const char *doubt = NULL;
+    for (unsigned i = 0; i < r->ports; i++) {
+        if (host_cube_host_wire(r->file, i)->node == node &&
+            host_port_other_key(&r->port[i])) {
+            doubt = "answers, but with another key; give both ends the same "
+                    "key file";
+        }
+    }
+    return doubt;
+}
+
+static void machine_rest(void *context, uint64_t rest_us)
+{
+    struct host_remote *r = context;
+    for (unsigned i = 0; i < r->ports; i++) {
+        host_port_rest(&r->port[i], rest_us);
+    }
+}
+
+/* Nothing tells of nodes elsewhere, and those here begin anew. */
+static bool machine_ended(void *context)
+{
+    (void)context;
+    return true;
+}
+
+static void machine_stop(void *context)
+{
+    host_remote_stop(context);
+}
+
+/* A node that starts again may need a moment to find its neighbours. */
+static uint8_t absent_s(const struct host_cube_file *file)
+{
+    unsigned s = file->dead_s;
+    return (uint8_t)(s == 0                  ? 0
+                     : s < HOST_ABSENT_MIN_S ? HOST_ABSENT_MIN_S
+                     : s > UINT8_MAX         ? UINT8_MAX
+                                             : s);
+}
+
+struct host_machine host_remote_machine(struct host_remote *remote)
+{
+    const struct host_cube_wire *second = host_cube_host_wire(remote->file, 1);
+    struct host_machine machine;
+    memset(&machine, 0, sizeof machine);
+    machine.context = remote;
+    machine.nodes = remote->file->nodes;
+    machine.dimension = remote->file->dimension;
+    machine.line_baud = remote->file->line_baud;
+    machine.absent_s = absent_s(remote->file);
+    while (machine.epoch == 0) {
+        (void)!getrandom(&machine.epoch, sizeof machine.epoch, 0);
+    }
+    machine.pipe = host_port_pipe(&remote->port[0]);
+    if (second != NULL) {
+        machine.spare_node = second->node;
+        machine.spare = host_port_pipe(&remote->port[1]);
+    }
+    machine.now_us = machine_now_us;
+    machine.idle = machine_idle;
+    machine.check = machine_check;
+    /* Without them, nodes are waited for as patiently as the user wants. */
+    bool all_here = true;
+    for (unsigned i = 0; i < machine.nodes; i++) {
+        all_here = all_here && remote->file->local[i];
+    }
+    machine.restarts = all_here ? machine_restarts : NULL;
+    machine.kill = machine_kill;
+    machine.keyed = remote->file->has_key;
+    machine.doubt = machine_doubt;
+    machine.rest = machine_rest;
+    machine.ended = machine_ended;
+    machine.stop = machine_stop;
+    return machine;
+}
+
+/* --- for a run ------------------------------------------------------------ */
+
+/* One run a program. */
+static struct host_cube_file the_file;
+
+/* Whether there are nodes that the host starts. */
+static bool starts_some(const struct host_cube_file *file)
+{
+    bool some = false;
+    for (unsigned i = 0; i < file->nodes; i++) {
+        some = some || file->local[i];
+    }
+    return some;
+}
+
+static int begin(const struct host_run_options *options,
+                 struct host_run_result *result, struct host_machine *machine,
+                 struct host_error *error)
+{
+    static struct host_remote remote;
+    static char program[4096];
+    (void)result;
+    if ((starts_some(&the_file) &&
+         host_cluster_program(options->node_program, program, sizeof program,
+                              error) != 0) ||
+        host_remote_start(&remote, &the_file, program, error) != 0) {
+        return error->code;
+    }
+    *machine = host_remote_machine(&remote);
+    return 0;
+}
+
+int host_remote_prepare(struct host_run_options *options,
+                        struct host_error *error)
+{
+    unsigned asked = options->nodes;
+    if (host_cube_file_read(&the_file, options->cube, error) != 0) {
+        return error->code;
+    }
+    if (asked != 0 && asked != the_file.nodes) {
+        return host_fail(error, HOST_USAGE,
+                         "--nodes %u: the cube of %s has %u; leave it out",
+                         asked, options->cube, the_file.nodes);
+    }
+    if (options->table) {
+        return host_fail(error, HOST_USAGE,
+                         "--table: compares with one node, and the cube of %s "
+                         "has its own; leave it out",
+                         options->cube);
+    }
+    if (options->node_program != NULL && !starts_some(&the_file)) {
+        return host_fail(error, HOST_USAGE,
+                         "--node-program: the host starts none of the nodes of "
+                         "%s; leave it out",
+                         options->cube);
+    }
+    options->nodes = the_file.nodes;
+    options->memory = the_file.memory;
+    options->link = the_file.line_baud != 0 ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
+    options->begin = begin;
+    return 0;
+}

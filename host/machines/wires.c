@@ -1,0 +1,95 @@
+#include "wires.h"
+
+#include <errno.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "transport/drivers/serial.h"
+#include "transport/drivers/tcp.h"
+
+/* How a wire of each kind is made, and what it may lack. */
+static const struct {
+    int (*pair)(int fds[2]);
+    const char *needs;
+} kinds[] = {
+    [HOST_WIRE_TCP] = {tcp_pair, "loopback connections"},
+    [HOST_WIRE_SERIAL] = {serial_pair, "pseudo-terminals"},
+};
+
+static void close_end(int *end)
+{
+    if (*end >= 0) {
+        close(*end);
+        *end = -1;
+    }
+}
+
+static int make_between_nodes(struct host_wires *wires,
+                              enum host_wire_kind kind, unsigned nodes,
+                              unsigned dimension, struct host_error *error)
+{
+    int pair[2];
+    for (unsigned i = 0; i < nodes; i++) {
+        for (unsigned d = 0; d < dimension; d++) {
+            unsigned other = i ^ 1u << d;
+            if (other < i) {
+                continue;
+            }
+            if (kinds[kind].pair(pair) != 0) {
+                return host_fail(error, HOST_CUBE,
+                                 "wire between nodes %u and %u: %s; are %s "
+                                 "and %u open files allowed?",
+                                 i, other, strerror(errno), kinds[kind].needs,
+                                 nodes * (dimension + 1) + 16);
+            }
+            wires->end[i][d] = pair[0];
+            wires->end[other][d] = pair[1];
+        }
+    }
+    return 0;
+}
+
+int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
+                    unsigned nodes, unsigned dimension,
+                    struct host_error *error)
+{
+    int pair[2];
+    memset(wires, -1, sizeof *wires);
+    wires->host_path[0] = '\0';
+    if (make_between_nodes(wires, kind, nodes, dimension, error) != 0) {
+        host_wires_close(wires);
+        return error->code;
+    }
+    if (kinds[kind].pair(pair) != 0) {
+        int reason = errno;
+        host_wires_close(wires);
+        return host_fail(error, HOST_CUBE,
+                         "wire between host and node 0: %s; are %s allowed?",
+                         strerror(reason), kinds[kind].needs);
+    }
+    wires->end[0][dimension] = pair[0];
+    wires->host = pair[1];
+    if (kind == HOST_WIRE_SERIAL &&
+        ttyname_r(pair[1], wires->host_path, sizeof wires->host_path) != 0) {
+        host_wires_close(wires);
+        return host_fail(error, HOST_CUBE,
+                         "wire between host and node 0: a pseudo-terminal "
+                         "without a name; is /dev/pts mounted?");
+    }
+    return 0;
+}
+
+void host_wires_close_nodes(struct host_wires *wires)
+{
+    for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
+        for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
+            close_end(&wires->end[i][d]);
+        }
+    }
+}
+
+void host_wires_close(struct host_wires *wires)
+{
+    host_wires_close_nodes(wires);
+    close_end(&wires->host);
+}

@@ -1,0 +1,43 @@
+/* The wires between nodes that this machine emulates, and from the host to node
+ * 0: pairs of open files, one end for each side, by kind.
+ *
+ * Memory: 4 bytes for each port of HOST_PROCESSES_MAX nodes; in the kernel what
+ * a wire of its kind takes.  Work: a few system calls a wire.
+ *
+ *     host_wires_make(&wires, HOST_WIRE_TCP, nodes, dimension, &error);
+ *     ... hand wires.end[node][link] to the nodes, use wires.host ...
+ *     host_wires_close(&wires);
+ */
+#ifndef HOST_WIRES_H
+#define HOST_WIRES_H
+
+#include "transport/cube.h"
+#include "host/base/error.h"
+
+enum { HOST_PROCESSES_MAX = 64 }; /* nodes on one machine */
+
+enum host_wire_kind {
+    HOST_WIRE_TCP,
+    HOST_WIRE_SERIAL,
+    HOST_WIRE_MPI /* made by host/mpi */
+};
+
+struct host_wires {
+    int host;           /* the host's end of its wire to node 0; -1: none */
+    char host_path[64]; /* of it, where it is a terminal */
+    int end[HOST_PROCESSES_MAX][CUBE_LINKS_MAX]; /* [node][link]; -1: none */
+};
+
+/* All ends non-blocking and closed on exec.  HOST_CUBE where the machine does
+ * not give so many; what was made is closed then. */
+int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
+                    unsigned nodes, unsigned dimension,
+                    struct host_error *error);
+
+/* Closes the nodes' ends here, once the nodes have theirs. */
+void host_wires_close_nodes(struct host_wires *wires);
+
+/* Closes all. */
+void host_wires_close(struct host_wires *wires);
+
+#endif

@@ -1,0 +1,68 @@
+/* A growing list of tetrahedra, 16 bytes each, its canonical order and its
+ * digest.
+ *
+ * Memory: 16 bytes a tetrahedron, grown without a second copy, sorted in
+ * place.  Work: appending is amortised O(1); sorting about 40 ns a row.
+ *
+ *     uint32_t(*v)[4] = host_tetrahedra_room(&tets, 100, &error);
+ *     ... fill v[0..n) ...; host_tetrahedra_keep(&tets, n);
+ *     host_tetrahedra_map(&tets, order.row); host_tetrahedra_sort(&tets);
+ */
+#ifndef HOST_TETRAHEDRA_H
+#define HOST_TETRAHEDRA_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "host/base/error.h"
+
+struct host_tetrahedra {
+    uint32_t (*v)[4]; /* [count] four vertices of positive orientation */
+    uint64_t count;
+    uint64_t capacity;
+};
+
+/* "sha256:" and 64 hexadecimal digits. */
+struct host_digest {
+    char text[72];
+};
+
+/* Room for n more rows at v + count; NULL without memory.  The rows count
+ * from host_tetrahedra_keep on.  Rows may move in memory. */
+uint32_t (*host_tetrahedra_room(struct host_tetrahedra *tets, uint64_t n,
+                                struct host_error *error))[4];
+static inline void host_tetrahedra_keep(struct host_tetrahedra *tets,
+                                        uint64_t n)
+{
+    tets->count += n;
+}
+
+/* Drops all rows past `count` (a region that starts again). */
+void host_tetrahedra_cut(struct host_tetrahedra *tets, uint64_t count);
+
+/* Replaces every vertex number by map[vertex]. */
+void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map);
+
+/* Brings every row into the canonical form (smallest vertex first, then the
+ * even permutation whose second is smallest) and the rows into the order of
+ * the digest (by vertices sorted ascending).  Two threads, in place. */
+void host_tetrahedra_sort(struct host_tetrahedra *tets);
+
+/* SHA-256 of the sorted rows, each ascending, as little-endian words. */
+void host_digest(const struct host_tetrahedra *tets,
+                 struct host_digest *digest);
+
+/* Reads .ele, .vtu, .vtk, .msh, .mesh, .npy (.gz allowed, "-" is .ele), rows
+ * numbered from 0; rows are as in the file, neither sorted nor checked.
+ * `points`, where not NULL, takes the file's points, if it has any (else it
+ * stays empty). */
+struct host_points;
+int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
+                         struct host_points *points, struct host_error *error);
+int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
+                          struct host_tetrahedra *tets,
+                          struct host_points *points, struct host_error *error);
+
+void host_tetrahedra_free(struct host_tetrahedra *tets);
+
+#endif

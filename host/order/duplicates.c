@@ -1,0 +1,245 @@
+#include "duplicates.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "host/base/memory.h"
+#include "host/base/parallel.h"
+
+enum {
+    AHEAD = 16, /* rows hashed ahead, so that their slots come from memory */
+    FORK_ROWS = 1 << 13, /* fewer rows are not worth a thread: to search, */
+    COPY_ROWS = 1 << 17, /* to copy */
+    PARTS_MAX = 16
+};
+
+static const uint64_t empty = UINT64_MAX;
+
+/* A table for each part of the hash values, so that threads share nothing. */
+struct table {
+    uint64_t *slot; /* upper hash bits and row, or empty */
+    size_t slots;   /* a power of two */
+};
+
+struct search {
+    const double *xyz;
+    uint64_t rows;
+    unsigned parts;
+    struct table table[PARTS_MAX];
+    uint32_t *lowest; /* [rows], or NULL */
+    uint8_t *doubled; /* [rows] 1 where an earlier row is equal, or NULL */
+    uint64_t distinct[PARTS_MAX];
+    struct host_item *items;
+    uint64_t first[PARTS_MAX + 1];
+    uint64_t negative_zeros[PARTS_MAX];
+    double lo[PARTS_MAX][3], hi[PARTS_MAX][3];
+};
+
+static uint64_t bits_of(double c)
+{
+    uint64_t bits;
+    c += 0.0; /* -0.0 becomes 0.0 */
+    memcpy(&bits, &c, sizeof bits);
+    return bits;
+}
+
+static uint64_t hash(const double *p)
+{
+    uint64_t h = bits_of(p[0]) * UINT64_C(0x9e3779b97f4a7c15);
+    h = ((h ^ (h >> 32)) + bits_of(p[1])) * UINT64_C(0xbf58476d1ce4e5b9);
+    h = ((h ^ (h >> 29)) + bits_of(p[2])) * UINT64_C(0x94d049bb133111eb);
+    return h ^ (h >> 32);
+}
+
+static bool same(const double *p, const double *q)
+{
+    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
+}
+
+/* Enters a row, or finds the equal one that was there before. */
+static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
+                      uint32_t row)
+{
+    size_t mask = table->slots - 1, at = (size_t)h & mask;
+    uint64_t mark = h & UINT64_C(0xffffffff00000000);
+    for (; table->slot[at] != empty; at = (at + 1) & mask) {
+        uint64_t slot = table->slot[at];
+        if ((slot & UINT64_C(0xffffffff00000000)) == mark) {
+            uint32_t other = (uint32_t)slot;
+            if (same(s->xyz + 3 * (size_t)other, s->xyz + 3 * (size_t)row)) {
+                return other;
+            }
+        }
+    }
+    table->slot[at] = mark | row;
+    return row;
+}
+
+/* Rows whose hash belongs to the part, in input order: so the first of equal
+ * rows is the lowest. */
+static void search_part(void *context, unsigned part)
+{
+    struct search *s = context;
+    struct table *table = &s->table[part];
+    memset(table->slot, 0xff, table->slots * sizeof *table->slot);
+    uint64_t waiting[AHEAD];
+    uint32_t waiting_row[AHEAD];
+    uint64_t queued = 0, taken = 0, distinct = 0;
+    for (uint64_t row = 0; row < s->rows || taken < queued;) {
+        if (row < s->rows && queued - taken < AHEAD) {
+            uint64_t h = hash(s->xyz + 3 * row);
+            if ((h >> 40) % s->parts == part) {
+                waiting[queued % AHEAD] = h;
+                waiting_row[queued % AHEAD] = (uint32_t)row;
+                __builtin_prefetch(&table->slot[h & (table->slots - 1)], 1);
+                queued++;
+            }
+            row++;
+            continue;
+        }
+        uint32_t mine = waiting_row[taken % AHEAD];
+        uint32_t other = enter(s, table, waiting[taken % AHEAD], mine);
+        taken++;
+        distinct += other == mine;
+        if (s->lowest != NULL) {
+            s->lowest[mine] = other;
+        }
+        if (s->doubled != NULL && other != mine) {
+            s->doubled[mine] = 1;
+        }
+    }
+    s->distinct[part] = distinct;
+}
+
+static bool run_search(struct search *s)
+{
+    s->parts = s->rows < FORK_ROWS ? 1 : host_threads();
+    size_t slots = 64;
+    while (slots < s->rows / s->parts * 3 / 2 + 64) {
+        slots *= 2;
+    }
+    bool enough = true;
+    for (unsigned i = 0; i < s->parts; i++) {
+        s->table[i].slots = slots;
+        s->table[i].slot = host_map(slots * sizeof(uint64_t));
+        enough = enough && s->table[i].slot != NULL;
+    }
+    if (enough) {
+        host_fork_all(s->parts, search_part, s);
+    }
+    for (unsigned i = 0; i < s->parts; i++) {
+        host_unmap(s->table[i].slot, slots * sizeof(uint64_t));
+    }
+    return enough;
+}
+
+/* --- Records ---------------------------------------------------------- */
+
+static uint64_t part_start(const struct search *s, unsigned part)
+{
+    return s->rows / s->parts * part +
+           (part == s->parts ? s->rows % s->parts : 0);
+}
+
+static void count_part(void *context, unsigned part)
+{
+    struct search *s = context;
+    uint64_t count = 0, last = part_start(s, part + 1);
+    for (uint64_t row = part_start(s, part); row < last; row++) {
+        count += s->doubled[row] == 0;
+    }
+    s->first[part + 1] = count;
+}
+
+static void fill_part(void *context, unsigned part)
+{
+    struct search *s = context;
+    struct host_item *to = s->items + s->first[part];
+    uint64_t negative_zeros = 0;
+    uint64_t last = part_start(s, part + 1);
+    for (uint64_t row = part_start(s, part); row < last; row++) {
+        const double *p = s->xyz + 3 * row;
+        for (int d = 0; d < 3; d++) {
+            negative_zeros += p[d] == 0.0 && signbit(p[d]);
+        }
+        if (s->doubled[row] == 0) {
+            *to++ =
+                (struct host_item){{p[0] + 0.0, p[1] + 0.0, p[2] + 0.0}, row};
+        }
+    }
+    s->negative_zeros[part] = negative_zeros;
+    size_t count = (size_t)(s->first[part + 1] - s->first[part]);
+    host_arrange_box(to - count, count, s->lo[part], s->hi[part]);
+}
+
+static void fill_items(struct search *s, struct host_unique *unique)
+{
+    s->items = unique->items;
+    s->parts = s->rows < COPY_ROWS ? 1 : s->parts;
+    host_fork_all(s->parts, count_part, s);
+    for (unsigned i = 0; i < s->parts; i++) {
+        s->first[i + 1] += s->first[i];
+    }
+    host_fork_all(s->parts, fill_part, s);
+    for (unsigned i = 0; i < s->parts; i++) {
+        unique->negative_zeros += s->negative_zeros[i];
+    }
+    for (int d = 0; d < 3; d++) {
+        unique->lo[d] = INFINITY;
+        unique->hi[d] = -INFINITY;
+        for (unsigned i = 0; i < s->parts; i++) {
+            unique->lo[d] = fmin(unique->lo[d], s->lo[i][d]);
+            unique->hi[d] = fmax(unique->hi[d], s->hi[i][d]);
+        }
+    }
+}
+
+int host_unique_make(struct host_unique *unique, const double *xyz,
+                     uint64_t rows, struct host_error *error)
+{
+    *unique = (struct host_unique){0};
+    if (rows >= UINT32_MAX) {
+        return host_fail(error, HOST_INPUT,
+                         "host: %llu points are more than row numbers of 32 "
+                         "bits allow; split the input",
+                         (unsigned long long)rows);
+    }
+    struct search s = {.xyz = xyz, .rows = rows};
+    s.doubled = host_map((size_t)rows);
+    if (s.doubled == NULL || !run_search(&s)) {
+        host_unmap(s.doubled, (size_t)rows);
+        return host_fail_memory(error, "the search for duplicates");
+    }
+    for (unsigned i = 0; i < s.parts; i++) {
+        unique->count += (size_t)s.distinct[i];
+    }
+    unique->capacity = unique->count;
+    unique->items = host_map(unique->capacity * sizeof *unique->items);
+    if (unique->items == NULL) {
+        host_fail_memory(error, "the points");
+    } else {
+        fill_items(&s, unique);
+    }
+    host_unmap(s.doubled, (size_t)rows);
+    return error->code;
+}
+
+void host_unique_free(struct host_unique *unique)
+{
+    host_unmap(unique->items, unique->capacity * sizeof *unique->items);
+    *unique = (struct host_unique){0};
+}
+
+/* NOLINTNEXTLINE(readability-non-const-parameter): the threads write it */
+uint64_t host_unique_rows(const double *xyz, uint64_t rows, uint32_t *lowest)
+{
+    struct search s = {.xyz = xyz, .rows = rows, .lowest = lowest};
+    uint64_t distinct = 0;
+    if (run_search(&s)) {
+        for (unsigned i = 0; i < s.parts; i++) {
+            distinct += s.distinct[i];
+        }
+    }
+    return distinct;
+}

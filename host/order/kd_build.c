@@ -1,0 +1,271 @@
+#include "kd_build.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "incode/pages/pages.h"
+#include "host/base/parallel.h"
+
+enum {
+    SAMPLE_MAX = 256,     /* items looked at to choose a pivot */
+    SORT_MAX = 16,        /* fewer items than this are sorted by insertion */
+    FORK_ITEMS = 1 << 13, /* fewer items than this are not worth a thread */
+};
+
+void host_arrange_box(const struct host_item *items, size_t n, double lo[3],
+                      double hi[3])
+{
+    double l0 = INFINITY, l1 = INFINITY, l2 = INFINITY;
+    double h0 = -INFINITY, h1 = -INFINITY, h2 = -INFINITY;
+    for (size_t i = 0; i < n; i++) {
+        const double *c = items[i].c;
+        l0 = c[0] < l0 ? c[0] : l0;
+        l1 = c[1] < l1 ? c[1] : l1;
+        l2 = c[2] < l2 ? c[2] : l2;
+        h0 = c[0] > h0 ? c[0] : h0;
+        h1 = c[1] > h1 ? c[1] : h1;
+        h2 = c[2] > h2 ? c[2] : h2;
+    }
+    lo[0] = l0, lo[1] = l1, lo[2] = l2;
+    hi[0] = h0, hi[1] = h1, hi[2] = h2;
+}
+
+int host_arrange_longest(const double lo[3], const double hi[3])
+{
+    int longest = 0;
+    double best = -1;
+    for (int d = 0; d < 3; d++) {
+        /* Halves first: the difference of two finite numbers may overflow. */
+        double extent = 0.5 * hi[d] - 0.5 * lo[d];
+        if (extent > best) {
+            best = extent;
+            longest = d;
+        }
+    }
+    return longest;
+}
+
+/* Both partitions move by an unconditional exchange, since the outcome of the
+ * comparison is a coin toss that no branch predictor learns. */
+static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
+                             double pivot)
+{
+    size_t m = 0;
+    for (size_t i = 0; i < n; i++) {
+        struct host_item t = a[i];
+        a[i] = a[m];
+        a[m] = t;
+        m += sign * t.c[d] < pivot;
+    }
+    return m;
+}
+
+static size_t partition_not_greater(struct host_item *a, size_t n, int d,
+                                    double sign, double pivot)
+{
+    size_t m = 0;
+    for (size_t i = 0; i < n; i++) {
+        struct host_item t = a[i];
+        a[i] = a[m];
+        a[m] = t;
+        m += sign * t.c[d] <= pivot;
+    }
+    return m;
+}
+
+size_t host_arrange_below(struct host_item *items, size_t n, int d, double wall)
+{
+    return partition_less(items, n, d, 1, wall);
+}
+
+static int less(const struct host_item *a, const struct host_item *b,
+                const int order[3], double sign)
+{
+    for (int i = 0; i < 3; i++) {
+        double p = sign * a->c[order[i]], q = sign * b->c[order[i]];
+        if (p != q) {
+            return p < q;
+        }
+    }
+    return 0;
+}
+
+static void insertion_sort(struct host_item *a, size_t n, const int order[3],
+                           double sign)
+{
+    for (size_t i = 1; i < n; i++) {
+        struct host_item t = a[i];
+        size_t j = i;
+        while (j > 0 && less(&t, &a[j - 1], order, sign)) {
+            a[j] = a[j - 1];
+            j--;
+        }
+        a[j] = t;
+    }
+}
+
+static void sort_keys(double *key, size_t n)
+{
+    for (size_t gap = n < 24    ? 1
+                      : n < 120 ? 10
+                                : 57;
+         ; gap = gap > 23   ? 23
+                 : gap > 10 ? 10
+                 : gap > 4  ? 4
+                            : 1) {
+        for (size_t i = gap; i < n; i++) {
+            double t = key[i];
+            size_t j = i;
+            for (; j >= gap && t < key[j - gap]; j -= gap) {
+                key[j] = key[j - gap];
+            }
+            key[j] = t;
+        }
+        if (gap == 1) {
+            return;
+        }
+    }
+}
+
+/* A key whose rank is near k, on the far side of it from the nearer end, so
+ * that the larger part falls away at once: the median of the sample is taken
+ * with a margin of its standard deviation. */
+static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
+                           double sign, uint64_t *state)
+{
+    double key[SAMPLE_MAX];
+    size_t s = n / 32;
+    s = s < 5 ? 5 : s > SAMPLE_MAX ? SAMPLE_MAX : s;
+    for (size_t i = 0; i < s; i++) {
+        *state = *state * 6364136223846793005u + 1442695040888963407u;
+        size_t stretch = n / s;
+        size_t at = i * stretch + (size_t)(*state >> 33) % stretch;
+        key[i] = sign * a[at].c[d];
+    }
+    sort_keys(key, s);
+    size_t margin = s >= 64 ? s / 20 : s >= 16 ? 1 : 0;
+    size_t rank = (size_t)((double)k / (double)n * (double)s);
+    if (2 * k < n) {
+        rank += margin;
+    } else {
+        rank = rank > margin ? rank - margin : 0;
+    }
+    return key[rank >= s ? s - 1 : rank];
+}
+
+void host_arrange_rank(struct host_item *a, size_t n, size_t k, int d,
+                       int from_above)
+{
+    int order[3] = {d, d == 0 ? 1 : 0, d == 2 ? 1 : 2};
+    double sign = from_above ? -1 : 1;
+    uint64_t state = n;
+    int level = 0; /* keys order[0..level) are equal in all that is left */
+    while (k > 0 && k < n && level < 3) {
+        if (n <= SORT_MAX) {
+            insertion_sort(a, n, order, sign);
+            return;
+        }
+        int e = order[level];
+        double pivot = choose_pivot(a, n, k, e, sign, &state);
+        size_t below = partition_less(a, n, e, sign, pivot);
+        if (k <= below) {
+            n = below;
+            continue;
+        }
+        a += below, n -= below, k -= below;
+        size_t equal = partition_not_greater(a, n, e, sign, pivot);
+        if (k <= equal) {
+            n = equal;
+            level++;
+        } else {
+            a += equal, n -= equal, k -= equal;
+        }
+    }
+}
+
+/* Cuts n > 8 items into leaves of 8: the first part is a multiple of 8. */
+static void arrange_leaves(struct host_item *a, size_t n)
+{
+    while (n > INCODE_LEAF_POINTS) {
+        double lo[3], hi[3];
+        host_arrange_box(a, n, lo, hi);
+        size_t leaves = (n + INCODE_LEAF_POINTS - 1) / INCODE_LEAF_POINTS;
+        size_t k = (leaves / 2) * INCODE_LEAF_POINTS;
+        host_arrange_rank(a, n, k, host_arrange_longest(lo, hi), 0);
+        arrange_leaves(a, k);
+        a += k, n -= k;
+    }
+}
+
+/* Where to cut bricks [a, a + count): at the multiple of 32^k nearest to the
+ * middle, for the largest k that leaves a fifth on either side, so that the
+ * children of a box page lie together. */
+static uint32_t cut_bricks(uint32_t a, uint32_t count)
+{
+    uint64_t first = a, last = first + count, middle = first + count / 2;
+    uint64_t fifth = (count + 4) / 5;
+    for (uint64_t step = (uint64_t)1 << 25; step > 1; step >>= 5) {
+        uint64_t cut = (middle + step / 2) / step * step;
+        if (cut > first && cut < last && cut - first >= fifth &&
+            last - cut >= fifth) {
+            return (uint32_t)(cut - first);
+        }
+    }
+    return count / 2;
+}
+
+struct task {
+    struct host_item *items;
+    size_t n;
+    uint32_t first_brick;
+    unsigned threads;
+    unsigned from_above; /* bit d: along d the upper part comes first */
+    host_brick_sink *sink;
+    void *context;
+};
+
+static void arrange(void *argument)
+{
+    struct task *t = argument;
+    if (t->n <= INCODE_BRICK_POINTS) {
+        arrange_leaves(t->items, t->n);
+        t->sink(t->context, t->first_brick, t->items, t->n);
+        return;
+    }
+    double lo[3], hi[3];
+    host_arrange_box(t->items, t->n, lo, hi);
+    int d = host_arrange_longest(lo, hi);
+    size_t bricks = (t->n + INCODE_BRICK_POINTS - 1) / INCODE_BRICK_POINTS;
+    uint32_t cut = cut_bricks(t->first_brick, (uint32_t)bricks);
+    size_t k = (size_t)cut * INCODE_BRICK_POINTS;
+    host_arrange_rank(t->items, t->n, k, d, (int)(t->from_above >> d & 1));
+    struct task first = *t, second = *t;
+    first.n = k;
+    second.items += k;
+    second.n -= k;
+    second.first_brick += cut;
+    /* As in a reflected Gray code the second part is walked backwards, mirrored
+     * at the wall: where the first part ends the second begins. */
+    second.from_above ^= 7u & ~(1u << d);
+    if (t->threads > 1 && t->n >= FORK_ITEMS) {
+        struct host_fork fork;
+        first.threads = t->threads / 2;
+        second.threads = t->threads - first.threads;
+        host_fork_start(&fork, arrange, &first);
+        arrange(&second);
+        host_fork_join(&fork);
+    } else {
+        arrange(&first);
+        arrange(&second);
+    }
+}
+
+void host_arrange_bricks(struct host_item *items, size_t n,
+                         uint32_t first_brick, unsigned threads,
+                         host_brick_sink *sink, void *context)
+{
+    struct task task = {items, n, first_brick, threads, 0, sink, context};
+    if (n > 0) {
+        arrange(&task);
+    }
+}

@@ -1,0 +1,467 @@
+#include "order.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "incode/predicates/predicates.h"
+#include "kd_build.h"
+#include "host/base/memory.h"
+#include "host/base/parallel.h"
+#include "duplicates.h"
+
+enum { FORK_POINTS = 1 << 13 };
+
+/* Vertex numbers of all bricks must stay below INCODE_NONE. */
+static const uint64_t bricks_max = (UINT64_C(1) << 26) - 1024;
+
+/* --- Regions ---------------------------------------------------------- */
+
+struct cut {
+    struct host_order *order;
+    struct host_item *items; /* of all points */
+    enum host_partition partition;
+    unsigned threads;
+    uint32_t region, regions; /* [region, region + regions) */
+    size_t first, n;
+    double lo[3], hi[3];
+    int depth;
+};
+
+/* Equal counts, in whole bricks and whole box pages where that costs at most
+ * one part in 64 of the balance. */
+static size_t half_rank(size_t n)
+{
+    size_t half = (n + 1) / 2;
+    const size_t page = (size_t)INCODE_BRICK_POINTS * INCODE_FANOUT;
+    size_t step = n >= 32 * page                          ? page
+                  : n >= (size_t)32 * INCODE_BRICK_POINTS ? INCODE_BRICK_POINTS
+                                                          : 1;
+    return (half + step / 2) / step * step;
+}
+
+static void cut_regions(void *argument)
+{
+    struct cut *c = argument;
+    struct host_item *items = c->items + c->first;
+    if (c->regions == 1) {
+        struct host_region *r = c->order->region + c->region;
+        r->points = (uint32_t)c->n;
+        memcpy(r->lo, c->lo, sizeof r->lo);
+        memcpy(r->hi, c->hi, sizeof r->hi);
+        return;
+    }
+    int d = c->depth % 3;
+    size_t k;
+    double wall;
+    if (c->partition == HOST_UNIFORM) {
+        wall = 0.5 * c->lo[d] + 0.5 * c->hi[d];
+        k = host_arrange_below(items, c->n, d, wall);
+    } else {
+        double lo[3], hi[3];
+        host_arrange_box(items, c->n, lo, hi);
+        d = c->n > 0 ? host_arrange_longest(lo, hi) : 0;
+        k = half_rank(c->n);
+        host_arrange_rank(items, c->n, k, d, 0);
+        host_arrange_box(items + k, c->n - k, lo, hi);
+        wall = k < c->n ? lo[d] : c->hi[d];
+    }
+    struct cut lower = *c, upper = *c;
+    lower.depth = upper.depth = c->depth + 1;
+    lower.regions = upper.regions = c->regions / 2;
+    upper.region += lower.regions;
+    lower.n = k;
+    upper.first += k, upper.n -= k;
+    lower.hi[d] = upper.lo[d] = wall;
+    if (c->threads > 1 && c->n >= FORK_POINTS) {
+        struct host_fork fork;
+        lower.threads = c->threads / 2;
+        upper.threads = c->threads - lower.threads;
+        host_fork_start(&fork, cut_regions, &lower);
+        cut_regions(&upper);
+        host_fork_join(&fork);
+    } else {
+        cut_regions(&lower);
+        cut_regions(&upper);
+    }
+}
+
+/* --- Bricks ----------------------------------------------------------- */
+
+static void store_brick(void *context, uint32_t number,
+                        const struct host_item *items, size_t count)
+{
+    struct host_order *order = context;
+    struct incode_brick *brick = &order->brick[number];
+    uint32_t *row = order->row + (size_t)number * INCODE_BRICK_POINTS;
+    for (size_t i = 0; i < INCODE_BRICK_POINTS; i++) {
+        const struct host_item *item = &items[i < count ? i : count - 1];
+        brick->x[i] = item->c[0];
+        brick->y[i] = item->c[1];
+        brick->z[i] = item->c[2];
+        row[i] = i < count ? (uint32_t)item->row : INCODE_NONE;
+    }
+    order->fill[number] = (uint8_t)count;
+}
+
+struct spread {
+    struct host_order *order;
+    struct host_item *items;
+    uint32_t region, regions;
+    size_t first, n;
+    unsigned threads;
+};
+
+/* Arranges a run of regions, forking where there are threads and points. */
+static void arrange_regions(void *argument)
+{
+    struct spread *s = argument;
+    if (s->regions == 1) {
+        host_arrange_bricks(s->items + s->first, s->n,
+                            s->order->region[s->region].first, s->threads,
+                            store_brick, s->order);
+        return;
+    }
+    struct spread lower = *s, upper = *s;
+    lower.regions = upper.regions = s->regions / 2;
+    upper.region += lower.regions;
+    lower.n = 0;
+    for (uint32_t i = 0; i < lower.regions; i++) {
+        lower.n += s->order->region[s->region + i].points;
+    }
+    upper.first += lower.n, upper.n -= lower.n;
+    if (s->threads > 1 && s->n >= FORK_POINTS) {
+        struct host_fork fork;
+        lower.threads = s->threads / 2;
+        upper.threads = s->threads - lower.threads;
+        host_fork_start(&fork, arrange_regions, &lower);
+        arrange_regions(&upper);
+        host_fork_join(&fork);
+    } else {
+        arrange_regions(&lower);
+        arrange_regions(&upper);
+    }
+}
+
+static uint64_t number_bricks(struct host_order *order)
+{
+    uint64_t bricks = 0;
+    for (uint32_t r = 0; r < order->regions; r++) {
+        struct host_region *region = &order->region[r];
+        region->first = (uint32_t)bricks;
+        bricks += ((uint64_t)region->points + INCODE_BRICK_POINTS - 1) /
+                  INCODE_BRICK_POINTS;
+        region->last = (uint32_t)bricks;
+    }
+    return bricks;
+}
+
+/* --- Box pages -------------------------------------------------------- */
+
+static void box_of_brick(const struct host_order *order, uint32_t b,
+                         struct incode_boxes *boxes, uint32_t child)
+{
+    const struct incode_brick *brick = &order->brick[b];
+    const double *axis[3] = {brick->x, brick->y, brick->z};
+    for (int d = 0; d < 3; d++) {
+        double lo = axis[d][0], hi = axis[d][0];
+        for (int i = 1; i < INCODE_BRICK_POINTS; i++) {
+            double c = axis[d][i];
+            lo = c < lo ? c : lo;
+            hi = c > hi ? c : hi;
+        }
+        boxes->lo[d][child] = lo;
+        boxes->hi[d][child] = hi;
+    }
+}
+
+static void box_of_boxes(const struct incode_boxes *from,
+                         struct incode_boxes *boxes, uint32_t child)
+{
+    for (int d = 0; d < 3; d++) {
+        double lo = INFINITY, hi = -INFINITY;
+        for (int i = 0; i < INCODE_FANOUT; i++) {
+            lo = from->lo[d][i] < lo ? from->lo[d][i] : lo;
+            hi = from->hi[d][i] > hi ? from->hi[d][i] : hi;
+        }
+        boxes->lo[d][child] = lo;
+        boxes->hi[d][child] = hi;
+    }
+}
+
+static void make_boxes(struct host_order *order)
+{
+    const struct incode_tree *tree = &order->tree;
+    for (uint32_t level = 1; level < tree->levels; level++) {
+        struct incode_boxes *to =
+            order->boxes + (tree->base[level] - tree->base[1]);
+        uint32_t children = tree->count[level - 1];
+        for (uint32_t c = 0; c < tree->count[level] * INCODE_FANOUT; c++) {
+            struct incode_boxes *boxes = &to[c / INCODE_FANOUT];
+            uint32_t child = c % INCODE_FANOUT;
+            if (c >= children) {
+                for (int d = 0; d < 3; d++) {
+                    boxes->lo[d][child] = INFINITY;
+                    boxes->hi[d][child] = -INFINITY;
+                }
+            } else if (level == 1) {
+                box_of_brick(order, c, boxes, child);
+            } else {
+                box_of_boxes(order->boxes +
+                                 (tree->base[level - 1] - tree->base[1] + c),
+                             boxes, child);
+            }
+        }
+    }
+}
+
+/* --- The uniform grid ------------------------------------------------- */
+
+static uint32_t cells_along(double extent, double side)
+{
+    double cells = extent / side;
+    return cells >= 1e9 ? 1000000000u : cells > 1 ? (uint32_t)cells : 1;
+}
+
+/* Cubic cells, as many as points or a few less. */
+static void choose_cells(struct host_order *order)
+{
+    double extent[3], longest = 0;
+    for (int d = 0; d < 3; d++) {
+        extent[d] = 0.5 * order->hi[d] - 0.5 * order->lo[d];
+        longest = extent[d] > longest ? extent[d] : longest;
+        order->cells[d] = 1;
+    }
+    /* 2^-30 of the longest side to all of it: 60 halvings of the interval. */
+    double small = longest / 0x1p30, large = longest * 2;
+    for (int i = 0; i < 60 && longest > 0; i++) {
+        double side = 0.5 * small + 0.5 * large;
+        if (!(side > 0)) {
+            break; /* denormal extents: one cell does */
+        }
+        uint32_t cells[3];
+        double product = 1;
+        for (int d = 0; d < 3; d++) {
+            cells[d] = cells_along(extent[d], side);
+            product *= cells[d];
+        }
+        if (product <= order->points) {
+            large = side;
+            memcpy(order->cells, cells, sizeof cells);
+        } else {
+            small = side;
+        }
+    }
+}
+
+static int make_grid(struct host_order *order, struct host_error *error)
+{
+    choose_cells(order);
+    size_t cells = (size_t)order->cells[0] * order->cells[1] * order->cells[2];
+    order->first_of_cell = host_map((cells + 1) * sizeof(uint32_t));
+    order->by_cell = host_map((size_t)order->points * sizeof(uint32_t));
+    if (order->first_of_cell == NULL || order->by_cell == NULL) {
+        return host_fail_memory(error, "the lists of the uniform grid");
+    }
+    uint32_t *first = order->first_of_cell;
+    for (int pass = 0; pass < 2; pass++) {
+        for (uint32_t b = order->bricks; b-- > 0;) {
+            for (uint32_t i = order->fill[b]; i-- > 0;) {
+                uint32_t v = b * INCODE_BRICK_POINTS + i;
+                double p[3];
+                host_vertex(order, v, p);
+                uint32_t cell =
+                    incode_cell_of(order->lo, order->hi, order->cells, p);
+                if (pass == 0) {
+                    first[cell]++;
+                } else {
+                    order->by_cell[--first[cell]] = v;
+                }
+            }
+        }
+        for (size_t cell = 1; pass == 0 && cell <= cells; cell++) {
+            first[cell] += first[cell - 1];
+        }
+    }
+    return 0;
+}
+
+/* --- Dimension -------------------------------------------------------- */
+
+/* Points that span the space: the first that is off the first two's line, the
+ * first that is off that plane.  Neighbours in the arrangement are close, so
+ * the second point is taken from the far end. */
+static int check_dimension(const struct host_order *order, const char *where,
+                           struct host_error *error)
+{
+    struct incode_tally tally = {0, 0};
+    double a[3], b[3], c[3], d[3];
+    host_vertex(order, 0, a);
+    uint32_t last = order->bricks - 1;
+    host_vertex(order, last * INCODE_BRICK_POINTS + order->fill[last] - 1u, b);
+    bool plane = false;
+    for (uint32_t k = 0; k < order->bricks; k++) {
+        for (uint32_t i = 0; i < order->fill[k]; i++) {
+            host_vertex(order, k * INCODE_BRICK_POINTS + i, d);
+            if (!plane) {
+                plane = !incode_collinear(a, b, d);
+                memcpy(c, d, sizeof c);
+            } else if (incode_orient3d(&tally, a, b, c, d) != 0) {
+                return 0;
+            }
+        }
+    }
+    return host_fail(error, HOST_INPUT,
+                     "%s: all %u distinct points lie on one %s, so there is "
+                     "no tetrahedron; give points that span three dimensions",
+                     where, order->points, plane ? "plane" : "line");
+}
+
+/* --- All together ----------------------------------------------------- */
+
+static int allocate(struct host_order *order, struct host_error *error)
+{
+    size_t bricks = order->bricks;
+    order->brick = host_map(bricks * sizeof *order->brick);
+    order->fill = host_map(bricks);
+    order->row = host_map(bricks * INCODE_BRICK_POINTS * sizeof(uint32_t));
+    order->boxes = host_map((order->tree.base[order->tree.levels] - bricks) *
+                            sizeof *order->boxes);
+    if (order->brick == NULL || order->fill == NULL || order->row == NULL ||
+        order->boxes == NULL) {
+        return host_fail_memory(error, "the order of the points");
+    }
+    return 0;
+}
+
+static int arrange_items(struct host_order *order, struct host_item *items,
+                         enum host_partition partition,
+                         struct host_error *error)
+{
+    struct cut cut = {.order = order,
+                      .items = items,
+                      .partition = partition,
+                      .threads = host_threads(),
+                      .regions = order->regions,
+                      .n = order->points};
+    memcpy(cut.lo, order->lo, sizeof cut.lo);
+    memcpy(cut.hi, order->hi, sizeof cut.hi);
+    cut_regions(&cut);
+    uint64_t bricks = number_bricks(order);
+    if (bricks > bricks_max) {
+        return host_fail(error, HOST_INPUT,
+                         "host: %u points are more than vertex numbers of 32 "
+                         "bits allow; split the input",
+                         order->points);
+    }
+    order->bricks = (uint32_t)bricks;
+    incode_tree_init(&order->tree, order->bricks, 0);
+    if (allocate(order, error) != 0) {
+        return error->code;
+    }
+    struct spread spread = {.order = order,
+                            .items = items,
+                            .regions = order->regions,
+                            .n = order->points,
+                            .threads = host_threads()};
+    arrange_regions(&spread);
+    make_boxes(order);
+    return 0;
+}
+
+int host_order_make(struct host_order *order, const char *where,
+                    const double *xyz, uint64_t rows,
+                    enum host_partition partition, uint32_t regions, bool grid,
+                    struct host_error *error)
+{
+    *order = (struct host_order){.rows = rows, .regions = regions};
+    struct host_unique unique;
+    if (host_unique_make(&unique, xyz, rows, error) != 0) {
+        return error->code;
+    }
+    order->points = (uint32_t)unique.count;
+    order->duplicates = rows - unique.count;
+    order->negative_zeros = unique.negative_zeros;
+    if (unique.count < 4) {
+        host_fail(error, HOST_INPUT,
+                  "%s: %u distinct points (of %llu) where a tetrahedron has 4; "
+                  "give more points",
+                  where, order->points, (unsigned long long)rows);
+    }
+    memcpy(order->lo, unique.lo, sizeof order->lo);
+    memcpy(order->hi, unique.hi, sizeof order->hi);
+    order->region = calloc(regions, sizeof *order->region);
+    if (order->region == NULL) {
+        host_fail_memory(error, "the regions");
+    } else if (error->code == 0) {
+        arrange_items(order, unique.items, partition, error);
+    }
+    host_unique_free(&unique);
+    if (error->code == 0) {
+        check_dimension(order, where, error);
+    }
+    if (error->code == 0 && grid && make_grid(order, error) == 0) {
+        incode_tree_init(&order->tree, order->bricks,
+                         order->cells[0] * order->cells[1] * order->cells[2]);
+    }
+    if (error->code != 0) {
+        host_order_free(order);
+    }
+    return error->code;
+}
+
+void host_order_free(struct host_order *order)
+{
+    size_t bricks = order->bricks;
+    size_t cells = (size_t)order->cells[0] * order->cells[1] * order->cells[2];
+    host_unmap(order->brick, bricks * sizeof *order->brick);
+    host_unmap(order->fill, bricks);
+    host_unmap(order->row, bricks * INCODE_BRICK_POINTS * sizeof(uint32_t));
+    host_unmap(order->boxes, (order->tree.base[order->tree.levels] - bricks) *
+                                 sizeof *order->boxes);
+    host_unmap(order->first_of_cell, (cells + 1) * sizeof(uint32_t));
+    host_unmap(order->by_cell, (size_t)order->points * sizeof(uint32_t));
+    free(order->region);
+    *order = (struct host_order){0};
+}
+
+static size_t copy_words(const uint32_t *from, size_t count, uint32_t page,
+                         void *buffer)
+{
+    size_t first = (size_t)page * INCODE_PAGE_WORDS;
+    size_t n = first < count ? count - first : 0;
+    n = n > INCODE_PAGE_WORDS ? INCODE_PAGE_WORDS : n;
+    memset(buffer, 0xff, INCODE_PAGE_BYTES);
+    if (n > 0) {
+        memcpy(buffer, from + first, n * sizeof *from);
+    }
+    return INCODE_PAGE_BYTES;
+}
+
+size_t host_page(const struct host_order *order, uint32_t page, void *buffer)
+{
+    const struct incode_tree *tree = &order->tree;
+    if (page < order->bricks) {
+        const struct incode_brick *brick = &order->brick[page];
+        size_t axis = order->fill[page] * sizeof(double);
+        memcpy(buffer, brick->x, axis);
+        memcpy((char *)buffer + axis, brick->y, axis);
+        memcpy((char *)buffer + 2 * axis, brick->z, axis);
+        return 3 * axis;
+    }
+    if (page < tree->base[tree->levels]) {
+        memcpy(buffer, &order->boxes[page - tree->base[1]], INCODE_PAGE_BYTES);
+        return INCODE_PAGE_BYTES;
+    }
+    if (page < tree->list_base) {
+        size_t cells =
+            (size_t)order->cells[0] * order->cells[1] * order->cells[2];
+        return copy_words(order->first_of_cell, cells + 1,
+                          page - tree->cells_base, buffer);
+    }
+    if (page < tree->pages) {
+        return copy_words(order->by_cell, order->points, page - tree->list_base,
+                          buffer);
+    }
+    return 0;
+}

@@ -1,0 +1,234 @@
+#include "report.h"
+
+#include <string.h>
+#include <unistd.h>
+
+#include "host/mesh/gen.h"
+
+/* The processor time of the busiest node: what t_max would be if every node
+ * had a processor to itself. */
+static double busiest(const struct host_run_result *r)
+{
+    double most = 0.0;
+    for (unsigned i = 0; i < r->nodes; i++) {
+        double s = 1e-6 * (double)r->node[i].statistics.busy_us;
+        most = s > most ? s : most;
+    }
+    return most;
+}
+
+static double ratio(double a, double b)
+{
+    return b > 0.0 ? a / b : 0.0;
+}
+
+static void table_head(FILE *file, const char *title)
+{
+    fprintf(file,
+            "\n%s\n"
+            "%5s %8s %8s %8s %8s %5s %10s %6s %8s %8s %5s\n",
+            title, "nodes", "t_min", "t_max", "t_IO", "speed-up", "eff.",
+            "tetrahedra", "dupl.", "cpu_max", "speed-up", "eff.");
+}
+
+static void table_row(FILE *file, const struct host_run_result *r,
+                      const struct host_run_result *alone)
+{
+    double wall = ratio(alone->t_max_s, r->t_max_s);
+    double cpu = ratio(busiest(alone), busiest(r));
+    fprintf(file,
+            "%5u %8.3f %8.3f %8.3f %8.2f %5.2f %10llu %6.3f %8.3f %8.2f "
+            "%5.2f\n",
+            r->nodes, r->t_min_s, r->t_max_s, r->time_io_s, wall,
+            wall / r->nodes, (unsigned long long)r->tetrahedra,
+            ratio((double)r->built, (double)r->tetrahedra), busiest(r), cpu,
+            cpu / r->nodes);
+}
+
+static void table_notes(FILE *file)
+{
+    fprintf(file,
+            "Seconds; t_min, t_max: of the fastest and the slowest node, on "
+            "the clock, %ld\nprocessors shared by all.  cpu_max: processor "
+            "time of the busiest node, and the\nspeed-up and efficiency that "
+            "follow for a machine with a processor a node.\n",
+            sysconf(_SC_NPROCESSORS_ONLN));
+}
+
+static void node_lines(FILE *file, const struct host_run_result *r)
+{
+    fprintf(file, "\n%4s %10s %10s %8s %8s %8s %8s %8s %10s\n", "node", "built",
+            "kept", "pages", "faults", "evicted", "AFL max", "spilled",
+            "memory");
+    for (unsigned i = 0; i < r->nodes; i++) {
+        const struct node_finished_message *f = &r->node[i].statistics;
+        const struct incode_statistics *s = &f->statistics;
+        fprintf(
+            file, "%4u %10llu %10llu %8llu %8llu %8llu %8llu %8llu %10llu\n", i,
+            (unsigned long long)s->tetrahedra_built,
+            (unsigned long long)s->tetrahedra_kept,
+            (unsigned long long)s->page_requests,
+            (unsigned long long)s->page_faults,
+            (unsigned long long)s->page_evictions,
+            (unsigned long long)s->afl_max, (unsigned long long)s->afl_spilled,
+            (unsigned long long)f->memory_high_water);
+    }
+    fprintf(file, "Of %llu bytes of data memory a node%s.\n",
+            (unsigned long long)r->memory,
+            r->limited ? ", held by the kernel"
+            : r->link == HOST_WIRE_MPI
+                ? ", besides what Open MPI takes for itself"
+                : " (a sanitizer build: not held by the kernel)");
+}
+
+static void map_line(FILE *file, uint64_t bytes, const char *what,
+                     uint64_t count, const char *unit)
+{
+    fprintf(file, "%12llu  %s", (unsigned long long)bytes, what);
+    if (count > 0) {
+        fprintf(file, " (%llu %s)", (unsigned long long)count, unit);
+    }
+    fputc('\n', file);
+}
+
+void host_report_map(FILE *file, const struct host_run_result *result)
+{
+    const struct node_map *m = &result->node[0].map.map;
+    unsigned links = 1;
+    while (1u << (links - 1) < result->nodes) {
+        links++;
+    }
+    fprintf(file, "\nMemory map of node 0, bytes of %llu\n",
+            (unsigned long long)result->memory);
+    map_line(file, HOST_STACK_BYTES, "stack", 0, "");
+    map_line(file, m->fixed - HOST_STACK_BYTES, ".data, .bss", 0, "");
+    map_line(file, m->node, "node program", 0, "");
+    map_line(file, m->cube, "windows of links", links * m->window,
+             "frames each way");
+    map_line(file, m->outbox, "results and spilled faces on their way out", 0,
+             "");
+    map_line(file, m->control, "triangulator, its gathered points and tasks", 0,
+             "");
+    map_line(file, m->afl, "active face list", m->afl_faces, "faces");
+    map_line(file, m->bricks, "open bricks", m->brick_entries, "entries");
+    map_line(file, m->frames, "page frames", m->frame_count,
+             "pages of 1536 bytes and their boxes");
+    uint64_t used = m->fixed + m->node + m->cube + m->outbox + m->control +
+                    m->afl + m->bricks + m->frames;
+    map_line(file, result->memory - used, "left over", 0, "");
+    fprintf(file,
+            "Outside it, in the kernel: %d and %d bytes of buffers for each "
+            "end of a wire.\n",
+            result->socket_send_bytes, result->socket_receive_bytes);
+}
+
+void host_report_run(FILE *file, const struct host_run_options *options,
+                     const struct host_run_result *result,
+                     const struct host_run_result *alone)
+{
+    const struct host_run_result *r = result;
+    fprintf(file, "%s: %llu %spoints, %llu tetrahedra, %s\n", options->input,
+            (unsigned long long)r->points, r->duplicates > 0 ? "distinct " : "",
+            (unsigned long long)r->tetrahedra, r->digest.text);
+    if (r->duplicates > 0) {
+        fprintf(file,
+                "%llu of %llu points are duplicates; each stands for its "
+                "lowest row\n",
+                (unsigned long long)r->duplicates, (unsigned long long)r->rows);
+    }
+    if (r->negative_zeros > 0) {
+        fprintf(file, "coordinates of -0.0, which count as 0.0: %llu\n",
+                (unsigned long long)r->negative_zeros);
+    }
+    fprintf(file,
+            "%s on %u node%s: %.3f s to triangulate (%.3f Mtet/s), %.3f s "
+            "in all%s\n",
+            host_strategies[r->strategy], r->nodes, r->nodes == 1 ? "" : "s",
+            r->time_triangulation_s,
+            1e-6 * ratio((double)r->tetrahedra, r->time_triangulation_s),
+            r->time_total_s, r->verified ? "; verified" : "");
+    if (alone != NULL) {
+        char title[128];
+        snprintf(title, sizeof title, "%s, %s partition, index %s",
+                 r->strategy == HOST_SPATIAL ? "Spatial decomposition"
+                                             : "Sequential",
+                 host_partitions[r->partition], host_indexes[r->index]);
+        table_head(file, title);
+        table_row(file, alone, alone);
+        table_row(file, r, alone);
+        table_notes(file);
+        node_lines(file, r);
+    }
+    if (options->map) {
+        host_report_map(file, r);
+    }
+}
+
+/* One row of a table: `points` on so many nodes. */
+static int bench_row(const struct host_run_options *options,
+                     const struct host_points *points, unsigned nodes,
+                     struct host_run_result *result, struct host_error *error)
+{
+    struct host_run_options row = *options;
+    struct host_tetrahedra tets = {0};
+    row.nodes = nodes;
+    row.strategy = HOST_SPATIAL;
+    row.quiet = true;
+    memset(result, 0, sizeof *result);
+    int status = host_triangulate(&row, points, &tets, result, error);
+    host_tetrahedra_free(&tets);
+    return status;
+}
+
+static int bench_table(const struct host_run_options *options, const char *kind,
+                       const char *name, uint64_t n, unsigned nodes_max,
+                       struct host_error *error)
+{
+    static struct host_run_result alone, result;
+    struct host_points points = {0};
+    char title[128];
+    int status = host_gen(kind, n, 1, &points, error);
+    snprintf(title, sizeof title, "%s, %llu points, %s partition", name,
+             (unsigned long long)n, host_partitions[options->partition]);
+    table_head(stdout, title);
+    for (unsigned nodes = 1; status == 0 && nodes <= nodes_max; nodes *= 2) {
+        status = bench_row(options, &points, nodes, &result, error);
+        if (nodes == 1) {
+            alone = result;
+        }
+        if (status == 0) {
+            table_row(stdout, &result, &alone);
+            fflush(stdout);
+        }
+    }
+    host_points_free(&points);
+    return status;
+}
+
+int host_bench_paper(const struct host_run_options *options, unsigned nodes_max,
+                     struct host_error *error)
+{
+    static const struct {
+        const char *kind, *name;
+        uint64_t n;
+    } sets[] = {{"uniform", "Uniform", 10000},
+                {"bubbles", "Bubbles", 20000},
+                {"bluntfin", "Bluntfin", 10000}};
+    struct host_run_options row = *options;
+    int status = 0;
+    printf("Table 2: spatial decomposition of uniform sets\n");
+    row.partition = HOST_UNIFORM;
+    for (uint64_t n = 10000; status == 0 && n <= 20000; n += 10000) {
+        status = bench_table(&row, "uniform", "Uniform", n, nodes_max, error);
+    }
+    printf("\nTable 4: adaptive and uniform partition\n");
+    for (unsigned i = 0; status == 0 && i < 3; i++) {
+        for (unsigned k = 0; status == 0 && k < 2; k++) {
+            row.partition = k == 0 ? HOST_ADAPTIVE : HOST_UNIFORM;
+            status = bench_table(&row, sets[i].kind, sets[i].name, sets[i].n,
+                                 nodes_max, error);
+        }
+    }
+    table_notes(stdout);
+    return status;
+}

@@ -1,0 +1,479 @@
+#include "run.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "node/node.h"
+#include "host/formats/claims.h"
+#include "host/mesh/facets.h"
+#include "host/base/memory.h"
+#include "host/files/output.h"
+#include "report.h"
+#include "stats.h"
+#include "host/formats/write.h"
+
+const char *const host_strategies[] = {[HOST_SEQUENTIAL] = "sequential",
+                                       [HOST_SPATIAL] = "spatial",
+                                       [HOST_AUTO] = "auto",
+                                       NULL};
+const char *const host_partitions[] = {
+    [HOST_ADAPTIVE] = "adaptive", [HOST_UNIFORM] = "uniform", NULL};
+const char *const host_indexes[] = {
+    [INCODE_NAIVE] = "naive", [INCODE_GRID] = "grid", [INCODE_KD] = "kd", NULL};
+const char *const host_face_rules[] = {
+    [INCODE_FACE_OWN] = "own", [INCODE_FACE_PAPER] = "paper", NULL};
+const char *const host_links[] = {[HOST_WIRE_TCP] = "tcp",
+                                  [HOST_WIRE_SERIAL] = "serial",
+                                  [HOST_WIRE_MPI] = "mpi",
+                                  NULL};
+const char *const host_boards[] = {"linux", NULL};
+
+void host_run_defaults(struct host_run_options *options)
+{
+    memset(options, 0, sizeof *options);
+    options->strategy = HOST_AUTO;
+    options->partition = HOST_ADAPTIVE;
+    options->index = INCODE_KD;
+    options->face_rule = INCODE_FACE_OWN;
+    options->memory = 4u << 20;
+    options->patience_s = 60;
+    options->progress = true;
+}
+
+static double seconds_since(uint64_t start_us)
+{
+    return 1e-6 * (double)(host_now_us() - start_us);
+}
+
+/* The largest power of two of nodes that have a processor each. */
+static unsigned suitable_nodes(void)
+{
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    unsigned nodes = 1;
+    while (nodes < HOST_PROCESSES_MAX && (long)nodes * 2 <= processors) {
+        nodes *= 2;
+    }
+    return nodes;
+}
+
+unsigned host_run_nodes(const struct host_run_options *options)
+{
+    if (options->nodes != 0) {
+        return options->nodes;
+    }
+    return options->strategy == HOST_SEQUENTIAL ? 1 : suitable_nodes();
+}
+
+/* Nodes and strategy, where they were left open. */
+static void settle(const struct host_run_options *options,
+                   struct host_run_result *result)
+{
+    result->strategy = options->strategy;
+    result->partition = options->partition;
+    result->index = options->index;
+    result->link = options->link;
+    result->memory = options->memory;
+    result->nodes = host_run_nodes(options);
+    if (result->strategy == HOST_AUTO) {
+        result->strategy = result->nodes > 1 ? HOST_SPATIAL : HOST_SEQUENTIAL;
+    }
+}
+
+/* Sums over the nodes. */
+static void gather_reports(const struct host_service *service,
+                           struct host_run_result *r)
+{
+    memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
+    r->retransmitted = service->retransmitted;
+    r->faces_spilled = service->spill.faces_total;
+    r->restarts = service->restarts;
+    r->generations = service->generations;
+    for (unsigned i = 0; i < r->nodes; i++) {
+        const struct node_finished_message *f = &r->node[i].statistics;
+        const struct incode_statistics *s = &f->statistics;
+        double wall = 1e-6 * (double)f->wall_us;
+        r->retransmitted += f->retransmitted;
+        if (i >= service->workers && s->vertices == 0) {
+            continue;
+        }
+        r->t_min_s = i == 0 || wall < r->t_min_s ? wall : r->t_min_s;
+        r->t_max_s = wall > r->t_max_s ? wall : r->t_max_s;
+        r->make_tetra_calls += s->make_tetra_calls;
+        r->built += s->tetrahedra_built;
+        r->exact_orient3d += s->tally.exact_orient3d;
+        r->exact_in_sphere += s->tally.exact_in_sphere;
+        r->candidates += s->candidates;
+        r->vertices += s->vertices;
+        r->vertices_waited += s->vertices_waited;
+        for (unsigned k = 0; k < 24; k++) {
+            r->candidates_histogram[k] += s->candidates_histogram[k];
+        }
+    }
+}
+
+/* The part on the nodes: ordered points in, rows of input rows out. */
+static int run_service(const struct host_run_options *options,
+                       const struct host_order *order,
+                       struct host_service *service,
+                       struct host_tetrahedra *tets,
+                       struct host_run_result *result, struct host_error *error)
+{
+    service->order = order;
+    service->tets = tets;
+    service->setup.setup.index = (uint8_t)options->index;
+    service->setup.setup.face_rule = (uint8_t)options->face_rule;
+    service->setup.setup.shuffle_seed = options->shuffle_seed;
+    service->workers = result->strategy == HOST_SEQUENTIAL ? 1 : result->nodes;
+    int status = host_service_run(service, error);
+    gather_reports(service, result);
+    result->time_io_s += 1e-6 * (double)service->pages_us;
+    return status;
+}
+
+static unsigned cube_dimension(unsigned nodes)
+{
+    unsigned dimension = 0;
+    while (1u << dimension < nodes) {
+        dimension++;
+    }
+    return dimension;
+}
+
+/* The least memory that node 0, which has the most links, does with. */
+static uint64_t memory_needed(const struct host_run_options *options,
+                              unsigned dimension,
+                              const struct incode_setup *setup)
+{
+    struct node_identity identity = {.dimension = (uint8_t)dimension,
+                                     .window = (uint8_t)options->window,
+                                     .epoch = 1};
+    uint64_t memory = HOST_MEMORY_MIN;
+    while (node_arena_needed(&identity, memory, setup) + HOST_STACK_BYTES +
+               HOST_STATIC_BYTES >
+           memory) {
+        memory += 16384;
+    }
+    return memory;
+}
+
+/* What can be done where a cube needs more memory than its nodes have. */
+static const char *memory_advice(const struct host_run_options *options,
+                                 unsigned nodes,
+                                 const struct incode_setup *setup)
+{
+    struct host_run_options narrow = *options;
+    narrow.window = 0;
+    bool fewer =
+        nodes > 1 && memory_needed(options, 0, setup) <= options->memory;
+    if (options->cube != NULL) {
+        return "";
+    }
+    if (options->window > 0 && memory_needed(&narrow, cube_dimension(nodes),
+                                             setup) <= options->memory) {
+        return fewer ? ", fewer --nodes, or no --window" : ", or no --window";
+    }
+    return fewer ? ", or fewer --nodes" : "";
+}
+
+/* bricks, cells: of the order, where it is known; else 1 and none. */
+static int check_memory(const struct host_run_options *options, unsigned nodes,
+                        uint32_t bricks, const uint32_t cells[3],
+                        struct host_error *error)
+{
+    struct incode_setup setup = {0};
+    setup.bricks = bricks;
+    setup.index = (uint8_t)options->index;
+    memcpy(setup.cells, cells, sizeof setup.cells);
+    uint64_t needed = memory_needed(options, cube_dimension(nodes), &setup);
+    return needed <= options->memory
+               ? 0
+               : host_fail(error, HOST_USAGE,
+                           "%s%s %lluK: a node of %u needs at least %lluK; "
+                           "give that%s",
+                           options->cube == NULL ? "" : options->cube,
+                           options->cube == NULL ? "--memory" : ": memory",
+                           (unsigned long long)options->memory / 1024, nodes,
+                           (unsigned long long)needed / 1024,
+                           memory_advice(options, nodes, &setup));
+}
+
+int host_triangulate_on(const struct host_run_options *options,
+                        struct host_machine *machine,
+                        const struct host_points *points,
+                        struct host_tetrahedra *tets,
+                        struct host_run_result *result,
+                        struct host_error *error)
+{
+    static struct host_service service;
+    struct host_hindered hindered;
+    struct host_machine slowed;
+    struct host_order order;
+    uint64_t start = host_now_us();
+    memset(&service, 0, sizeof service);
+    memset(&order, 0, sizeof order);
+    service.machine = machine;
+    if (options->hindrance.stall_us_max != 0 ||
+        options->hindrance.bytes_a_second != 0) {
+        slowed = host_hinder(&hindered, machine, &options->hindrance);
+        service.machine = &slowed;
+    }
+    service.window = options->window;
+    service.patience_us = options->patience_s * UINT64_C(1000000);
+    service.show_progress = options->progress && !options->quiet;
+    int status = host_service_start(&service, error);
+    result->time_start_up_s += seconds_since(start);
+    start = host_now_us();
+    if (status == 0) {
+        status = host_order_make(
+            &order, options->input == NULL ? "points" : options->input,
+            points->xyz, points->count, options->partition,
+            result->strategy == HOST_SEQUENTIAL ? 1 : result->nodes,
+            options->index == INCODE_GRID, error);
+        result->time_order_s = seconds_since(start);
+    }
+    if (status == 0) {
+        result->rows = order.rows;
+        result->points = order.points;
+        result->duplicates = order.duplicates;
+        result->negative_zeros = order.negative_zeros;
+        status = check_memory(options, result->nodes, order.bricks, order.cells,
+                              error);
+    }
+    if (status == 0) {
+        status = run_service(options, &order, &service, tets, result, error);
+    }
+    result->time_triangulation_s = seconds_since(start);
+    result->tetrahedra = tets->count;
+    if (status == 0) {
+        status = host_service_wires(&service, error);
+        result->missing_wires = service.missing_wires;
+    }
+    host_service_end(&service);
+    if (status == 0) {
+        status =
+            host_hull_facets(tets, (uint64_t)order.bricks * INCODE_BRICK_POINTS,
+                             &result->hull_facets, error);
+    }
+    if (status == 0) {
+        start = host_now_us();
+        host_tetrahedra_map(tets, order.row);
+        result->time_triangulation_s += seconds_since(start);
+    }
+    host_order_free(&order);
+    return status;
+}
+
+int host_triangulate(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_tetrahedra *tets,
+                     struct host_run_result *result, struct host_error *error)
+{
+    static struct host_cluster cluster;
+    static const uint32_t no_cells[3] = {0, 0, 0};
+    struct host_cluster_options nodes = {0};
+    uint64_t start = host_now_us();
+    settle(options, result);
+    nodes.nodes = result->nodes;
+    nodes.memory = options->memory;
+    nodes.window = options->window;
+    nodes.link = options->link;
+    nodes.unplug_us = options->unplug_us;
+    nodes.program = options->node_program;
+    if (check_memory(options, result->nodes, 1, no_cells, error) != 0) {
+        return error->code;
+    }
+    if (options->begin != NULL) {
+        struct host_machine machine;
+        if (options->begin(options, result, &machine, error) != 0) {
+            return error->code;
+        }
+        result->time_start_up_s = seconds_since(start);
+        return host_triangulate_on(options, &machine, points, tets, result,
+                                   error);
+    }
+    if (host_cluster_start(&cluster, &nodes, error) != 0) {
+        return error->code;
+    }
+    struct host_machine machine = host_cluster_machine(&cluster);
+    result->limited = cluster.limited;
+    (void)tcp_buffers(cluster.port.tcp.fd, &result->socket_send_bytes,
+                      &result->socket_receive_bytes);
+    result->time_start_up_s = seconds_since(start);
+    return host_triangulate_on(options, &machine, points, tets, result, error);
+}
+
+/* Whether standard output takes tetrahedra or statistics. */
+static bool stdout_is_data(const struct host_run_options *options)
+{
+    bool data = options->stats != NULL && strcmp(options->stats, "-") == 0;
+    for (unsigned i = 0; i < options->outputs; i++) {
+        data = data || strcmp(options->output[i], "-") == 0;
+    }
+    return data;
+}
+
+/* The summary, which has to arrive where it goes to standard output. */
+static int report(const struct host_run_options *options,
+                  const struct host_run_result *result,
+                  const struct host_run_result *alone, struct host_error *error)
+{
+    FILE *file = stdout_is_data(options) ? stderr : stdout;
+    host_report_run(file, options, result, alone);
+    return file == stdout ? host_output_printed(error) : 0;
+}
+
+void host_run_clean(const struct host_run_options *options, pid_t writer,
+                    uint64_t since_ns)
+{
+    char name[HOST_PATH_MAX];
+    const char *file;
+    for (unsigned i = 0; i < options->outputs; i++) {
+        for (unsigned k = 0;
+             (file = host_write_file(options->output[i], k, name,
+                                     sizeof name)) != NULL;
+             k++) {
+            host_output_clean(file, writer, since_ns);
+        }
+    }
+    if (options->stats != NULL) {
+        host_output_clean(options->stats, writer, since_ns);
+    }
+}
+
+/* No output may be a file that is read, nor be another output. */
+static int check_claims(const struct host_run_options *options,
+                        struct host_error *error)
+{
+    struct host_claims claims = {0};
+    host_claims_read(&claims, options->input, error);
+    if (options->cube != NULL) {
+        host_claims_read(&claims, options->cube, error);
+    }
+    for (unsigned i = 0; i < options->outputs; i++) {
+        host_claims_write(&claims, "-o ", options->output[i], error);
+    }
+    if (options->stats != NULL) {
+        host_claims_write(&claims, "--stats ", options->stats, error);
+    }
+    host_claims_free(&claims);
+    return error->code;
+}
+
+static int check_outputs(const struct host_run_options *options,
+                         struct host_error *error)
+{
+    if (check_claims(options, error) != 0) {
+        return error->code;
+    }
+    if (options->stats != NULL && strcmp(options->stats, "-") != 0 &&
+        host_write_probe(options->stats, error) != 0) {
+        return error->code;
+    }
+    for (unsigned i = 0; i < options->outputs; i++) {
+        if (host_write_check(options->output[i], error) != 0 ||
+            host_write_probe(options->output[i], error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+static int verify(const struct host_points *points,
+                  struct host_tetrahedra *tets, struct host_run_result *result,
+                  struct host_error *error)
+{
+    uint64_t start = host_now_us();
+    int status = host_verify(points, tets, &result->check, error);
+    result->time_verify_s = seconds_since(start);
+    result->verified = status == 0;
+    if (status == HOST_UNVERIFIED) {
+        fputs(result->check.text, stderr);
+    }
+    return status;
+}
+
+/* Order, check, digest and files, once the tetrahedra are here. */
+static int finish(const struct host_run_options *options,
+                  const struct host_points *points,
+                  struct host_tetrahedra *tets, struct host_run_result *result,
+                  struct host_error *error)
+{
+    uint64_t start = host_now_us();
+    host_tetrahedra_sort(tets);
+    host_digest(tets, &result->digest);
+    result->time_write_s = seconds_since(start);
+    if (options->verify && verify(points, tets, result, error) != 0) {
+        return error->code;
+    }
+    start = host_now_us();
+    for (unsigned i = 0; i < options->outputs; i++) {
+        if (host_write(options->output[i], points, tets, error) != 0) {
+            return error->code;
+        }
+    }
+    result->time_write_s += seconds_since(start);
+    return 0;
+}
+
+/* The same on one node, for the table's speed-up. */
+static int run_alone(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_run_result *alone, struct host_error *error)
+{
+    struct host_run_options one = *options;
+    struct host_tetrahedra tets = {0};
+    one.nodes = 1;
+    one.strategy = HOST_SEQUENTIAL;
+    int status = host_triangulate(&one, points, &tets, alone, error);
+    host_tetrahedra_free(&tets);
+    return status;
+}
+
+static int run_on(const struct host_run_options *options,
+                  const struct host_points *points,
+                  struct host_run_result *result, struct host_run_result *alone,
+                  struct host_error *error)
+{
+    struct host_tetrahedra tets = {0};
+    alone->time_io_s = result->time_read_s;
+    if (options->table && run_alone(options, points, alone, error) != 0) {
+        return error->code;
+    }
+    result->time_io_s = result->time_read_s;
+    int status = host_triangulate(options, points, &tets, result, error);
+    if (status == 0) {
+        status = finish(options, points, &tets, result, error);
+    }
+    host_tetrahedra_free(&tets);
+    return status;
+}
+
+int host_run(const struct host_run_options *options,
+             struct host_run_result *result, struct host_error *error)
+{
+    static struct host_run_result alone;
+    struct host_points points = {0};
+    uint64_t start = host_now_us();
+    memset(result, 0, sizeof *result);
+    memset(&alone, 0, sizeof alone);
+    if (check_outputs(options, error) != 0) {
+        return error->code;
+    }
+    int status = host_points_read(options->input, &points, error);
+    result->time_read_s = seconds_since(start);
+    if (status == 0) {
+        status = run_on(options, &points, result, &alone, error);
+    }
+    host_points_free(&points);
+    result->host_peak_bytes = host_memory_peak();
+    result->time_total_s = seconds_since(start);
+    if (status == 0 && options->stats != NULL) {
+        status = host_stats_write(options->stats, result, error);
+    }
+    if (status == 0 && !options->quiet) {
+        report(options, result, options->table ? &alone : NULL, error);
+    }
+    return host_output_commit(error);
+}

@@ -1,0 +1,121 @@
+/* `incode run`: points in, a cube of nodes, tetrahedra out.
+ *
+ * Memory: 52 bytes a point and 16 a tetrahedron at the end, 108 a point while
+ * the points are ordered.  Work: the sum of its parts; the times are in the
+ * result.
+ *
+ *     host_run_defaults(&options);
+ *     options.input = "bunny.xyz";
+ *     if (host_run(&options, &result, &error) != 0) ... error.text
+ */
+#ifndef HOST_RUN_H
+#define HOST_RUN_H
+
+#include <sys/types.h>
+
+#include "host/machines/cluster.h"
+#include "host/machines/throttle.h"
+#include "host/order/order.h"
+#include "host/mesh/points.h"
+#include "host/service/service.h"
+#include "host/mesh/tetrahedra.h"
+#include "host/check/verify.h"
+
+/* HOST_AUTO is the last: one of those before it. */
+enum host_strategy { HOST_SEQUENTIAL, HOST_SPATIAL, HOST_AUTO };
+
+enum { HOST_OUTPUTS_MAX = 16 };
+
+struct host_run_result;
+
+struct host_run_options {
+    const char *input;
+    const char *output[HOST_OUTPUTS_MAX];
+    unsigned outputs;
+    enum host_strategy strategy;
+    enum host_partition partition;
+    enum incode_index index;
+    enum incode_face_rule face_rule;
+    enum host_wire_kind link;
+    unsigned nodes; /* 0: what suits this machine */
+    uint64_t memory;
+    uint64_t patience_s; /* for a node that does not answer */
+    const char *cube;    /* a file that describes real nodes, or NULL */
+    const char *stats;   /* a file for the statistics, or NULL */
+    bool verify, quiet, progress, table, map;
+    /* For tests. */
+    unsigned window;
+    uint64_t shuffle_seed;
+    uint64_t unplug_us;
+    struct host_hindrance hindrance;
+    const char *node_program;
+    /* Begins a cube of result->nodes where it is not host_cluster that does. */
+    int (*begin)(const struct host_run_options *options,
+                 struct host_run_result *result, struct host_machine *machine,
+                 struct host_error *error);
+};
+
+struct host_run_result {
+    uint64_t rows, points, duplicates, negative_zeros;
+    uint64_t tetrahedra, hull_facets;
+    struct host_digest digest;
+    enum host_strategy strategy; /* the one taken */
+    enum host_partition partition;
+    enum incode_index index;
+    enum host_wire_kind link;
+    unsigned nodes;
+    uint64_t memory;
+    double time_total_s, time_read_s, time_order_s, time_io_s;
+    double time_start_up_s, time_triangulation_s, time_verify_s, time_write_s;
+    double t_min_s, t_max_s; /* of the nodes that worked */
+    uint64_t host_peak_bytes;
+    uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
+    uint64_t retransmitted, faces_spilled;
+    unsigned restarts, generations; /* of nodes; of the cube's wiring */
+    unsigned missing_wires;         /* that were named */
+    uint64_t candidates, candidates_histogram[24];
+    uint64_t vertices, vertices_waited;
+    int socket_send_bytes, socket_receive_bytes; /* buffers of a wire's end */
+    struct host_node_report node[HOST_NODES_MAX];
+    bool limited; /* the kernel held the nodes to their memory */
+    bool verified;
+    struct host_verify_report check;
+};
+
+void host_run_defaults(struct host_run_options *options);
+
+/* The names of the enumerations by their values, as options and statistics have
+ * them, and of what a node may run on; a NULL behind them. */
+extern const char *const host_strategies[], *const host_partitions[];
+extern const char *const host_indexes[], *const host_face_rules[];
+extern const char *const host_links[], *const host_boards[];
+
+/* How many nodes the cube gets. */
+unsigned host_run_nodes(const struct host_run_options *options);
+
+/* Removes what process `writer`, which was ended in a run that began at
+ * `since_ns` of the clock, has left of the outputs. */
+void host_run_clean(const struct host_run_options *options, pid_t writer,
+                    uint64_t since_ns);
+
+/* Triangulates points: tets become rows of points, in no order. */
+int host_triangulate(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_tetrahedra *tets,
+                     struct host_run_result *result, struct host_error *error);
+
+/* The same on nodes that are there already, result->nodes of them, with
+ * result's strategy and memory as they are.  Ends the machine, whatever
+ * happens. */
+int host_triangulate_on(const struct host_run_options *options,
+                        struct host_machine *machine,
+                        const struct host_points *points,
+                        struct host_tetrahedra *tets,
+                        struct host_run_result *result,
+                        struct host_error *error);
+
+/* The whole command: reads, triangulates, verifies, writes. */
+int host_run(const struct host_run_options *options,
+             struct host_run_result *result, struct host_error *error);
+
+#endif

@@ -1,0 +1,409 @@
+#include "failure_detector.h"
+
+#include <string.h>
+
+#include "missing_links.h"
+
+enum {
+    CHECK_EVERY_US = 20000,
+    ELAPSED_US_MAX = 100000,   /* a host that was stopped blames nobody */
+    CALLS_EVERY_US = 250000,   /* all nodes once, */
+    CALL_EVERY_US = 5000,      /* but no more than one node in this time, */
+    CALLS_DUE_MAX = 8,         /* and none while so many wait for the wire */
+    CALL_AGAIN_US = 2000000,   /* a call may have been lost with a node; */
+    CALL_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
+    PROBE_US = 3000000,
+    WIRE_DOWN_US_MAX = 8000000,
+    BRING_UP_US_MAX = 9000000,
+    IN_USE_US_MAX = 5000000,  /* longer than a link keeps to a silent host, */
+    IN_USE_US_LAST = 9000000, /* whether it was told so again or not */
+    IN_USE_TOLD_US = 2000000, /* it is told so more often as long as it is so */
+    IN_USE_REST_US = 1000000
+};
+
+static unsigned wire_of(const struct host_service *s)
+{
+    uint16_t gate = cube_wiring(s->cube)->gate;
+    return gate != 0 && gate == s->machine->spare_node ? 1 : 0;
+}
+
+/* --- the beginning ------------------------------------------------------- */
+
+/* A start of a node is over.  Of what it did and no statistics tell, this much
+ * is known: it built the tetrahedra that it sent. */
+static void close_start(struct host_service *s, unsigned i)
+{
+    struct host_node *node = &s->node[i];
+    struct incode_statistics *sum = &s->report[i].statistics.statistics;
+    sum->tetrahedra_built += node->unreported;
+    sum->tetrahedra_kept += node->unreported;
+    sum->make_tetra_calls += node->unreported;
+    node->unreported = 0;
+    node->before = s->report[i].statistics;
+}
+
+static unsigned distance(const struct host_service *s, unsigned node)
+{
+    return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gate);
+}
+
+/* Calls one more node: of those that have not answered one that is nearest to
+ * the gate, so that the way to it leads over nodes that have. */
+static void call_next(struct host_service *s)
+{
+    unsigned best = UINT32_MAX;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->node[i].lost && !s->report[i].here &&
+            (best == UINT32_MAX || distance(s, i) < distance(s, best))) {
+            best = i;
+        }
+    }
+    s->probing = best != UINT32_MAX;
+    if (s->probing) {
+        s->node[best].call_due = true;
+    }
+}
+
+void host_watch_begin(struct host_service *service, uint64_t now_us)
+{
+    struct host_service *s = service;
+    s->generation = cube_wiring(s->cube)->generation;
+    s->loss = false;
+    s->probing = s->probe;
+    s->probe = false;
+    s->living = s->here = s->ready = 0;
+    s->began_us = s->searching ? s->began_us : now_us;
+    s->news_us = s->call_us = now_us;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct host_node *node = &s->node[i];
+        node->lost = node->given_up || !cube_reaches(s->cube, (uint16_t)i);
+        s->living += !node->lost;
+        node->call_due = !node->lost && !s->probing;
+        node->called_us = now_us;
+        node->calling = false;
+        node->call_again_us = CALL_AGAIN_US_MIN;
+        node->sent = node->received = node->missed = 0;
+        node->silent_us = 0;
+        s->report[i].here = s->report[i].ready = false;
+        if (node->lost) {
+            close_start(s, i);
+        }
+    }
+    if (s->probing) {
+        call_next(s);
+    }
+}
+
+void host_watch_end(struct host_service *service)
+{
+    for (unsigned i = 0; i < service->machine->nodes; i++) {
+        close_start(service, i);
+    }
+}
+
+/* --- calls and answers ---------------------------------------------------- */
+
+bool host_watch_call(struct host_service *service, uint16_t to)
+{
+    struct host_node *node = &service->node[to];
+    struct node_call_message call = {node->sent};
+    if (cube_write(service->cube, to, NODE_CALL, &call, sizeof call) != 0) {
+        return false;
+    }
+    node->sent++;
+    node->call_due = false;
+    node->calling = true;
+    return true;
+}
+
+int host_watch_answer(struct host_service *service,
+                      const struct cube_message *message,
+                      struct host_error *error)
+{
+    struct host_service *s = service;
+    struct host_node *node = &s->node[message->source];
+    struct host_node_report *report = &s->report[message->source];
+    struct node_here_message here;
+    if (message->size != sizeof here) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u link %u: is here in another language; are "
+                         "host and node of one version? run make",
+                         message->source,
+                         host_watch_link(service, message->source));
+    }
+    memcpy(&here, message->data, sizeof here);
+    if (node->start != 0 && node->start != here.start) {
+        s->blamed = message->source;
+    }
+    bool first = !report->here;
+    if (first) {
+        /* It has had nothing but calls yet.  The first of them may have gone
+         * to a link's end that was just about to start again. */
+        report->here = true;
+        s->here++;
+        s->news_us = s->check_us;
+        node->missed = here.called - here.received;
+        node->call_again_us = CALL_AGAIN_US;
+        if (node->start != 0 && node->start != here.start) {
+            close_start(s, message->source);
+        }
+        node->start = here.start;
+    }
+    if (here.start != node->start ||
+        here.called - here.received != node->missed ||
+        here.sent != node->received) {
+        s->loss = true;
+    }
+    host_missing_heard(s, message->source, here.links);
+    node->calling = false;
+    node->call_due = false; /* what would have been asked again, is answered */
+    if (first && s->probing) {
+        call_next(s);
+    }
+    return 0;
+}
+
+static unsigned calls_due(const struct host_service *s)
+{
+    unsigned due = 0;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        due += s->node[i].call_due;
+    }
+    return due;
+}
+
+/* Has each node called once a period, one after the other; less often where
+ * the wire is too slow for that and for the work. */
+static void call_in_turn(struct host_service *s, uint64_t now_us)
+{
+    if (s->probing) {
+        return;
+    }
+    uint64_t every = CALLS_EVERY_US / s->machine->nodes;
+    every = every < CALL_EVERY_US ? CALL_EVERY_US : every;
+    if (now_us - s->call_us < every) {
+        return;
+    }
+    unsigned due = calls_due(s);
+    for (unsigned i = 0; i < s->machine->nodes && due < CALLS_DUE_MAX &&
+                         now_us - s->call_us >= every;
+         i++) {
+        struct host_node *node = &s->node[s->call_turn];
+        if (!node->lost && !node->calling) {
+            due += !node->call_due;
+            node->call_due = true;
+            node->called_us = now_us;
+        }
+        s->call_turn = (s->call_turn + 1) % s->machine->nodes;
+        s->call_us += every;
+    }
+    if (now_us - s->call_us >= every) {
+        s->call_us = now_us;
+    }
+}
+
+/* --- what is wrong -------------------------------------------------------- */
+
+unsigned host_watch_link(const struct host_service *service, unsigned node)
+{
+    return host_link_to(node, cube_wiring(service->cube)->gate,
+                        service->machine->dimension);
+}
+
+static int fail_wrong(const struct host_service *s, struct host_error *error)
+{
+    const struct cube_wrong *wrong = &cube_wiring(s->cube)->wrong[0];
+    char text[CUBE_FAULT_BYTES];
+    (void)cube_wiring_fault(s->cube, text);
+    return host_fail(error, HOST_CUBE, "wiring: %s; %s", text,
+                     wrong->refusal == LINK_WRONG_WIRE
+                         ? "put that wire right and run again"
+                         : "run the same version of the program everywhere");
+}
+
+/* Nodes that are silent, and what follows.  One that takes nothing off its
+ * links holds up all that is on the way to it and behind, and so makes others
+ * silent: at first nobody is blamed, but each is called alone. */
+static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
+{
+    uint16_t gate = cube_wiring(s->cube)->gate;
+    for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
+        struct host_node *node = &s->node[i];
+        /* Without the only gate the run is over: haste gains nothing. */
+        bool haste = s->probing && (i != gate || s->machine->spare_node != 0);
+        uint64_t limit =
+            haste && s->patience_us > PROBE_US ? PROBE_US : s->patience_us;
+        if (node->calling && now_us - node->called_us >= node->call_again_us) {
+            node->call_due = true;
+            node->called_us = now_us;
+            node->call_again_us = 2 * node->call_again_us < CALL_AGAIN_US
+                                      ? 2 * node->call_again_us
+                                      : CALL_AGAIN_US;
+        }
+        if (!s->started || node->lost || !(node->calling || node->call_due)) {
+            continue;
+        }
+        node->silent_us += elapsed_us;
+        if (node->silent_us <= limit) {
+            continue;
+        }
+        node->silent_us = 0;
+        s->probe = true;
+        if (s->probing && s->machine->kill != NULL &&
+            s->machine->kill(s->machine->context, i)) {
+            continue; /* the machine will say that it has started it again */
+        }
+        node->given_up = s->probing;
+        s->blamed = i;
+        s->loss = true;
+    }
+}
+
+/* Whether another host has the nodes; it may have died just before. */
+static bool in_use(struct host_service *s, uint64_t now_us)
+{
+    const struct link_peer *peer = cube_link_peer(s->cube, wire_of(s));
+    if (peer->refusal != LINK_IN_USE) {
+        s->in_use_us = 0;
+        return false;
+    }
+    if (s->in_use_us == 0) {
+        s->in_use_us = now_us;
+    }
+    if (s->in_use != peer->in_use) {
+        s->in_use_told_us = now_us;
+        if (s->machine->rest != NULL) {
+            s->machine->rest(s->machine->context, IN_USE_REST_US);
+        }
+    }
+    s->in_use = peer->in_use;
+    return true;
+}
+
+/* Whether the other host goes on.  If not, its node says so no more, and lets
+ * this one in a moment later. */
+static bool stays_in_use(const struct host_service *s, uint64_t now_us)
+{
+    uint64_t passed = now_us - s->in_use_us;
+    return passed > IN_USE_US_LAST ||
+           (passed > IN_USE_US_MAX &&
+            now_us - s->in_use_told_us <= IN_USE_TOLD_US);
+}
+
+static int check_wire(struct host_service *s, uint64_t now_us,
+                      struct host_error *error)
+{
+    unsigned wire = wire_of(s);
+    enum link_state state = cube_link_state(s->cube, wire);
+    uint16_t gate = cube_wiring(s->cube)->gate;
+    if (in_use(s, now_us)) {
+        return !stays_in_use(s, now_us)
+                   ? 0
+                   : host_fail(error, HOST_CUBE,
+                               "node %u link %u: the cube is in use by another "
+                               "host; wait until its run is over, or end it",
+                               gate, s->machine->dimension);
+    }
+    if (state == LINK_REFUSED) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u link %u: the host's wire leads to node %u "
+                         "link %u, or to another version of the program; put "
+                         "the wire right, or run make",
+                         gate, s->machine->dimension,
+                         cube_link_peer(s->cube, wire)->node,
+                         cube_link_peer(s->cube, wire)->port);
+    }
+    /* A wire that was never up is waited for: its node may start late. */
+    if (state != LINK_DOWN ||
+        cube_link_statistics(s->cube, wire)->sessions == 0) {
+        s->wire_down_us = now_us;
+    }
+    if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX) {
+        s->wire_lost = true;
+        s->blamed = gate;
+        s->loss = true;
+    }
+    return 0;
+}
+
+/* For nodes to come: as long as the machine would need to start them. */
+static uint64_t patience_of(const struct host_service *s)
+{
+    return s->machine->restarts != NULL ? BRING_UP_US_MAX : s->patience_us;
+}
+
+int host_watch_doubt(const struct host_service *service, unsigned node,
+                     struct host_error *error)
+{
+    const struct host_machine *m = service->machine;
+    const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
+    return doubt == NULL
+               ? 0
+               : host_fail(error, HOST_CUBE, "node %u link %u: %s", node,
+                           host_watch_link(service, node), doubt);
+}
+
+static int fail_silent(const struct host_service *s, unsigned node,
+                       struct host_error *error)
+{
+    if (host_watch_doubt(s, node, error) != 0) {
+        return error->code;
+    }
+    return host_fail(error, HOST_CUBE,
+                     "node %u link %u: no answer, %u of %u nodes are there; is "
+                     "the node's program of this version%s, and the machine "
+                     "not too busy?",
+                     node, host_watch_link(s, node), s->here, s->machine->nodes,
+                     s->machine->keyed ? ", its key file the same" : "");
+}
+
+/* Nodes that have not answered since the generation began. */
+static int check_bring_up(const struct host_service *s, uint64_t now_us,
+                          struct host_error *error)
+{
+    if (s->started || s->here == s->living ||
+        now_us - s->began_us <= patience_of(s) ||
+        host_missing_undecided(s, now_us, patience_of(s))) {
+        return 0;
+    }
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->node[i].lost && !s->report[i].here) {
+            return fail_silent(s, i, error);
+        }
+    }
+    return 0;
+}
+
+int host_watch_check(struct host_service *service, uint64_t now_us,
+                     struct host_error *error)
+{
+    struct host_service *s = service;
+    const struct cube_wiring *wiring = cube_wiring(s->cube);
+    if (now_us - s->check_us < CHECK_EVERY_US) {
+        return 0;
+    }
+    uint64_t elapsed = now_us - s->check_us;
+    s->check_us = now_us;
+    if (s->machine->check(s->machine->context, error) != 0) {
+        return error->code;
+    }
+    if (wiring->wrong_count > 0) {
+        return fail_wrong(s, error);
+    }
+    if (s->machine->restarts != NULL &&
+        s->machine->restarts(s->machine->context) != s->restarts) {
+        s->restarts = s->machine->restarts(s->machine->context);
+        s->loss = true;
+    }
+    if (!host_missing_check(s, now_us, patience_of(s))) {
+        s->loss = s->loss || wiring->dead_count > wiring->settled;
+    }
+    call_in_turn(s, now_us);
+    elapsed = elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX;
+    listen(s, now_us, elapsed);
+    host_missing_look(s, elapsed);
+    if (check_wire(s, now_us, error) != 0) {
+        return error->code;
+    }
+    return check_bring_up(s, now_us, error);
+}

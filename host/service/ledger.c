@@ -1,0 +1,153 @@
+#include "ledger.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "incode/predicates/predicates.h"
+
+/* Ranges a worker after a loss: they differ in work, and whoever is free takes
+ * the next; but each has a border, which is worked on from both sides. */
+enum { PIECES = 2 };
+
+int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
+                     uint32_t nodes, struct host_error *error)
+{
+    memset(ledger, 0, sizeof *ledger);
+    ledger->bricks = bricks;
+    ledger->nodes = nodes;
+    ledger->piece_max = bricks;
+    ledger->bits = calloc((size_t)bricks / 64 + 1, sizeof *ledger->bits);
+    ledger->job = calloc(nodes, sizeof *ledger->job);
+    if (ledger->bits == NULL || ledger->job == NULL) {
+        host_ledger_free(ledger);
+        return host_fail_memory(error, "the list of bricks");
+    }
+    return 0;
+}
+
+void host_ledger_free(struct host_ledger *ledger)
+{
+    free(ledger->bits);
+    free(ledger->job);
+    memset(ledger, 0, sizeof *ledger);
+}
+
+/* The end of the region that a brick is in. */
+static uint32_t region_end(const struct host_order *order, uint32_t brick)
+{
+    uint32_t low = 0, high = order->regions;
+    while (high - low > 1) {
+        uint32_t middle = low + (high - low) / 2;
+        if (order->region[middle].first <= brick) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return order->region[low].last;
+}
+
+bool host_ledger_next(struct host_ledger *ledger,
+                      const struct host_order *order, uint32_t *first,
+                      uint32_t *last)
+{
+    uint32_t at = ledger->cursor;
+    while (at < ledger->bricks && host_ledger_committed(ledger, at)) {
+        at++;
+    }
+    *first = at;
+    if (at < ledger->bricks) {
+        uint32_t end = region_end(order, at);
+        while (at < end && at - *first < ledger->piece_max &&
+               !host_ledger_committed(ledger, at)) {
+            at++;
+        }
+    }
+    *last = at;
+    ledger->cursor = at;
+    return *first < *last;
+}
+
+uint32_t host_ledger_open(struct host_ledger *ledger, uint32_t node,
+                          uint32_t first, uint32_t last)
+{
+    struct host_job *job = &ledger->job[node];
+    job->epoch = ++ledger->epoch;
+    job->first = first;
+    job->last = last;
+    job->committed = 0;
+    return job->epoch;
+}
+
+bool host_ledger_current(const struct host_ledger *ledger, uint32_t node,
+                         uint32_t epoch)
+{
+    return node < ledger->nodes && epoch != 0 &&
+           ledger->job[node].epoch == epoch;
+}
+
+bool host_ledger_committed(const struct host_ledger *ledger, uint32_t brick)
+{
+    return (ledger->bits[brick / 64] >> (brick % 64) & 1) != 0;
+}
+
+int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
+                       uint32_t brick)
+{
+    struct host_job *job = &ledger->job[node];
+    if (job->epoch == 0 || brick < job->first || brick >= job->last ||
+        host_ledger_committed(ledger, brick)) {
+        return -1;
+    }
+    ledger->bits[brick / 64] |= UINT64_C(1) << (brick % 64);
+    ledger->committed++;
+    job->committed++;
+    return 0;
+}
+
+int host_ledger_finish(struct host_ledger *ledger, uint32_t node)
+{
+    struct host_job *job = &ledger->job[node];
+    if (job->epoch == 0 || job->committed != job->last - job->first) {
+        return -1;
+    }
+    job->epoch = 0;
+    return 0;
+}
+
+/* The brick that owns a tetrahedron. */
+static uint32_t owner(const struct host_order *order, const uint32_t v[4])
+{
+    uint32_t smallest = v[0];
+    double low[3], other[3];
+    host_vertex(order, v[0], low);
+    for (int i = 1; i < 4; i++) {
+        host_vertex(order, v[i], other);
+        if (incode_lexicographic(other, low) < 0) {
+            smallest = v[i];
+            memcpy(low, other, sizeof low);
+        }
+    }
+    return smallest / INCODE_BRICK_POINTS;
+}
+
+uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t workers,
+                             const struct host_order *order,
+                             struct host_tetrahedra *tets)
+{
+    uint64_t kept = 0, count = tets->count;
+    uint32_t left = ledger->bricks - ledger->committed;
+    for (uint64_t i = 0; i < count; i++) {
+        if (host_ledger_committed(ledger, owner(order, tets->v[i]))) {
+            memmove(tets->v[kept], tets->v[i], sizeof tets->v[0]);
+            kept++;
+        }
+    }
+    host_tetrahedra_cut(tets, kept);
+    for (uint32_t i = 0; i < ledger->nodes; i++) {
+        ledger->job[i].epoch = 0;
+    }
+    ledger->cursor = 0;
+    ledger->piece_max = workers <= 1 ? left : left / (PIECES * workers) + 1;
+    return count - kept;
+}

@@ -1,0 +1,77 @@
+/* All that the host's service asks of the place where its cube runs, as
+ * node/board.h is all that a node asks of its board: processes of this machine,
+ * ranks of MPI, real boards, or a simulation.  The service reads the time and
+ * sleeps through it alone.
+ *
+ * Memory: none of its own.  Work: every function returns at once, but for idle.
+ *
+ *     machine = host_cluster_machine(&cluster);
+ *     while (working) { poll; serve; machine.idle(machine.context, due_us); }
+ *     machine.stop(machine.context);
+ */
+#ifndef HOST_MACHINE_H
+#define HOST_MACHINE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "transport/cube.h"
+#include "host/base/error.h"
+
+enum { HOST_NODES_MAX = 1024 }; /* of any machine: 2^CUBE_DIMENSION_MAX */
+
+struct host_machine {
+    void *context;
+    unsigned nodes, dimension;
+    uint32_t epoch;        /* of this start of the host, never repeated */
+    struct link_pipe pipe; /* the bytes to and from node 0 */
+    uint32_t line_baud;    /* of the slowest serial line; 0: there is none */
+    /* A second wire, to another node, for when node 0 is lost; 0: none. */
+    uint16_t spare_node;
+    struct link_pipe spare;
+    /* Instead of it, wires to nodes 0 .. host_wires - 1; see cube.h. */
+    uint8_t host_wires;
+    struct link_pipe wires[CUBE_HOST_WIRES_MAX]; /* [0] is `pipe` */
+    /* A wire that is missing from the start is gone round, and later one that
+     * was not up for so many seconds; 0: the machine has made its wires. */
+    uint8_t absent_s;
+    /* Is told of a wire that is missing from the start; NULL: the user is, on
+     * standard error. */
+    void (*missing)(void *context, unsigned node, unsigned link);
+    /* Microseconds since any fixed time, never going back. */
+    uint64_t (*now_us)(void *context);
+    /* Sleeps until bytes have come, or room for them where there was none, but
+     * no longer than wait_us. */
+    void (*idle)(void *context, uint64_t wait_us);
+    /* Looks after the nodes, and starts again those that it started itself and
+     * that died.  0, or HOST_CUBE where the cube cannot go on. */
+    int (*check)(void *context, struct host_error *error);
+    /* How many nodes `check` has started again so far; NULL: it never does. */
+    unsigned (*restarts)(void *context);
+    /* Ends a node that does not answer, for `check` to start it again; false,
+     * as where it is NULL: the node is not this machine's to start. */
+    bool (*kill)(void *context, unsigned node);
+    bool keyed; /* the nodes must have the host's key */
+    /* Why a node is not heard, and what to do, as "WHAT; WHAT TO DO NEXT";
+     * NULL, or the result: nothing is known of it. */
+    const char *(*doubt)(void *context, unsigned node);
+    /* Leaves the host's wires alone for a time, as another host has them; NULL:
+     * there is no other. */
+    void (*rest)(void *context, uint64_t rest_us);
+    /* Whether every node has ended: true as well where nothing tells.  Called
+     * at the end, when no node is to be started again. */
+    bool (*ended)(void *context);
+    /* Ends what still runs and was started here. */
+    void (*stop)(void *context);
+};
+
+/* The link by which a node is reached from the gate, the last of e-cube's way;
+ * of the gate, the host's wire. */
+static inline unsigned host_link_to(unsigned node, unsigned gate,
+                                    unsigned dimension)
+{
+    unsigned away = node ^ gate;
+    return away == 0 ? dimension : 31u - (unsigned)__builtin_clz(away);
+}
+
+#endif

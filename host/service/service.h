@@ -1,0 +1,158 @@
+/* The host's part of a run: hands out the setup and the jobs, serves pages,
+ * collects tetrahedra and commits, keeps spilled faces, gives credit, and
+ * watches over the nodes.  One loop, one thread; it never waits to write while
+ * there is something to read.
+ *
+ * On any loss (watch.h) it begins a new generation of the cube's wiring: every
+ * node drops its job and its role, uncommitted tetrahedra are dropped here, and
+ * their bricks are given out again, in ranges.
+ *
+ * Memory: the cube's windows, 3 KiB a node, a bit a brick, the spilled faces
+ * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
+ *
+ *     host_service_run(&service, &error);
+ *     service.report[i].finished.statistics ...; tets: vertex numbers
+ *     host_service_end(&service);
+ */
+#ifndef HOST_SERVICE_H
+#define HOST_SERVICE_H
+
+#include "node/message.h"
+#include "ledger.h"
+#include "machine.h"
+#include "host/order/order.h"
+#include "host/base/progress.h"
+#include "spill.h"
+#include "host/mesh/tetrahedra.h"
+
+enum {
+    HOST_PAGES_QUEUED_MAX = 256,
+    HOST_UNSPILLS_MAX = 64,
+    HOST_PATIENCE_US = 60000000 /* unless the caller says otherwise */
+};
+
+/* What the host knows of one node while it runs. */
+struct host_node {
+    uint32_t pages[HOST_PAGES_QUEUED_MAX]; /* asked for, to be sent */
+    uint32_t pages_first, pages_count;
+    struct {
+        struct node_spill_header header;
+        struct host_spill_list list;
+    } unspills[HOST_UNSPILLS_MAX]; /* asked for, to be sent */
+    uint32_t unspills_first, unspills_count;
+    uint32_t results; /* messages taken */
+    uint32_t credit;  /* messages allowed, as the node knows */
+    /* What is to be sent, in this order. */
+    bool call_due, setup_due, job_due, report_due;
+    struct node_job_message job;
+    bool working;  /* a job is out */
+    bool reported; /* statistics of all that it has done are here */
+    /* Whether it is there: watch.h. */
+    bool lost;     /* not reached in this generation: nothing is sent to it */
+    bool given_up; /* for the rest of the run */
+    bool calling;  /* a call has not been answered */
+    bool called;   /* what it was sent last is a call */
+    uint32_t sent, received; /* letters of this generation */
+    uint32_t missed;         /* calls that were lost before the first answer */
+    uint32_t start;          /* the epoch of its start; 0: not heard of */
+    uint64_t silent_us;      /* that it has not answered */
+    uint64_t called_us, call_again_us;
+    uint32_t links;          /* that have been up, as either end has said */
+    uint64_t links_heard_us; /* uncabled_us when this end said so last */
+    /* Statistics of starts that are over, and tetrahedra of the present one
+     * that no statistics know of yet. */
+    struct node_finished_message before;
+    uint64_t unreported;
+};
+
+/* What remains of a node when the run is over. */
+struct host_node_report {
+    bool here, ready;
+    struct node_ready_message map;
+    struct node_finished_message statistics;
+    uint64_t pages; /* that this node had from the host */
+    uint64_t page_bytes;
+};
+
+struct host_service {
+    /* Given by the caller, who clears the rest. */
+    struct host_machine *machine;
+    const struct host_order *order;
+    struct host_tetrahedra *tets; /* takes rows of vertex numbers */
+    struct node_setup_message setup;
+    unsigned window;      /* frames; 0: a large one */
+    uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
+    bool show_progress;
+    /* Nodes that compute, one region of the order each; others hold pages. */
+    unsigned workers;
+    /* Results. */
+    struct host_node_report *report; /* [nodes], until the end */
+    uint64_t pages_us;               /* time spent on serving pages */
+    uint64_t retransmitted;          /* frames, on the host's wire */
+    unsigned restarts;               /* of nodes, by the machine */
+    unsigned generations;            /* of the cube's wiring; 1: no loss */
+    unsigned missing_wires;          /* that were named: missing.h */
+    /* Private. */
+    struct cube *cube;
+    void *cube_memory;
+    struct host_node *node;
+    struct host_ledger ledger;
+    struct host_spill spill;
+    struct host_progress progress;
+    bool started, finished;
+    bool dealt;          /* the first jobs of this generation are out */
+    bool over;           /* all is here that is needed */
+    uint32_t generation; /* of the wiring that is followed */
+    bool loss;           /* a new generation is due */
+    unsigned blamed;     /* the node of the last loss, as far as is known */
+    /* Losses in a row without a brick between them that was committed. */
+    unsigned fruitless;
+    uint32_t committed_before;
+    bool wire_lost; /* the one in use is dead */
+    /* Wires that never came up are looked for: missing.h. */
+    bool searching;
+    uint64_t search_us;   /* since when, */
+    uint64_t news_us;     /* and when a node answered for the first time last */
+    bool cabled;          /* every wire has been up, or was named */
+    uint64_t uncabled_us; /* time without that, while all nodes answer */
+    bool probe, probing; /* nodes are called one by one: in the next generation;
+                            now, until all have answered */
+    unsigned living;     /* nodes that are not lost */
+    unsigned here, ready; /* of them, that are up; that have their setup */
+    unsigned working;     /* that have a job */
+    unsigned turn;        /* the node to be served next */
+    unsigned call_turn;   /* to be called next */
+    uint64_t call_us, check_us, began_us, wire_down_us;
+    uint64_t in_use_us; /* since when another host has the nodes; 0: none */
+    uint64_t in_use_told_us; /* and when they said so last */
+    uint32_t in_use;         /* times that they said so */
+};
+
+/* Brings up the cube on the machine's wire, and waits until every node has
+ * answered: the start-up. */
+int host_service_start(struct host_service *service, struct host_error *error);
+
+/* The same in parts, for who has other things to do between two rounds of the
+ * loop: before the first; one; and whether every node has answered. */
+int host_service_open(struct host_service *service, struct host_error *error);
+int host_service_round(struct host_service *service, struct host_error *error);
+bool host_service_is_up(const struct host_service *service);
+
+/* Hands out the setup and the jobs, and returns when every brick is committed
+ * and every node has told its statistics. */
+int host_service_run(struct host_service *service, struct host_error *error);
+
+/* After the run, and no part of its time: waits for wires that have not been up
+ * yet, and that nothing needed, until they are or are named.  At once where all
+ * have been, as is the rule. */
+int host_service_wires(struct host_service *service, struct host_error *error);
+
+/* For missing.h: the node by which the host speaks from now on: as before, or
+ * the other one that has a wire to the host. */
+uint16_t host_service_gate(const struct host_service *service,
+                           const struct cube_wiring *next);
+
+/* Tells the nodes to stop, ends those that do not, and frees all. */
+void host_service_end(struct host_service *service);
+
+#endif

@@ -1,0 +1,279 @@
+#include "spill.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "host/base/memory.h"
+
+enum { BLOCKS_MEMORY_DEFAULT = 131072, TABLE_START = 1024 };
+
+struct host_spill_block {
+    uint32_t next;
+    uint16_t first, end; /* faces [first, end) are there */
+    struct incode_face faces[HOST_SPILL_BLOCK_FACES];
+};
+
+struct host_spill_entry {
+    uint32_t node, brick;
+    struct host_spill_list list;
+    bool used;
+};
+
+int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
+                    struct host_error *error)
+{
+    memset(spill, 0, sizeof *spill);
+    spill->blocks_memory =
+        blocks_memory == 0 ? BLOCKS_MEMORY_DEFAULT : blocks_memory;
+    spill->free = HOST_SPILL_END;
+    spill->file = -1;
+    spill->table_size = TABLE_START;
+    spill->table = calloc(TABLE_START, sizeof *spill->table);
+    return spill->table == NULL ? host_fail_memory(error, "spilled faces") : 0;
+}
+
+void host_spill_clear(struct host_spill *spill)
+{
+    memset(spill->table, 0, spill->table_size * sizeof *spill->table);
+    spill->table_used = 0;
+    spill->blocks_used = 0;
+    spill->free = HOST_SPILL_END;
+    spill->faces = 0;
+}
+
+void host_spill_free(struct host_spill *spill)
+{
+    host_unmap(spill->blocks, spill->blocks_mapped * sizeof *spill->blocks);
+    free(spill->table);
+    if (spill->file >= 0) {
+        close(spill->file);
+    }
+    memset(spill, 0, sizeof *spill);
+    spill->file = -1;
+}
+
+static int file_failed(struct host_error *error)
+{
+    return host_fail(error, HOST_BROKEN,
+                     "temporary file of spilled faces: %s; make room in the "
+                     "directory for temporary files or set TMPDIR to another",
+                     strerror(errno));
+}
+
+static off_t offset_of(const struct host_spill *s, uint32_t block)
+{
+    return (off_t)(block - s->blocks_memory) *
+           (off_t)sizeof(struct host_spill_block);
+}
+
+static int load(const struct host_spill *s, uint32_t block,
+                struct host_spill_block *copy, struct host_error *error)
+{
+    if (block < s->blocks_memory) {
+        *copy = s->blocks[block];
+        return 0;
+    }
+    errno = EIO;
+    return pread(s->file, copy, sizeof *copy, offset_of(s, block)) ==
+                   (ssize_t)sizeof *copy
+               ? 0
+               : file_failed(error);
+}
+
+static int store(struct host_spill *s, uint32_t block,
+                 const struct host_spill_block *copy, struct host_error *error)
+{
+    if (block < s->blocks_memory) {
+        s->blocks[block] = *copy;
+        return 0;
+    }
+    errno = ENOSPC;
+    return pwrite(s->file, copy, sizeof *copy, offset_of(s, block)) ==
+                   (ssize_t)sizeof *copy
+               ? 0
+               : file_failed(error);
+}
+
+/* A file without a name: it goes when the program goes. */
+static int open_file(struct host_spill *s, struct host_error *error)
+{
+    const char *directory = getenv("TMPDIR");
+    char name[512];
+    if (directory == NULL || strlen(directory) > 400) {
+        directory = "/tmp";
+    }
+    strcpy(name, directory);
+    strcat(name, "/incode-XXXXXX");
+    s->file = mkostemp(name, O_CLOEXEC);
+    if (s->file < 0) {
+        return file_failed(error);
+    }
+    unlink(name);
+    return 0;
+}
+
+/* A block without faces that no list has. */
+static int new_block(struct host_spill *s, uint32_t *block,
+                     struct host_error *error)
+{
+    struct host_spill_block copy = {HOST_SPILL_END, 0, 0, {{{0}}}};
+    *block = s->free;
+    if (s->free != HOST_SPILL_END) {
+        struct host_spill_block old;
+        if (load(s, s->free, &old, error) != 0) {
+            return error->code;
+        }
+        s->free = old.next;
+        return store(s, *block, &copy, error);
+    }
+    *block = s->blocks_used;
+    if (*block < s->blocks_memory && *block >= s->blocks_mapped) {
+        uint32_t grown = s->blocks_mapped == 0 ? 256 : 2 * s->blocks_mapped;
+        grown = grown > s->blocks_memory ? s->blocks_memory : grown;
+        void *moved =
+            host_remap(s->blocks, s->blocks_mapped * sizeof *s->blocks,
+                       grown * sizeof *s->blocks);
+        if (moved == NULL) {
+            return host_fail_memory(error, "spilled faces");
+        }
+        s->blocks = moved;
+        s->blocks_mapped = grown;
+    }
+    if (*block >= s->blocks_memory && s->file < 0 && open_file(s, error) != 0) {
+        return error->code;
+    }
+    s->blocks_used++;
+    return store(s, *block, &copy, error);
+}
+
+static struct host_spill_entry *find(const struct host_spill *s, uint32_t node,
+                                     uint32_t brick)
+{
+    uint32_t at = (brick * 2654435761u ^ node * 40503u) % s->table_size;
+    while (s->table[at].used &&
+           (s->table[at].node != node || s->table[at].brick != brick)) {
+        at = (at + 1) % s->table_size;
+    }
+    return &s->table[at];
+}
+
+/* Entries stay once made: a brick that spilled will often spill again. */
+static int grow_table(struct host_spill *s, struct host_error *error)
+{
+    struct host_spill old = *s;
+    s->table_size = 2 * old.table_size;
+    s->table = calloc(s->table_size, sizeof *s->table);
+    if (s->table == NULL) {
+        *s = old;
+        return host_fail_memory(error, "spilled faces");
+    }
+    for (uint32_t i = 0; i < old.table_size; i++) {
+        if (old.table[i].used) {
+            *find(s, old.table[i].node, old.table[i].brick) = old.table[i];
+        }
+    }
+    free(old.table);
+    return 0;
+}
+
+static int append(struct host_spill *s, struct host_spill_list *list,
+                  struct incode_face face, struct host_error *error)
+{
+    struct host_spill_block tail;
+    tail.end = 0;
+    if (list->tail != HOST_SPILL_END && list->faces > 0 &&
+        load(s, list->tail, &tail, error) != 0) {
+        return error->code;
+    }
+    if (list->faces == 0 || tail.end == HOST_SPILL_BLOCK_FACES) {
+        uint32_t block;
+        if (new_block(s, &block, error) != 0) {
+            return error->code;
+        }
+        if (list->faces == 0) {
+            list->head = block;
+        } else {
+            tail.next = block;
+            if (store(s, list->tail, &tail, error) != 0) {
+                return error->code;
+            }
+        }
+        list->tail = block;
+        memset(&tail, 0, sizeof tail);
+        tail.next = HOST_SPILL_END;
+    }
+    tail.faces[tail.end++] = face;
+    list->faces++;
+    return store(s, list->tail, &tail, error);
+}
+
+int host_spill_put(struct host_spill *spill, uint32_t node,
+                   const struct incode_face *faces, uint32_t count,
+                   struct host_error *error)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t brick = faces[i].v[0] / INCODE_BRICK_POINTS;
+        struct host_spill_entry *entry = find(spill, node, brick);
+        if (!entry->used) {
+            if (2 * (spill->table_used + 1) > spill->table_size &&
+                grow_table(spill, error) != 0) {
+                return error->code;
+            }
+            entry = find(spill, node, brick);
+            spill->table_used++;
+            *entry = (struct host_spill_entry){
+                node, brick, {HOST_SPILL_END, HOST_SPILL_END, 0}, true};
+        }
+        if (append(spill, &entry->list, faces[i], error) != 0) {
+            return error->code;
+        }
+    }
+    spill->faces += count;
+    spill->faces_total += count;
+    if (spill->faces > spill->faces_max) {
+        spill->faces_max = spill->faces;
+    }
+    return 0;
+}
+
+struct host_spill_list host_spill_detach(struct host_spill *spill,
+                                         uint32_t node, uint32_t brick)
+{
+    struct host_spill_list empty = {HOST_SPILL_END, HOST_SPILL_END, 0};
+    struct host_spill_entry *entry = find(spill, node, brick);
+    struct host_spill_list list = entry->used ? entry->list : empty;
+    entry->list = empty;
+    return list;
+}
+
+int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
+                    struct incode_face *faces, uint32_t max, uint32_t *count,
+                    struct host_error *error)
+{
+    *count = 0;
+    while (list->faces > 0 && *count < max) {
+        struct host_spill_block block;
+        uint32_t at = list->head;
+        if (load(spill, at, &block, error) != 0) {
+            return error->code;
+        }
+        while (block.first < block.end && *count < max) {
+            faces[(*count)++] = block.faces[block.first++];
+            list->faces--;
+            spill->faces--;
+        }
+        if (block.first == block.end) {
+            list->head = block.next;
+            block.next = spill->free;
+            spill->free = at;
+        }
+        if (store(spill, at, &block, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,63 @@
+/* Where nodes put the part of their active face lists that does not fit: lists
+ * of faces by node and brick, in memory first, then in a temporary file that
+ * has no name and is gone when the program is.
+ *
+ * Memory: blocks of 512 bytes up to blocks_memory, and 24 bytes a list; beyond
+ * it, disk.  Work: constant a block.
+ *
+ *     host_spill_put(&spill, node, faces, count, &error);
+ *     list = host_spill_detach(&spill, node, brick);
+ *     n = host_spill_take(&spill, &list, faces, 128, &error);
+ */
+#ifndef HOST_SPILL_H
+#define HOST_SPILL_H
+
+#include <stdint.h>
+
+#include "incode/triangulator.h"
+#include "host/base/error.h"
+
+enum { HOST_SPILL_BLOCK_FACES = 42 };
+
+#define HOST_SPILL_END UINT32_MAX
+
+/* A list taken out of the store: its first block. */
+struct host_spill_list {
+    uint32_t head, tail;
+    uint64_t faces;
+};
+
+struct host_spill {
+    struct host_spill_block *blocks; /* the first of them */
+    uint32_t blocks_memory;          /* most that are kept in memory */
+    uint32_t blocks_mapped;          /* capacity of `blocks` */
+    uint32_t blocks_used, free;      /* high water; list of free blocks */
+    int file;                        /* -1, or the blocks past memory */
+    struct host_spill_entry *table;  /* open addressing by node and brick */
+    uint32_t table_size, table_used;
+    uint64_t faces, faces_max, faces_total;
+};
+
+/* blocks_memory: 0 for the default, 64 MiB. */
+int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
+                    struct host_error *error);
+/* Drops all lists. */
+void host_spill_clear(struct host_spill *spill);
+void host_spill_free(struct host_spill *spill);
+
+/* Appends faces to the lists of their bricks, v[0] / 64. */
+int host_spill_put(struct host_spill *spill, uint32_t node,
+                   const struct incode_face *faces, uint32_t count,
+                   struct host_error *error);
+
+/* Takes a list out; what is put later starts a new one.  Empty if none. */
+struct host_spill_list host_spill_detach(struct host_spill *spill,
+                                         uint32_t node, uint32_t brick);
+
+/* Moves up to max faces from the list's front, oldest first, to `faces`, sets
+ * *count; the list is used up when list->faces is 0. */
+int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
+                    struct incode_face *faces, uint32_t max, uint32_t *count,
+                    struct host_error *error);
+
+#endif

@@ -1,0 +1,110 @@
+#include <argp.h>
+#include <string.h>
+
+#include "host/run/arguments.h"
+#include "sim.h"
+
+enum { KEY_SEED = 256, KEY_SEEDS, KEY_NODES, KEY_SECONDS };
+
+struct parse_sim {
+    struct host_sim_options *options;
+    struct host_error *error;
+};
+
+/* A..B, both included. */
+static void parse_seeds(struct parse_sim *p, const char *value)
+{
+    struct host_sim_options *o = p->options;
+    char first[32] = "";
+    const char *dots = strstr(value, "..");
+    size_t length = dots == NULL ? sizeof first : (size_t)(dots - value);
+    if (length < sizeof first) {
+        memcpy(first, value, length);
+    }
+    if (dots == NULL ||
+        host_parse_number(first, 0, UINT64_MAX, &o->first) != 0 ||
+        host_parse_number(dots + 2, o->first, UINT64_MAX, &o->last) != 0) {
+        host_fail(p->error, HOST_USAGE,
+                  "--seeds %s: not a range of seeds; give A..B, as in 1..1000",
+                  value);
+    }
+}
+
+static error_t parse_sim_option(int key, char *value, struct argp_state *state)
+{
+    struct parse_sim *p = state->input;
+    uint64_t n = 0;
+    switch (key) {
+    case KEY_SEED:
+        if (host_parse_number(value, 0, UINT64_MAX, &n) != 0) {
+            host_fail(p->error, HOST_USAGE,
+                      "--seed %s: not a number; give 0 or more", value);
+        }
+        p->options->first = p->options->last = n;
+        return 0;
+    case KEY_SEEDS:
+        parse_seeds(p, value);
+        return 0;
+    case KEY_SECONDS:
+        if (host_parse_number(value, 1, 1000000, &p->options->seconds_max) !=
+            0) {
+            host_fail(p->error, HOST_USAGE,
+                      "--seconds %s: not a number; give 1 or more", value);
+        }
+        return 0;
+    case KEY_NODES:
+        if (host_parse_number(value, 1, HOST_NODES_MAX, &n) != 0 ||
+            (n & (n - 1)) != 0) {
+            host_fail(p->error, HOST_USAGE,
+                      "--nodes %s: not a number of nodes of a cube; allowed: "
+                      "1, 2, 4 .. %d",
+                      value, HOST_NODES_MAX);
+        }
+        p->options->nodes = (unsigned)n;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
+                       struct host_error *error)
+{
+    static const struct argp_option options_of_sim[] = {
+        {"seed", KEY_SEED, "S", 0, "Run seed S. Default: 1", 0},
+        {"seeds", KEY_SEEDS, "A..B", 0, "Run seeds A to B, and print totals",
+         0},
+        {"nodes", KEY_NODES, "N", 0,
+         "Nodes of the cube: 1, 2, 4 .. 1024. Default: the seed decides", 0},
+        {"seconds", KEY_SECONDS, "T", 0,
+         "Begin no seed after T seconds of processor time", 0},
+        {0}};
+    static const struct argp argp = {
+        options_of_sim,
+        parse_sim_option,
+        "",
+        "Runs a whole cube - host, nodes and links as they are - in one "
+        "process in virtual time.  The seed decides on points, cube, wires and "
+        "faults: "
+        "lost and damaged frames, stalls, closed wires, partitions, pauses, "
+        "crashes, small memories, a slow host.  Then the faults stop, and the "
+        "result must be the right one.  Each seed prints what struck while "
+        "work was open; a failure prints the command that replays it.\v"
+        "Examples:\n"
+        "  incode sim --seed 17\n"
+        "  incode sim --seeds 1..1000\n"
+        "  incode sim --seeds 1..20 --nodes 64\n\n"
+        "Exit status: 0 every result right, 1 something was left behind or the "
+        "program failed, 2 wrong usage, 4 a run did not end or a node failed, "
+        "5 a wrong result.",
+        NULL,
+        NULL,
+        NULL};
+    struct parse_sim parse = {options, error};
+    *options = (struct host_sim_options){.first = 1, .last = 1};
+    if (argp_parse(&argp, argc, argv, 0, NULL, &parse) != 0) {
+        return host_fail(error, HOST_USAGE,
+                         "incode sim: wrong usage; see incode sim --help");
+    }
+    return error->code;
+}

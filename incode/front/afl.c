@@ -1,0 +1,200 @@
+#include "afl.h"
+
+#include <string.h>
+
+#include "incode/predicates/check.h"
+#include "incode/pages/pages.h"
+
+static uint32_t power_below(uint32_t n)
+{
+    uint32_t power = 1;
+    while (power <= n / 2)
+        power *= 2;
+    return power;
+}
+
+size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks)
+{
+    size_t heads = (size_t)power_below(capacity) + power_below(bricks);
+    return capacity * sizeof(struct incode_afl_node) +
+           bricks * sizeof(struct incode_touched) + heads * sizeof(uint32_t);
+}
+
+void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
+                     uint32_t bricks)
+{
+    INCODE_ASSERT(capacity > 0 && bricks > 0);
+    memset(afl, 0, sizeof *afl);
+    afl->touched = memory;
+    afl->nodes = (struct incode_afl_node *)(void *)(afl->touched + bricks);
+    afl->heads = (uint32_t *)(void *)(afl->nodes + capacity);
+    afl->capacity = capacity;
+    afl->mask = power_below(capacity) - 1;
+    afl->touched_heads = afl->heads + afl->mask + 1;
+    afl->touched_capacity = bricks;
+    afl->touched_mask = power_below(bricks) - 1;
+    incode_afl_clear(afl);
+}
+
+void incode_afl_clear(struct incode_afl *afl)
+{
+    for (uint32_t i = 0; i <= afl->mask; i++)
+        afl->heads[i] = INCODE_AFL_NIL;
+    for (uint32_t i = 0; i <= afl->touched_mask; i++)
+        afl->touched_heads[i] = INCODE_AFL_NIL;
+    for (uint32_t i = 0; i < afl->touched_capacity; i++) {
+        afl->touched[i].brick = INCODE_NONE;
+        afl->touched[i].next =
+            i + 1 < afl->touched_capacity ? i + 1 : INCODE_AFL_NIL;
+    }
+    afl->free = INCODE_AFL_NIL;
+    afl->unused = afl->touched_free = 0;
+    afl->count = afl->touched_count = 0;
+    afl->crowded = INCODE_NONE;
+}
+
+static uint32_t *touched_head(const struct incode_afl *afl, uint32_t brick)
+{
+    return &afl->touched_heads[(brick * UINT32_C(2654435761) >> 8) &
+                               afl->touched_mask];
+}
+
+struct incode_touched *incode_afl_find(const struct incode_afl *afl,
+                                       uint32_t brick)
+{
+    uint32_t i = *touched_head(afl, brick);
+    while (i != INCODE_AFL_NIL && afl->touched[i].brick != brick)
+        i = afl->touched[i].next;
+    return i == INCODE_AFL_NIL ? NULL : &afl->touched[i];
+}
+
+struct incode_touched *incode_afl_touch(struct incode_afl *afl, uint32_t brick)
+{
+    struct incode_touched *entry = incode_afl_find(afl, brick);
+    if (entry != NULL)
+        return entry;
+    uint32_t i = afl->touched_free;
+    INCODE_ASSERT(i != INCODE_AFL_NIL);
+    entry = &afl->touched[i];
+    afl->touched_free = entry->next;
+    memset(entry, 0, sizeof *entry);
+    entry->brick = brick;
+    uint32_t *head = touched_head(afl, brick);
+    entry->next = *head;
+    *head = i;
+    afl->touched_count++;
+    if (afl->touched_count > afl->touched_max)
+        afl->touched_max = afl->touched_count;
+    return entry;
+}
+
+void incode_afl_drop(struct incode_afl *afl, uint32_t brick)
+{
+    uint32_t *link = touched_head(afl, brick);
+    while (*link != INCODE_AFL_NIL && afl->touched[*link].brick != brick)
+        link = &afl->touched[*link].next;
+    if (*link == INCODE_AFL_NIL)
+        return;
+    uint32_t i = *link;
+    INCODE_ASSERT(afl->touched[i].faces == 0);
+    *link = afl->touched[i].next;
+    afl->touched[i].brick = INCODE_NONE;
+    afl->touched[i].next = afl->touched_free;
+    afl->touched_free = i;
+    afl->touched_count--;
+}
+
+static uint32_t *head_of(const struct incode_afl *afl, uint32_t key)
+{
+    return &afl->heads[(key * UINT32_C(2654435761) >> 7) & afl->mask];
+}
+
+static uint32_t take_node(struct incode_afl *afl)
+{
+    uint32_t i = afl->free;
+    if (i == INCODE_AFL_NIL) {
+        INCODE_ASSERT(afl->unused < afl->capacity);
+        return afl->unused++;
+    }
+    afl->free = afl->nodes[i].next;
+    return i;
+}
+
+static void unlink_node(struct incode_afl *afl, uint32_t *link)
+{
+    uint32_t i = *link;
+    *link = afl->nodes[i].next;
+    afl->nodes[i].next = afl->free;
+    afl->free = i;
+    afl->count--;
+}
+
+bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
+                           uint32_t c)
+{
+    uint32_t *link = head_of(afl, key), passed = 0;
+    while (*link != INCODE_AFL_NIL) {
+        struct incode_afl_node *node = &afl->nodes[*link];
+        if (node->key == key && node->b == c && node->c == b) {
+            unlink_node(afl, link);
+            incode_afl_find(afl, key / INCODE_BRICK_POINTS)->faces--;
+            return true;
+        }
+        INCODE_ASSERT(node->key != key || node->b != b || node->c != c);
+        passed += node->key == key;
+        link = &node->next;
+    }
+    if (passed >= INCODE_AFL_CROWD && afl->crowded == INCODE_NONE)
+        afl->crowded = key;
+    return false;
+}
+
+void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
+                       uint32_t c)
+{
+    if (incode_afl_close_twin(afl, key, b, c))
+        return;
+    uint32_t i = take_node(afl);
+    struct incode_afl_node *node = &afl->nodes[i];
+    uint32_t *head = head_of(afl, key);
+    *node = (struct incode_afl_node){key, b, c, *head};
+    *head = i;
+    struct incode_touched *entry =
+        incode_afl_touch(afl, key / INCODE_BRICK_POINTS);
+    entry->faces++;
+    entry->pending |= UINT64_C(1) << (key % INCODE_BRICK_POINTS);
+    afl->count++;
+    if (afl->count > afl->count_max)
+        afl->count_max = afl->count;
+}
+
+uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
+                         uint32_t (*pairs)[2], uint32_t limit, bool *more)
+{
+    uint32_t taken = 0;
+    uint32_t *link = head_of(afl, v);
+    *more = false;
+    while (*link != INCODE_AFL_NIL) {
+        struct incode_afl_node *node = &afl->nodes[*link];
+        if (node->key != v) {
+            link = &node->next;
+            continue;
+        }
+        if (taken == limit) {
+            *more = true;
+            break;
+        }
+        pairs[taken][0] = node->b;
+        pairs[taken][1] = node->c;
+        taken++;
+        unlink_node(afl, link);
+    }
+    struct incode_touched *entry =
+        incode_afl_find(afl, v / INCODE_BRICK_POINTS);
+    if (entry != NULL) {
+        entry->faces -= taken;
+        if (!*more)
+            entry->pending &= ~(UINT64_C(1) << (v % INCODE_BRICK_POINTS));
+    }
+    return taken;
+}

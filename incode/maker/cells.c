@@ -1,0 +1,408 @@
+#include "cells.h"
+
+#include <stdalign.h>
+#include <string.h>
+
+#include "incode/predicates/check.h"
+
+/* ---- where cells lie ---- */
+
+/* Along dimension d, a coordinate that no point of the cells from `cell` on
+ * lies below.  The cell function itself is asked, and it never falls as the
+ * coordinate grows, so rounding cannot make the bound wrong, only wide. */
+static double floor_of(const struct incode_grid *g, int d, uint32_t cell)
+{
+    double lo = g->lo[d], hi = g->hi[d];
+    if (cell == 0)
+        return lo;
+    double side = 0.5 * hi - 0.5 * lo;
+    double wall = 2 * (0.5 * lo + side * ((double)cell / g->cells[d]));
+    double slack =
+        0x1p-50 * (__builtin_fabs(lo) + __builtin_fabs(hi)) + 0x1p-1070;
+    for (int i = 0; i < 4; i++, slack *= 64) {
+        double bound = wall - slack;
+        if (!(bound > lo))
+            return lo;
+        if (incode_cell_along(lo, hi, g->cells[d], bound) < cell)
+            return bound;
+    }
+    return lo;
+}
+
+/* The same from above, for the cells up to `cell`. */
+static double ceiling_of(const struct incode_grid *g, int d, uint32_t cell)
+{
+    double lo = g->lo[d], hi = g->hi[d];
+    if (cell + 1 >= g->cells[d])
+        return hi;
+    double side = 0.5 * hi - 0.5 * lo;
+    double wall = 2 * (0.5 * lo + side * ((double)(cell + 1) / g->cells[d]));
+    double slack =
+        0x1p-50 * (__builtin_fabs(lo) + __builtin_fabs(hi)) + 0x1p-1070;
+    for (int i = 0; i < 4; i++, slack *= 64) {
+        double bound = wall + slack;
+        if (!(bound < hi))
+            return hi;
+        if (incode_cell_along(lo, hi, g->cells[d], bound) > cell)
+            return bound;
+    }
+    return hi;
+}
+
+struct range {
+    uint32_t first, last;
+};
+
+/* The cells of dimension d within `reach` of the centre. */
+static struct range range_of(const struct incode_cells *c,
+                             const struct incode_grid *g, int d, uint32_t reach)
+{
+    uint32_t at = c->centre[d], last = g->cells[d] - 1;
+    return (struct range){at > reach ? at - reach : 0,
+                          last - at > reach ? at + reach : last};
+}
+
+/* Boxes as the query wants them: eight at once. */
+struct lane_boxes {
+    alignas(64) double lo[3][8];
+    alignas(64) double hi[3][8];
+};
+
+static uint32_t passing(const struct incode_query *q,
+                        const struct lane_boxes *boxes, unsigned count)
+{
+    const double *const lo[3] = {boxes->lo[0], boxes->lo[1], boxes->lo[2]};
+    const double *const hi[3] = {boxes->hi[0], boxes->hi[1], boxes->hi[2]};
+    return incode_query_boxes(q, lo, hi, count);
+}
+
+static void set_range(struct lane_boxes *boxes, const struct incode_grid *g,
+                      int d, struct range range)
+{
+    boxes->lo[d][0] = floor_of(g, d, range.first);
+    boxes->hi[d][0] = ceiling_of(g, d, range.last);
+}
+
+/* Whether the question still concerns what lies beyond `reach`: six slabs of
+ * the whole box, one beyond each side. */
+static bool more_beyond(const struct incode_cells *c,
+                        const struct incode_grid *g,
+                        const struct incode_query *q)
+{
+    struct lane_boxes boxes;
+    unsigned count = 0;
+    memset(&boxes, 0, sizeof boxes);
+    for (int d = 0; d < 3; d++) {
+        struct range range = range_of(c, g, d, c->reach);
+        for (int side = 0; side < 2; side++) {
+            if (side == 0 ? range.first == 0 : range.last + 1 == g->cells[d])
+                continue;
+            for (int e = 0; e < 3; e++) {
+                boxes.lo[e][count] = g->lo[e];
+                boxes.hi[e][count] = g->hi[e];
+            }
+            if (side == 0)
+                boxes.hi[d][count] = ceiling_of(g, d, range.first - 1);
+            else
+                boxes.lo[d][count] = floor_of(g, d, range.last + 1);
+            count++;
+        }
+    }
+    return count > 0 && passing(q, &boxes, count) != 0;
+}
+
+/* ---- points ---- */
+
+static bool get_word(const struct incode_grid *g, uint32_t base, uint32_t i,
+                     uint32_t *word, uint32_t *missing)
+{
+    uint32_t page = base + i / INCODE_PAGE_WORDS;
+    const struct incode_frame *f = incode_pager_get(g->walker->pager, page);
+    *missing = page;
+    if (f == NULL)
+        return false;
+    *word = f->page.words.word[i % INCODE_PAGE_WORDS];
+    return true;
+}
+
+enum { LANES = 8, ASK_AHEAD = 16 };
+
+struct batch {
+    alignas(64) double p[3][LANES];
+    uint32_t id[LANES];
+    unsigned count;
+};
+
+/* Up to 8 points of the list from c->list on; false: a page is missing after
+ * those. */
+static bool fill_batch(const struct incode_cells *c,
+                       const struct incode_grid *g, struct batch *batch,
+                       uint32_t *missing)
+{
+    const struct incode_frame *f = NULL;
+    uint32_t brick = INCODE_NONE;
+    memset(batch->p, 0, sizeof batch->p);
+    batch->count = 0;
+    while (batch->count < LANES && c->list + batch->count < c->end) {
+        uint32_t id;
+        if (!get_word(g, g->walker->tree->list_base, c->list + batch->count,
+                      &id, missing))
+            return false;
+        if (f == NULL || id / INCODE_BRICK_POINTS != brick) {
+            brick = id / INCODE_BRICK_POINTS;
+            f = incode_pager_get(g->walker->pager, brick);
+            *missing = brick;
+            if (f == NULL)
+                return false;
+        }
+        uint32_t slot = id % INCODE_BRICK_POINTS;
+        batch->p[0][batch->count] = f->page.brick.x[slot];
+        batch->p[1][batch->count] = f->page.brick.y[slot];
+        batch->p[2][batch->count] = f->page.brick.z[slot];
+        batch->id[batch->count++] = id;
+    }
+    return true;
+}
+
+static void look_at(struct incode_cells *c, const struct incode_grid *g,
+                    struct incode_query *q, const struct batch *batch)
+{
+    struct incode_tally *tally = g->walker->tally;
+    const double *const axis[3] = {batch->p[0], batch->p[1], batch->p[2]};
+    uint32_t lanes = incode_query_lanes(q, axis);
+    *g->walker->candidates += batch->count;
+    for (unsigned i = 0; i < batch->count; i++) {
+        uint32_t id = batch->id[i];
+        bool maybe = (lanes >> i & 1) != 0;
+        if ((!maybe && c->has_below) || id == q->v || id == q->b ||
+            id == q->c || id == q->best)
+            continue;
+        const double p[3] = {axis[0][i], axis[1][i], axis[2][i]};
+        if (maybe) {
+            incode_query_consider(q, tally, id, p);
+        } else if (incode_orient3d(tally, q->pv, q->pb, q->pc, p) < 0) {
+            c->has_below = true;
+            memcpy(c->below, p, sizeof p);
+        }
+    }
+}
+
+/* Asks for the bricks of the next points, which will be missing, too. */
+static void ask_ahead(const struct incode_cells *c, const struct incode_grid *g)
+{
+    uint32_t id, page;
+    for (uint32_t i = c->list; i < c->end && i < c->list + ASK_AHEAD; i++) {
+        if (!get_word(g, g->walker->tree->list_base, i, &id, &page))
+            return;
+        (void)incode_pager_get(g->walker->pager, id / INCODE_BRICK_POINTS);
+    }
+}
+
+/* The rest of the piece at work. */
+static enum incode_walk finish_piece(struct incode_cells *c,
+                                     const struct incode_grid *g,
+                                     struct incode_query *q, uint32_t *work)
+{
+    while (c->list < c->end) {
+        struct batch batch;
+        bool all = fill_batch(c, g, &batch, &q->missing);
+        if (batch.count > 0)
+            look_at(c, g, q, &batch);
+        c->list += batch.count;
+        if (!all) {
+            ask_ahead(c, g);
+            return INCODE_WALK_WAIT;
+        }
+        *work += batch.count;
+        if (*work >= INCODE_CELLS_WORK)
+            return INCODE_WALK_STOP;
+    }
+    return INCODE_WALK_DONE;
+}
+
+/* ---- shells ---- */
+
+/* Layers or rows from first to end that have been tested, one bit each. */
+struct tested {
+    uint32_t first, end, mask;
+};
+
+struct shell {
+    struct range outer[3], inner[3];
+    double lo[3], hi[3];        /* of outer, in coordinates */
+    struct lane_boxes box;      /* the first lane: of a piece */
+    struct tested rows, layers; /* rows: of this layer */
+    uint32_t work;
+};
+
+static bool is_within(struct range range, uint32_t i)
+{
+    return i >= range.first && i <= range.last;
+}
+
+/* Takes the next piece of the row, from c->x on, as far as the question
+ * concerns it; INCODE_WALK_STOP: none is left. */
+static enum incode_walk next_piece(struct incode_cells *c,
+                                   const struct incode_grid *g,
+                                   struct incode_query *q, struct shell *s)
+{
+    bool crosses = c->any_done && is_within(s->inner[1], c->y) &&
+                   is_within(s->inner[2], c->z);
+    uint32_t row = (c->z * g->cells[1] + c->y) * g->cells[0];
+    uint32_t base = g->walker->tree->cells_base;
+    while (c->x <= s->outer[0].last) {
+        uint32_t last = s->outer[0].last;
+        if (crosses && is_within(s->inner[0], c->x)) {
+            c->x = s->inner[0].last + 1;
+            continue;
+        }
+        if (crosses && c->x < s->inner[0].first)
+            last = s->inner[0].first - 1;
+        bool whole = c->x == s->outer[0].first && last == s->outer[0].last;
+        for (;; whole = false) {
+            set_range(&s->box, g, 0, (struct range){c->x, last});
+            s->work++;
+            if (!whole && passing(q, &s->box, 1) == 0)
+                break;
+            uint32_t from, to;
+            if (!get_word(g, base, row + c->x, &from, &q->missing) ||
+                !get_word(g, base, row + last + 1, &to, &q->missing))
+                return INCODE_WALK_WAIT;
+            if (to - from > INCODE_CELLS_PIECE && last > c->x) {
+                last = c->x + (last - c->x) / 2;
+                continue;
+            }
+            c->list = from;
+            c->end = to;
+            break;
+        }
+        c->x = last + 1;
+        if (c->list < c->end)
+            return INCODE_WALK_DONE;
+    }
+    return INCODE_WALK_STOP;
+}
+
+/* Whether the question concerns layer or row i (d: 2 or 1) of the shell; eight
+ * are tested at once, and what is found later can only leave fewer. */
+static bool passes(const struct incode_grid *g, const struct incode_query *q,
+                   struct shell *s, struct tested *tested, int d, uint32_t i)
+{
+    if (i >= tested->first && i < tested->end)
+        return (tested->mask >> (i - tested->first) & 1) != 0;
+    struct lane_boxes boxes;
+    uint32_t left = s->outer[d].last - i + 1;
+    uint32_t count = left < LANES ? left : LANES;
+    for (uint32_t k = 0; k < LANES; k++) {
+        for (int e = 0; e < 3; e++) {
+            boxes.lo[e][k] = e > d ? s->box.lo[e][0] : s->lo[e];
+            boxes.hi[e][k] = e > d ? s->box.hi[e][0] : s->hi[e];
+        }
+        uint32_t at = i + (k < count ? k : 0);
+        boxes.lo[d][k] = floor_of(g, d, at);
+        boxes.hi[d][k] = ceiling_of(g, d, at);
+    }
+    tested->first = i;
+    tested->end = i + count;
+    tested->mask = passing(q, &boxes, count);
+    s->work++;
+    return (tested->mask & 1) != 0;
+}
+
+static enum incode_walk run_row(struct incode_cells *c,
+                                const struct incode_grid *g,
+                                struct incode_query *q, struct shell *s)
+{
+    if (c->x == s->outer[0].first && !passes(g, q, s, &s->rows, 1, c->y))
+        return INCODE_WALK_DONE;
+    set_range(&s->box, g, 1, (struct range){c->y, c->y});
+    for (;;) {
+        enum incode_walk r = next_piece(c, g, q, s);
+        if (r == INCODE_WALK_STOP)
+            return INCODE_WALK_DONE;
+        if (r == INCODE_WALK_DONE)
+            r = finish_piece(c, g, q, &s->work);
+        if (r != INCODE_WALK_DONE)
+            return r;
+    }
+}
+
+/* One layer of cells from row c->y on. */
+static enum incode_walk run_layer(struct incode_cells *c,
+                                  const struct incode_grid *g,
+                                  struct incode_query *q, struct shell *s)
+{
+    if (c->y == s->outer[1].first && c->x == s->outer[0].first &&
+        !passes(g, q, s, &s->layers, 2, c->z))
+        return INCODE_WALK_DONE;
+    set_range(&s->box, g, 2, (struct range){c->z, c->z});
+    s->rows.end = 0;
+    for (; c->y <= s->outer[1].last; c->y++) {
+        enum incode_walk r = run_row(c, g, q, s);
+        if (r == INCODE_WALK_DONE && s->work >= INCODE_CELLS_WORK)
+            r = INCODE_WALK_STOP;
+        if (r != INCODE_WALK_DONE)
+            return r;
+        c->x = s->outer[0].first;
+    }
+    return INCODE_WALK_DONE;
+}
+
+static enum incode_walk run_shell(struct incode_cells *c,
+                                  const struct incode_grid *g,
+                                  struct incode_query *q)
+{
+    struct shell s;
+    memset(&s, 0, sizeof s);
+    for (int d = 0; d < 3; d++) {
+        s.outer[d] = range_of(c, g, d, c->reach);
+        s.inner[d] = range_of(c, g, d, c->done);
+        s.lo[d] = floor_of(g, d, s.outer[d].first);
+        s.hi[d] = ceiling_of(g, d, s.outer[d].last);
+    }
+    enum incode_walk r = finish_piece(c, g, q, &s.work);
+    for (; r == INCODE_WALK_DONE && c->z <= s.outer[2].last; c->z++) {
+        r = run_layer(c, g, q, &s);
+        if (r != INCODE_WALK_DONE)
+            break;
+        c->y = s.outer[1].first;
+        c->x = s.outer[0].first;
+    }
+    return r;
+}
+
+static void start_shell(struct incode_cells *c, const struct incode_grid *g)
+{
+    c->x = range_of(c, g, 0, c->reach).first;
+    c->y = range_of(c, g, 1, c->reach).first;
+    c->z = range_of(c, g, 2, c->reach).first;
+    c->list = c->end = 0;
+}
+
+void incode_cells_begin(struct incode_cells *c, const struct incode_grid *grid,
+                        const struct incode_query *q)
+{
+    memset(c, 0, sizeof *c);
+    for (int d = 0; d < 3; d++) {
+        double middle = q->pv[d] / 3 + q->pb[d] / 3 + q->pc[d] / 3;
+        c->centre[d] =
+            incode_cell_along(grid->lo[d], grid->hi[d], grid->cells[d], middle);
+    }
+    c->reach = 1;
+    start_shell(c, grid);
+}
+
+enum incode_walk incode_cells_run(struct incode_cells *c,
+                                  const struct incode_grid *grid,
+                                  struct incode_query *q)
+{
+    enum incode_walk r = run_shell(c, grid, q);
+    if (r != INCODE_WALK_DONE || !more_beyond(c, grid, q))
+        return r;
+    INCODE_ASSERT(c->reach < UINT32_C(1) << 30);
+    c->any_done = true;
+    c->done = c->reach;
+    c->reach *= 2;
+    start_shell(c, grid);
+    return INCODE_WALK_STOP;
+}

@@ -1,0 +1,145 @@
+/* Walks down the tree of boxes to the leaves that a question concerns, in page
+ * order, and can be suspended at a missing page and resumed there.
+ *
+ * Memory: the struct; stack for INCODE_LEVELS_MAX levels.  Work: the boxes of
+ * the pages whose own box passes the question.
+ *
+ *     q.question = INCODE_QUERY_BOX, q.boxed = true;       and q.lo, q.hi
+ *     while ((r = incode_walk(&w, &q, visit, context)) == INCODE_WALK_WAIT)
+ *         come back when page q.missing is there;
+ */
+#ifndef INCODE_QUERY_H
+#define INCODE_QUERY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "empty_spheres.h"
+#include "incode/pages/pager.h"
+#include "incode/predicates/predicates.h"
+#include "sphere.h"
+#include "half_space.h"
+
+enum incode_question {
+    INCODE_QUERY_BOX,     /* leaves that meet a box */
+    INCODE_QUERY_APEX,    /* the apex of a face: first in Delaunay distance */
+    INCODE_QUERY_NEAREST, /* the nearest neighbour of v */
+    INCODE_QUERY_SUPPORT, /* the half-space of a normal that holds all points */
+    INCODE_QUERY_CIRCLE   /* the smallest circle through v and b: a start for
+                             the search of a first face, approximate */
+};
+
+enum incode_walk { INCODE_WALK_DONE, INCODE_WALK_WAIT, INCODE_WALK_STOP };
+
+struct incode_query {
+    enum incode_question question;
+    bool boxed;          /* only what meets [lo, hi] */
+    bool timid;          /* APEX: only points clearly beyond the face */
+    bool ahead;          /* BOX: asks for missing bricks and passes them over */
+    bool shrinking;      /* APEX: the box is that of the best's sphere */
+    bool round;          /* APEX: what matters lies in the ball below */
+    bool lens;           /* round: it is less than the sphere (support.h) */
+    bool large;          /* round, and the sphere itself tells of boxes, too */
+    bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
+    bool done;           /* not what lies within [done_lo, done_hi] */
+    double lo[3], hi[3]; /* absolute coordinates */
+    double done_lo[3], done_hi[3];
+    uint32_t v, b, c;            /* vertex numbers */
+    double pv[3], pb[3], pc[3];  /* absolute coordinates */
+    double scale;                /* relative = (p - pv) * scale */
+    double rb[3], rc[3];         /* b and c, relative */
+    struct incode_sphere sphere; /* SUPPORT: its plane's normal alone */
+    struct incode_flat flat; /* APEX: bounds the box of a best without a ball */
+    const struct incode_empties *empties; /* APEX, or NULL */
+    struct incode_ceiling ceiling;        /* by these, of the best */
+    struct incode_support support; /* SUPPORT: what holds all points so far */
+    double peak[3];     /* centre of the sphere, where its value peaks */
+    double centre[3];   /* of the ball */
+    double square;      /* of its radius, widened */
+    double plane_slack; /* of n . p within the ball */
+    double t; /* where in a pencil the ball is, of the first candidate so far */
+    double limit;      /* NEAREST, CIRCLE: squared, relative */
+    uint32_t contests; /* APEX: points in doubt so far */
+    uint32_t looked;   /* APEX: leaves so far */
+    uint32_t best;     /* vertex number, or INCODE_NONE */
+    double best_p[3];
+    uint32_t pages, pages_max; /* needed so far; a walk stops at more than that,
+                                  unless it is 0 */
+    uint32_t cursor;           /* bricks below this one are done */
+    uint32_t missing;          /* the page a suspended walk waits for */
+};
+
+/* Coordinates relative to the query's vertex, scaled. */
+static inline void incode_query_relative(double out[3],
+                                         const struct incode_query *q,
+                                         const double p[3])
+{
+    for (int d = 0; d < 3; d++)
+        out[d] = (p[d] - q->pv[d]) * q->scale;
+}
+
+/* What a walk runs on. */
+struct incode_walker {
+    struct incode_pager *pager;
+    const struct incode_tree *tree;
+    struct incode_tally *tally;
+    uint64_t *candidates;
+};
+
+/* Called with a brick and its leaves that pass, one bit each (boxes_only: the
+ * first brick of a page and its boxes that pass); false stops the walk. */
+typedef bool incode_visit(struct incode_walker *walker, struct incode_query *q,
+                          const struct incode_frame *frame, uint32_t brick,
+                          uint32_t leaves, void *context);
+
+enum incode_walk incode_walk(struct incode_walker *walker,
+                             struct incode_query *q, incode_visit *visit,
+                             void *context);
+
+/* The same for one brick. */
+enum incode_walk incode_walk_brick(struct incode_walker *walker,
+                                   struct incode_query *q, uint32_t brick,
+                                   incode_visit *visit, void *context);
+
+/* Sets the direction of a SUPPORT query: that of a face at pv. */
+void incode_query_support(struct incode_query *q, const double pv[3],
+                          const double n[3], double scale);
+
+/* Sets the face (v, b, c) of an APEX query: plane and scale. */
+void incode_query_face(struct incode_query *q);
+
+/* The first candidate, known to be beyond the face; the sphere is that through
+ * it already. */
+void incode_query_start(struct incode_query *q, uint32_t id, const double p[3]);
+
+/* From now on only what meets the sphere of the best so far matters. */
+void incode_query_shrink(struct incode_query *q);
+
+enum { INCODE_QUERY_CROWD = 64 }; /* so many leaves are many */
+
+/* Counts a leaf; where they are many, a ceiling may rule out others. */
+void incode_query_look(struct incode_query *q);
+
+/* A candidate for the apex: takes it if it is strictly on the unknown side and
+ * inside the sphere of the best so far.  Exact. */
+void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
+                           uint32_t id, const double p[3]);
+
+/* Which of up to 32 boxes the question concerns, one bit each.  lo, hi: arrays
+ * aligned to 64 bytes, filled up to a multiple of 8. */
+uint32_t incode_query_boxes(const struct incode_query *q,
+                            const double *const lo[3],
+                            const double *const hi[3], unsigned count);
+
+/* Which of 8 points, in arrays aligned to 64 bytes, an APEX query must
+ * consider, one bit each. */
+uint32_t incode_query_lanes(const struct incode_query *q,
+                            const double *const axis[3]);
+
+/* Visits the points of the leaves for all but BOX. */
+incode_visit incode_visit_points;
+
+/* 2^k with k such that 2^k * extent is about 1; exact, never 0 or infinite. */
+double incode_scale_for(double extent);
+
+#endif

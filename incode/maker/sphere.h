@@ -1,0 +1,169 @@
+/* The plane of a face and the sphere through it and an apex, in coordinates
+ * relative to the face's first vertex v and scaled by a power of two, with
+ * forward error bounds: a small multiple of the unit roundoff times bounds of
+ * the terms from the maximum norms (Higham, Accuracy and Stability, chapter 3).
+ *
+ *     plane:  n . p > 0                  p lies on the unknown side
+ *     sphere: m . p - det |p|^2 > 0      p lies inside
+ *
+ * Memory: the struct.  Work: constant.
+ *
+ *     incode_sphere_plane(&s, b, c);
+ *     incode_sphere_apex(&s, b, c, a);
+ *     if (incode_sphere_value(&s, p) < -incode_sphere_error(&s, p)) outside;
+ */
+#ifndef INCODE_SPHERE_H
+#define INCODE_SPHERE_H
+
+#include <stdbool.h>
+
+#include "incode/predicates/double_double.h"
+
+struct incode_sphere {
+    double n[3], pn[3]; /* plane; |error of n[d] x| <= EPS pn[d] |x| */
+    double m[3], pm[3]; /* sphere; likewise */
+    double det, pdet;
+    double lb, lc, bb, cc; /* of b and c: maximum norm, square */
+    bool has_apex;
+};
+
+/* The line of spheres through a face's circle, in the same coordinates: the
+ * centres are c0 + (t/2) n, n a unit vector. */
+struct incode_pencil {
+    double c0[3], n[3];
+    double size; /* of the face, or how far c0 is */
+};
+
+/* Rounding of every step from the coordinates on stays below 20 units; what
+ * underflows stays below the absolute term, for points within 2^200. */
+#define INCODE_SPHERE_EPS 3.6e-15
+#define INCODE_SPHERE_TINY 1e-250
+/* Smaller determinants are left to the predicates. */
+#define INCODE_SPHERE_LEAST 1e-100
+
+static inline void incode_cross(double out[3], const double a[3],
+                                const double b[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline double incode_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline double incode_max_norm(const double a[3])
+{
+    /* The analyser forgets what another file's function filled.
+     * NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
+    double x = __builtin_fabs(a[0]), y = __builtin_fabs(a[1]),
+           z = __builtin_fabs(a[2]);
+    double l = x > y ? x : y;
+    return l > z ? l : z;
+}
+
+static inline double incode_dd_max_norm(const struct incode_dd a[3])
+{
+    const double hi[3] = {a[0].hi, a[1].hi, a[2].hi};
+    return incode_max_norm(hi);
+}
+
+/* Of a nearer point, underflow may have left no direction. */
+#define INCODE_PENCIL_LEAST 1e-240
+
+/* Where in the pencil a point lies; false: it is not clearly beyond the face.
+ */
+static inline bool incode_pencil_place(const struct incode_pencil *pencil,
+                                       const double r[3], double *t)
+{
+    double beyond = incode_dot(pencil->n, r), far = incode_max_norm(r);
+    if (!(beyond >
+          2e-3 * (far > INCODE_PENCIL_LEAST ? far : INCODE_PENCIL_LEAST)))
+        return false;
+    *t = (incode_dot(r, r) - 2 * incode_dot(pencil->c0, r)) / beyond;
+    return true;
+}
+
+/* A place that is certainly not before that of a point placed at t. */
+static inline double incode_pencil_later(const struct incode_pencil *pencil,
+                                         double t)
+{
+    return t + 1e-6 * (__builtin_fabs(t) + pencil->size);
+}
+
+void incode_sphere_plane(struct incode_sphere *s, const double b[3],
+                         const double c[3]);
+void incode_sphere_apex(struct incode_sphere *s, const double b[3],
+                        const double c[3], const double a[3]);
+
+/* Cancellation has left so little of n, of m or of det that their error bounds
+ * would leave nearly every point in doubt (points on a line or plane up to
+ * rounding). */
+static inline bool incode_plane_is_blurred(const struct incode_sphere *s)
+{
+    return s->pn[0] > 1024 * incode_max_norm(s->n);
+}
+
+static inline bool incode_sphere_is_blurred(const struct incode_sphere *s)
+{
+    double det = __builtin_fabs(s->det), m = incode_max_norm(s->m);
+    return s->pdet > 1024 * det || s->pm[0] > 1024 * m;
+}
+
+/* So ill-conditioned, or so much larger than its face, that it tells nothing of
+ * where points lie that are flat up to rounding. */
+static inline bool incode_sphere_is_vast(const struct incode_sphere *s)
+{
+    double size = s->lb > s->lc ? s->lb : s->lc;
+    return !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
+           !(s->det > INCODE_SPHERE_LEAST) ||
+           incode_max_norm(s->m) > 1e6 * size * s->det;
+}
+
+/* Plane and sphere in twice the precision, from absolute coordinates. */
+struct incode_fine {
+    struct incode_dd n[3], m[3], det;
+};
+
+/* a: NULL for the plane alone. */
+void incode_sphere_fine(struct incode_fine *f, const double v[3],
+                        const double b[3], const double c[3], const double *a,
+                        double scale);
+
+/* Computes them again from absolute coordinates in twice the precision, so that
+ * only the evaluation's own rounding is left in the bounds.  a: NULL for the
+ * plane alone. */
+void incode_sphere_refine(struct incode_sphere *s, const double v[3],
+                          const double b[3], const double c[3], const double *a,
+                          double scale);
+
+static inline double incode_sphere_value(const struct incode_sphere *s,
+                                         const double p[3])
+{
+    return incode_dot(s->m, p) - s->det * incode_dot(p, p);
+}
+
+static inline double incode_absolute_dot(const double a[3], const double p[3])
+{
+    return a[0] * __builtin_fabs(p[0]) + a[1] * __builtin_fabs(p[1]) +
+           a[2] * __builtin_fabs(p[2]);
+}
+
+static inline double incode_sphere_error(const struct incode_sphere *s,
+                                         const double p[3])
+{
+    return INCODE_SPHERE_EPS *
+               (incode_absolute_dot(s->pm, p) + s->pdet * incode_dot(p, p)) +
+           INCODE_SPHERE_TINY;
+}
+
+static inline double incode_plane_error(const struct incode_sphere *s,
+                                        const double p[3])
+{
+    return INCODE_SPHERE_EPS * incode_absolute_dot(s->pn, p) +
+           INCODE_SPHERE_TINY;
+}
+
+#endif

@@ -1,0 +1,240 @@
+#include "pager.h"
+
+#include <string.h>
+
+#include "incode/predicates/check.h"
+
+enum { GROUP = 32 }; /* frames of which a least time of use is noted */
+
+static uint32_t hash_size(uint32_t frames)
+{
+    uint32_t size = 64;
+    while (size < 2 * frames)
+        size *= 2;
+    return size;
+}
+
+size_t incode_pager_bytes(uint32_t frames)
+{
+    size_t heads = hash_size(frames) * sizeof(uint16_t);
+    size_t groups = (frames + GROUP - 1) / GROUP * sizeof(uint64_t);
+    return frames * (sizeof(struct incode_frame) + sizeof(uint64_t) +
+                     sizeof(struct incode_slot)) +
+           groups + heads;
+}
+
+void incode_pager_init(struct incode_pager *pager, void *memory,
+                       uint32_t frames, uint32_t bricks)
+{
+    INCODE_ASSERT(frames >= 1 && frames < INCODE_NO_FRAME);
+    memset(pager, 0, sizeof *pager);
+    pager->frames = memory;
+    pager->used = (uint64_t *)(void *)(pager->frames + frames);
+    pager->oldest = pager->used + frames;
+    pager->group_count = (frames + GROUP - 1) / GROUP;
+    pager->slots =
+        (struct incode_slot *)(void *)(pager->oldest + pager->group_count);
+    pager->heads = (uint16_t *)(void *)(pager->slots + frames);
+    pager->frame_count = frames;
+    pager->hash_mask = hash_size(frames) - 1;
+    pager->loading_max = frames / 4 < 1 ? 1 : frames / 4;
+    pager->bricks = bricks;
+    memset(pager->oldest, 0, pager->group_count * sizeof pager->oldest[0]);
+    for (uint32_t i = 0; i <= pager->hash_mask; i++)
+        pager->heads[i] = INCODE_NO_FRAME;
+}
+
+static uint16_t *head_of(const struct incode_pager *pager, uint32_t page)
+{
+    return &pager
+                ->heads[(page * UINT32_C(2654435761) >> 12) & pager->hash_mask];
+}
+
+static uint16_t find(const struct incode_pager *pager, uint32_t page)
+{
+    uint16_t i = *head_of(pager, page);
+    while (i != INCODE_NO_FRAME && pager->slots[i].number != page)
+        i = pager->slots[i].chain;
+    return i;
+}
+
+static void set_state(struct incode_pager *pager, uint16_t i,
+                      enum incode_frame_state state)
+{
+    uint64_t *oldest = &pager->oldest[i / GROUP];
+    pager->slots[i].state = (uint8_t)state;
+    pager->used[i] &= ~INCODE_FRAME_WAITING;
+    if (state != INCODE_FRAME_READY)
+        pager->used[i] |= INCODE_FRAME_WAITING;
+    *oldest = pager->used[i] < *oldest ? pager->used[i] : *oldest;
+}
+
+/* Where the least of some times is. */
+static uint32_t least_of(const uint64_t *time, uint32_t count)
+{
+    uint32_t at = 0;
+    for (uint32_t i = 1; i < count; i++)
+        at = time[i] < time[at] ? i : at;
+    return at;
+}
+
+/* The frame that is ready and was not used for longest.  Times only grow, so
+ * that what a group's least was is a lower bound: the group with the least of
+ * these has it if its bound still holds, else the bound is raised. */
+static uint16_t find_oldest(struct incode_pager *pager)
+{
+    for (;;) {
+        uint32_t group = least_of(pager->oldest, pager->group_count);
+        uint32_t first = group * GROUP, left = pager->frame_count - first;
+        uint32_t i =
+            first + least_of(pager->used + first, left < GROUP ? left : GROUP);
+        if (pager->used[i] >= INCODE_FRAME_WAITING &&
+            pager->oldest[group] >= INCODE_FRAME_WAITING)
+            return INCODE_NO_FRAME;
+        if (pager->used[i] == pager->oldest[group])
+            return (uint16_t)i;
+        pager->oldest[group] = pager->used[i];
+    }
+}
+
+static void unchain(struct incode_pager *pager, uint16_t i)
+{
+    uint16_t *link = head_of(pager, pager->slots[i].number);
+    while (*link != i)
+        link = &pager->slots[*link].chain;
+    *link = pager->slots[i].chain;
+}
+
+/* A frame to load into: never used, or the least recently used that is not
+ * waiting for its page. */
+static uint16_t take_frame(struct incode_pager *pager)
+{
+    if (pager->free < pager->frame_count) {
+        pager->frames_used++;
+        return pager->free++;
+    }
+    uint16_t i = find_oldest(pager);
+    if (i == INCODE_NO_FRAME)
+        return i;
+    unchain(pager, i);
+    pager->evictions++;
+    return i;
+}
+
+static void ask(struct incode_pager *pager, uint32_t page)
+{
+    if (pager->loading + pager->held >= pager->loading_max ||
+        !pager->request(pager->context, page))
+        return;
+    uint16_t i = take_frame(pager);
+    INCODE_ASSERT(i != INCODE_NO_FRAME);
+    struct incode_slot *slot = &pager->slots[i];
+    slot->number = pager->frames[i].number = page;
+    pager->used[i] = ++pager->time;
+    set_state(pager, i, INCODE_FRAME_LOADING);
+    uint16_t *head = head_of(pager, page);
+    slot->chain = *head;
+    *head = i;
+    pager->loading++;
+    pager->requests++;
+}
+
+struct incode_frame *incode_pager_get(struct incode_pager *pager, uint32_t page)
+{
+    uint16_t i = find(pager, page);
+    if (i == INCODE_NO_FRAME) {
+        ask(pager, page);
+        return NULL;
+    }
+    pager->used[i] = ++pager->time;
+    if (pager->slots[i].state == INCODE_FRAME_READY)
+        return &pager->frames[i];
+    pager->used[i] |= INCODE_FRAME_WAITING;
+    return NULL;
+}
+
+bool incode_pager_loading(const struct incode_pager *pager, uint32_t page)
+{
+    uint16_t i = find(pager, page);
+    return i != INCODE_NO_FRAME && pager->slots[i].state != INCODE_FRAME_READY;
+}
+
+static void leaf_boxes(struct incode_frame *f)
+{
+    const double *axis[3] = {f->page.brick.x, f->page.brick.y, f->page.brick.z};
+    for (int d = 0; d < 3; d++) {
+        for (int leaf = 0; leaf < INCODE_BRICK_LEAVES; leaf++) {
+            int first = leaf * INCODE_LEAF_POINTS;
+            double lo = __builtin_inf(), hi = -__builtin_inf();
+            for (int i = first; i < first + INCODE_LEAF_POINTS; i++) {
+                if (i >= f->count)
+                    break;
+                double a = axis[d][i];
+                lo = a < lo ? a : lo;
+                hi = a > hi ? a : hi;
+            }
+            f->leaf_lo[d][leaf] = lo;
+            f->leaf_hi[d][leaf] = hi;
+        }
+    }
+}
+
+static void load_brick(struct incode_frame *f, const uint8_t *data,
+                       size_t points)
+{
+    double *axis[3] = {f->page.brick.x, f->page.brick.y, f->page.brick.z};
+    for (int d = 0; d < 3; d++) {
+        memcpy(axis[d], data + (size_t)d * points * sizeof(double),
+               points * sizeof(double));
+        for (size_t i = points; i < INCODE_BRICK_POINTS; i++)
+            axis[d][i] = axis[d][points - 1];
+    }
+    f->count = (uint8_t)points;
+    leaf_boxes(f);
+}
+
+int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
+                         const void *data, size_t bytes)
+{
+    uint16_t i = find(pager, page);
+    if (i == INCODE_NO_FRAME || pager->slots[i].state != INCODE_FRAME_LOADING)
+        return -1;
+    struct incode_frame *f = &pager->frames[i];
+    if (page < pager->bricks) {
+        size_t points = bytes / (3 * sizeof(double));
+        if (points < 1 || points > INCODE_BRICK_POINTS ||
+            points * 3 * sizeof(double) != bytes)
+            return -1;
+        load_brick(f, data, points);
+    } else {
+        if (bytes != INCODE_PAGE_BYTES)
+            return -1;
+        memcpy(&f->page, data, bytes);
+        f->count = 0;
+    }
+    pager->loading--;
+    set_state(pager, i,
+              pager->shuffle != 0 ? INCODE_FRAME_HELD : INCODE_FRAME_READY);
+    pager->held += pager->shuffle != 0;
+    return 0;
+}
+
+bool incode_pager_release(struct incode_pager *pager, bool now)
+{
+    if (pager->held == 0)
+        return false;
+    pager->shuffle ^= pager->shuffle << 13;
+    pager->shuffle ^= pager->shuffle >> 7;
+    pager->shuffle ^= pager->shuffle << 17;
+    if (!now && (pager->shuffle >> 60 & 3) != 0)
+        return false;
+    uint32_t pick = (uint32_t)(pager->shuffle % pager->held);
+    for (uint16_t i = 0; i < pager->free; i++) {
+        if (pager->slots[i].state != INCODE_FRAME_HELD || pick-- > 0)
+            continue;
+        set_state(pager, i, INCODE_FRAME_READY);
+        pager->held--;
+        return true;
+    }
+    return false;
+}

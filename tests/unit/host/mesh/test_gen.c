@@ -1,0 +1,161 @@
+/* Generated point sets: the same everywhere (known digests), and what their
+ * names promise. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+#include <nettle/sha2.h>
+
+#include "host/mesh/gen.h"
+#include "host/order/duplicates.h"
+
+static struct host_points made(const char *kind, uint64_t n, uint64_t seed)
+{
+    struct host_points points;
+    struct host_error error = {0};
+    assert_int_equal(host_gen(kind, n, seed, &points, &error), 0);
+    assert_int_equal(points.count, n);
+    for (uint64_t i = 0; i < 3 * n; i++) {
+        assert_true(isfinite(points.xyz[i]));
+    }
+    return points;
+}
+
+static void digests_are_known(void **unused)
+{
+    (void)unused;
+    static const char *const known[][2] = {
+        {"uniform", "93dad7296d99889e"},  {"bubbles", "1d3a6942e6d59fe0"},
+        {"bluntfin", "c462303f05f2c400"}, {"sphere", "9dadb48db2822cbf"},
+        {"grid", "fb8430c1f27107f2"},     {"rotated", "fbaf1f72975c122a"},
+        {"hub", "0d28c3a45ac13c23"},
+    };
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        struct host_points points = made(known[i][0], 1000, 42);
+        struct sha256_ctx sha;
+        uint8_t sum[SHA256_DIGEST_SIZE];
+        char text[17];
+        sha256_init(&sha);
+        sha256_update(&sha, 24 * points.count, (const uint8_t *)points.xyz);
+        sha256_digest(&sha, sizeof sum, sum);
+        for (size_t k = 0; k < 8; k++) {
+            (void)snprintf(text + 2 * k, 3, "%02x", sum[k]);
+        }
+        assert_string_equal(text, known[i][1]);
+        assert_non_null(strstr(host_gen_kinds, known[i][0]));
+        host_points_free(&points);
+    }
+}
+
+static double length(const double *p)
+{
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+}
+
+static void shapes_are_as_named(void **unused)
+{
+    (void)unused;
+    struct host_points u = made("uniform", 5000, 1);
+    double sum = 0;
+    for (uint64_t i = 0; i < 15000; i++) {
+        assert_true(u.xyz[i] >= 0 && u.xyz[i] < 1);
+        sum += u.xyz[i];
+    }
+    assert_true(fabs(sum / 15000 - 0.5) < 0.01);
+    host_points_free(&u);
+    struct host_points s = made("sphere", 5000, 1);
+    struct host_points h = made("hub", 5000, 1);
+    assert_true(length(h.xyz) <= 0);
+    for (uint64_t i = 1; i < 5000; i++) {
+        assert_true(fabs(length(s.xyz + 3 * i) - 1) < 1e-15);
+        assert_true(fabs(length(h.xyz + 3 * i) - 1) < 1e-15);
+    }
+    host_points_free(&s);
+    host_points_free(&h);
+    struct host_points g = made("grid", 1000, 1);
+    assert_true(g.xyz[2997] >= 9 && g.xyz[2998] >= 9 && g.xyz[2999] >= 9);
+    struct host_points r = made("rotated", 1000, 1);
+    for (uint64_t i = 0; i < 1000; i++) {
+        assert_true(fabs(length(g.xyz + 3 * i) - length(r.xyz + 3 * i)) <
+                    1e-13);
+    }
+    host_points_free(&g);
+    host_points_free(&r);
+}
+
+/* As --help says it. */
+static void some_kinds_have_no_chance_in_them(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *kind;
+        bool chance;
+    } kinds[] = {{"uniform", true}, {"bubbles", true},   {"sphere", true},
+                 {"hub", true},     {"bluntfin", false}, {"grid", false},
+                 {"rotated", false}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+        struct host_points a = made(kinds[i].kind, 500, 1);
+        struct host_points b = made(kinds[i].kind, 500, 2);
+        int others = 0;
+        for (int k = 0; k < 1500; k++) {
+            others += a.xyz[k] != b.xyz[k];
+        }
+        assert_int_equal(others != 0, kinds[i].chance);
+        host_points_free(&a);
+        host_points_free(&b);
+    }
+}
+
+static void seeds_differ_and_points_do_not_repeat(void **unused)
+{
+    (void)unused;
+    static const char *const kinds[] = {"uniform", "bubbles", "sphere", "hub"};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        struct host_points a = made(kinds[i], 2000, 1);
+        struct host_points b = made(kinds[i], 2000, 2);
+        assert_memory_not_equal(a.xyz, b.xyz, 24 * 2000);
+        uint32_t lowest[2000];
+        assert_int_equal(host_unique_rows(a.xyz, 2000, lowest), 2000);
+        host_points_free(&a);
+        host_points_free(&b);
+    }
+    /* the blunt fin's shape: planes on planes of the same (x, y) */
+    struct host_points fin = made("bluntfin", 40960, 1);
+    for (uint64_t i = 0; i < 1280; i++) {
+        assert_true(fin.xyz[3 * i] == fin.xyz[3 * (i + 1280 * 31)]);
+        assert_true(fin.xyz[3 * i + 1] == fin.xyz[3 * (i + 1280 * 31) + 1]);
+    }
+    host_points_free(&fin);
+}
+
+static void wrong_requests_are_refused(void **unused)
+{
+    (void)unused;
+    struct host_points points;
+    struct host_error error = {0};
+    assert_int_equal(host_gen("cube", 100, 1, &points, &error), HOST_USAGE);
+    assert_non_null(strstr(error.text, "gen cube: no kind of point set; use"));
+    error = (struct host_error){0};
+    assert_int_equal(host_gen("grid", 3, 1, &points, &error), HOST_USAGE);
+    error = (struct host_error){0};
+    assert_int_equal(host_gen("grid", UINT64_C(1) << 32, 1, &points, &error),
+                     HOST_USAGE);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(digests_are_known),
+        cmocka_unit_test(shapes_are_as_named),
+        cmocka_unit_test(some_kinds_have_no_chance_in_them),
+        cmocka_unit_test(seeds_differ_and_points_do_not_repeat),
+        cmocka_unit_test(wrong_requests_are_refused),
+    };
+    return cmocka_run_group_tests_name("gen", tests, NULL, NULL);
+}

@@ -1,0 +1,229 @@
+/* What `incode run` takes, and what it refuses with a reason. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/run/arguments.h"
+
+static void test_bytes(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *text;
+        uint64_t bytes;
+    } good[] = {{"0", 0},
+                {"4194304", 4194304},
+                {"512K", 524288},
+                {"512k", 524288},
+                {"4M", 4194304},
+                {"4MiB", 4194304},
+                {"1G", UINT64_C(1) << 30}};
+    static const char *const bad[] = {"",
+                                      "K",
+                                      "-1",
+                                      "4T",
+                                      "4MB",
+                                      "4M4",
+                                      " 4",
+                                      "4 M",
+                                      "0x4",
+                                      "4Mi",
+                                      "99999999999999999999",
+                                      "18446744073709551615G"};
+    uint64_t bytes;
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        assert_int_equal(host_parse_bytes(good[i].text, &bytes), 0);
+        assert_int_equal(bytes, good[i].bytes);
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        assert_int_equal(host_parse_bytes(bad[i], &bytes), -1);
+    }
+}
+
+static void test_numbers(void **unused)
+{
+    (void)unused;
+    uint64_t n;
+    assert_int_equal(host_parse_number("7", 1, 7, &n), 0);
+    assert_int_equal(n, 7);
+    assert_int_equal(
+        host_parse_number("18446744073709551615", 0, UINT64_MAX, &n), 0);
+    assert_int_equal(host_parse_number("8", 1, 7, &n), -1);
+    assert_int_equal(host_parse_number("0", 1, 7, &n), -1);
+    assert_int_equal(host_parse_number("+3", 1, 7, &n), -1);
+    assert_int_equal(host_parse_number("3x", 1, 7, &n), -1);
+    assert_int_equal(host_parse_number("", 0, 7, &n), -1);
+    assert_int_equal(
+        host_parse_number("18446744073709551616", 0, UINT64_MAX, &n), -1);
+}
+
+enum { WORDS_MAX = 12 };
+
+/* Parses "incode run" with these words, ended by NULL. */
+static int parse(const char *const *words, struct host_run_options *options,
+                 struct host_error *error)
+{
+    char text[WORDS_MAX + 2][64] = {"incode run"};
+    char *argv[WORDS_MAX + 2] = {text[0]};
+    int argc = 1;
+    memset(error, 0, sizeof *error);
+    for (; words[argc - 1] != NULL; argc++) {
+        assert_true(argc <= WORDS_MAX);
+        strcpy(text[argc], words[argc - 1]);
+        argv[argc] = text[argc];
+    }
+    return host_arguments_run(argc, argv, options, error);
+}
+
+static void test_defaults(void **unused)
+{
+    (void)unused;
+    struct host_run_options o;
+    struct host_error error;
+    static const char *const words[] = {"a.xyz", NULL};
+    assert_int_equal(parse(words, &o, &error), 0);
+    assert_int_equal(o.strategy, HOST_AUTO);
+    assert_int_equal(o.partition, HOST_ADAPTIVE);
+    assert_int_equal(o.index, INCODE_KD);
+    assert_int_equal(o.face_rule, INCODE_FACE_OWN);
+    assert_int_equal(o.memory, 4194304);
+    assert_int_equal(o.nodes, 0);
+    assert_int_equal(o.outputs, 0);
+    assert_false(o.verify || o.quiet || o.table || o.map);
+    assert_true(o.progress);
+}
+
+static void test_options(void **unused)
+{
+    (void)unused;
+    struct host_run_options o;
+    struct host_error error;
+    static const char *const words[] = {"--strategy=spatial",
+                                        "--partition=uniform",
+                                        "--index=grid",
+                                        "--face-rule=paper",
+                                        "--nodes=8",
+                                        "--memory=512K",
+                                        "--window=1",
+                                        "--shuffle-seed=9",
+                                        "--verify",
+                                        "--host-rate=1024",
+                                        "--patience=7",
+                                        "a.xyz",
+                                        NULL};
+    assert_int_equal(parse(words, &o, &error), 0);
+    assert_int_equal(o.strategy, HOST_SPATIAL);
+    assert_int_equal(o.partition, HOST_UNIFORM);
+    assert_int_equal(o.index, INCODE_GRID);
+    assert_int_equal(o.face_rule, INCODE_FACE_PAPER);
+    assert_int_equal(o.nodes, 8);
+    assert_int_equal(o.memory, 524288);
+    assert_int_equal(o.window, 1);
+    assert_int_equal(o.shuffle_seed, 9);
+    assert_true(o.verify);
+    assert_int_equal(o.hindrance.bytes_a_second, 1024);
+    assert_int_equal(o.hindrance.slow_us, 30000000);
+    assert_int_equal(o.patience_s, 7);
+}
+
+/* Exit status 2, and the message says what is allowed. */
+static void test_refused(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *word, *said;
+    } wrong[] = {
+        {"--strategy=linda", "sequential, spatial, auto"},
+        {"--strategy=quick", "no such name"},
+        {"--partition=odd", "adaptive, uniform"},
+        {"--index=tree", "naive, grid, kd"},
+        {"--face-rule=all", "own, paper"},
+        {"--link=wet-string", "no such name; allowed: tcp, serial, mpi"},
+        {"--link=a-name-longer-than-any-other-name-that-there-is",
+         "no such name; allowed: tcp"},
+        {"--board=mps2-an500", "not in this version; allowed: linux"},
+        {"--cluster=4", "not in this version"},
+        {"--nodes=3", "1, 2, 4, 8, 16, 32, 64"},
+        {"--nodes=128", "1, 2, 4, 8, 16, 32, 64"},
+        {"--memory=1K", "640K to 1G"},
+        {"--window=0", "1 to 64"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        const char *const words[] = {"a.xyz", wrong[i].word, NULL};
+        struct host_run_options o;
+        struct host_error error;
+        assert_int_equal(parse(words, &o, &error), HOST_USAGE);
+        assert_non_null(strstr(error.text, wrong[i].said));
+    }
+}
+
+/* What would change nothing is refused, and what goes with it is not. */
+static void test_in_vain(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *vain, *beside, *with;
+    } cases[] = {{"--memory=1M", "--cube=lab.cube", "--nodes=2"},
+                 {"--link=tcp", "--cube=lab.cube", "--nodes=2"},
+                 {"--link=mpi", "--cube=lab.cube", "--nodes=2"},
+                 {"--window=4", "--cube=lab.cube", "--nodes=2"},
+                 {"--host-unplug=99", "--link=tcp", "--link=serial"},
+                 {"--host-unplug=99", "--cube=lab.cube", "--link=serial"},
+                 {"--node-program=node", "--link=mpi", "--cube=lab.cube"},
+                 {"--host-rate-time=4", "--nodes=2", "--host-rate=9"},
+                 {"--seed=4", "--nodes=2", "--host-stall=9"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct host_run_options o;
+        struct host_error error;
+        const char *words[] = {"a.xyz", cases[i].vain, cases[i].beside, NULL};
+        size_t name = strcspn(cases[i].vain, "=");
+        assert_int_equal(parse(words, &o, &error), HOST_USAGE);
+        assert_memory_equal(error.text, cases[i].vain, name);
+        assert_non_null(strstr(error.text, "; leave it out"));
+        words[2] = cases[i].with;
+        assert_int_equal(parse(words, &o, &error), 0);
+    }
+}
+
+/* Each value of an enumeration has a name, which the options know it by. */
+static void test_names(void **unused)
+{
+    static const struct {
+        const char *option;
+        const char *const *names;
+        int last;
+    } tables[] = {{"--strategy", host_strategies, HOST_AUTO},
+                  {"--partition", host_partitions, HOST_UNIFORM},
+                  {"--index", host_indexes, INCODE_KD},
+                  {"--face-rule", host_face_rules, INCODE_FACE_PAPER},
+                  {"--link", host_links, HOST_WIRE_MPI}};
+    (void)unused;
+    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
+        for (int value = 0; value <= tables[i].last; value++) {
+            struct host_run_options o;
+            struct host_error error;
+            const char *words[] = {tables[i].option, tables[i].names[value],
+                                   "a.xyz", NULL};
+            assert_non_null(words[1]);
+            assert_int_equal(parse(words, &o, &error), 0);
+            const int found[] = {(int)o.strategy, (int)o.partition,
+                                 (int)o.index, (int)o.face_rule, (int)o.link};
+            assert_int_equal(found[i], value);
+        }
+        assert_null(tables[i].names[tables[i].last + 1]);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_bytes),    cmocka_unit_test(test_numbers),
+        cmocka_unit_test(test_defaults), cmocka_unit_test(test_options),
+        cmocka_unit_test(test_refused),  cmocka_unit_test(test_in_vain),
+        cmocka_unit_test(test_names),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

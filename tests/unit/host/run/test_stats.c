@@ -1,0 +1,192 @@
+/* The statistics have every name that scripts rely on, and its value. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <jansson.h>
+#include <sys/wait.h>
+
+#include "host/base/memory.h"
+#include "host/files/output.h"
+#include "host/run/stats.h"
+
+static const char *const names[] = {"points",
+                                    "distinct_points",
+                                    "duplicates",
+                                    "negative_zeros",
+                                    "tetrahedra",
+                                    "hull_facets",
+                                    "digest",
+                                    "strategy",
+                                    "partition",
+                                    "index",
+                                    "link",
+                                    "board",
+                                    "nodes",
+                                    "memory_bytes",
+                                    "time_total_s",
+                                    "time_io_s",
+                                    "time_triangulation_s",
+                                    "t_min_s",
+                                    "t_max_s",
+                                    "host_peak_bytes",
+                                    "tetrahedra_per_second",
+                                    "make_tetra_calls",
+                                    "duplication_factor",
+                                    "exact_orient3d",
+                                    "exact_in_sphere",
+                                    "retransmitted_frames",
+                                    "per_node"};
+
+static const char *const node_names[] = {"node",
+                                         "tetrahedra_built",
+                                         "tetrahedra_kept",
+                                         "make_tetra_calls",
+                                         "cpu_s",
+                                         "page_requests",
+                                         "page_faults",
+                                         "page_evictions",
+                                         "afl_max",
+                                         "afl_spilled",
+                                         "bytes_in",
+                                         "bytes_out",
+                                         "memory_high_water_bytes"};
+
+static void fill(struct host_run_result *r)
+{
+    memset(r, 0, sizeof *r);
+    r->rows = 100;
+    r->points = 99;
+    r->tetrahedra = 500;
+    r->built = 600;
+    r->time_triangulation_s = 2.0;
+    r->nodes = 4;
+    r->strategy = HOST_SPATIAL;
+    r->index = INCODE_KD;
+    r->make_tetra_calls = 1000;
+    r->candidates = 64000;
+    r->candidates_histogram[10] = 980;
+    r->candidates_histogram[14] = 20;
+    strcpy(r->digest.text, "sha256:00");
+    for (unsigned i = 0; i < 4; i++) {
+        r->node[i].statistics.busy_us = 1500000;
+        r->node[i].statistics.statistics.tetrahedra_built = 150 + i;
+    }
+}
+
+static void test_names(void **unused)
+{
+    (void)unused;
+    static struct host_run_result result;
+    struct host_error error = {0};
+    char path[] = "/tmp/incode-stats-XXXXXX";
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    close(fd);
+    fill(&result);
+    assert_int_equal(host_stats_write(path, &result, &error), 0);
+    assert_int_equal(host_output_commit(&error), 0);
+    json_t *o = json_load_file(path, 0, NULL);
+    unlink(path);
+    assert_non_null(o);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        assert_non_null(json_object_get(o, names[i]));
+    }
+    assert_int_equal(json_integer_value(json_object_get(o, "points")), 100);
+    assert_int_equal(json_integer_value(json_object_get(o, "distinct_points")),
+                     99);
+    assert_string_equal(json_string_value(json_object_get(o, "strategy")),
+                        "spatial");
+    assert_true(json_real_value(json_object_get(o, "duplication_factor")) ==
+                1.2);
+    assert_true(json_real_value(json_object_get(o, "tetrahedra_per_second")) ==
+                250.0);
+    json_t *nodes = json_object_get(o, "per_node");
+    assert_int_equal(json_array_size(nodes), 4);
+    for (size_t k = 0; k < 4; k++) {
+        json_t *node = json_array_get(nodes, k);
+        for (size_t i = 0; i < sizeof node_names / sizeof node_names[0]; i++) {
+            assert_non_null(json_object_get(node, node_names[i]));
+        }
+        assert_int_equal(
+            json_integer_value(json_object_get(node, "tetrahedra_built")),
+            150 + k);
+    }
+    json_decref(o);
+}
+
+static void test_candidates(void **unused)
+{
+    (void)unused;
+    static struct host_run_result result;
+    fill(&result);
+    assert_true(host_candidates_mean(&result) == 64.0);
+    /* 2 % lie in the class that ends at 2^7.5. */
+    assert_true(host_candidates_p99(&result) > 181.0);
+    assert_true(host_candidates_p99(&result) < 182.0);
+}
+
+static void test_unwritable(void **unused)
+{
+    (void)unused;
+    static struct host_run_result result;
+    struct host_error error = {0};
+    fill(&result);
+    assert_int_equal(
+        host_stats_write("/nowhere/at/all/s.json", &result, &error),
+        HOST_INPUT);
+    assert_non_null(strstr(error.text, "/nowhere/at/all/s.json: "));
+}
+
+/* In a process that a large one became, as a shell or a script starts it. */
+static char *self;
+
+static void test_peak_is_its_own(void **unused)
+{
+    (void)unused;
+    const size_t large = (size_t)192 << 20;
+    int pair[2], status = -1;
+    uint64_t peak = 0;
+    char *bytes = host_map(large);
+    assert_non_null(bytes);
+    memset(bytes, 1, large);
+    assert_true(host_memory_peak() >= large);
+    assert_int_equal(pipe(pair), 0);
+    pid_t child = fork();
+    if (child == 0) {
+        char argument[] = "peak";
+        char *const again[] = {self, argument, NULL};
+        dup2(pair[1], STDOUT_FILENO);
+        execv(self, again);
+        _exit(127);
+    }
+    close(pair[1]);
+    assert_int_equal(read(pair[0], &peak, sizeof peak), sizeof peak);
+    close(pair[0]);
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(status, 0);
+    assert_in_range(peak, 65536, large - 1);
+    host_unmap(bytes, large);
+}
+
+int main(int argc, char **argv)
+{
+    self = argv[0];
+    if (argc > 1 && strcmp(argv[1], "peak") == 0) {
+        uint64_t peak = host_memory_peak();
+        return write(STDOUT_FILENO, &peak, sizeof peak) == sizeof peak ? 0 : 1;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_candidates),
+        cmocka_unit_test(test_unwritable),
+        cmocka_unit_test(test_peak_is_its_own),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

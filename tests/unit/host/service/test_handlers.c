@@ -1,0 +1,334 @@
+/* The host believes no message: whatever a node sends, the host takes it as it
+ * should be, or names the node and stops; it never writes where it must not. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/mesh/gen.h"
+#include "host/service/handlers.h"
+#include "node/result.h"
+#include "tests/unit/transport/line.h"
+
+enum { NODES = 4 };
+
+static uint64_t state = 88172645463325252u;
+
+static uint32_t draw(uint32_t below)
+{
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return (uint32_t)(state >> 32) % below;
+}
+
+static struct host_service service;
+static struct host_machine machine;
+static struct host_order order;
+static struct host_tetrahedra tets;
+
+/* The host's end of a cube, which nobody polls: the link of a node is named
+ * all the same. */
+static struct sim_end nowhere;
+
+static void *open_cube(void)
+{
+    struct cube_config config = {
+        .self = CUBE_HOST, .dimension = 2, .window = 1, .epoch = 1};
+    config.pipes[0] = line_pipe(&nowhere);
+    void *arena = malloc(cube_arena_bytes(&config));
+    assert_non_null(arena);
+    service.cube = cube_init(arena, cube_arena_bytes(&config), &config);
+    assert_non_null(service.cube);
+    return arena;
+}
+
+static void *cube_arena;
+
+static int set_up(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    assert_int_equal(host_gen("uniform", 3000, 1, &points, &error), 0);
+    assert_int_equal(host_order_make(&order, "test", points.xyz, points.count,
+                                     HOST_ADAPTIVE, NODES, false, &error),
+                     0);
+    host_points_free(&points);
+    return 0;
+}
+
+static int tear_down(void **unused)
+{
+    (void)unused;
+    host_order_free(&order);
+    return 0;
+}
+
+/* A service in the midst of its run, a job at each node. */
+static void begin(void)
+{
+    struct host_error error = {0};
+    memset(&service, 0, sizeof service);
+    memset(&tets, 0, sizeof tets);
+    cube_arena = open_cube();
+    machine.nodes = NODES;
+    machine.dimension = 2;
+    service.machine = &machine;
+    service.order = &order;
+    service.tets = &tets;
+    service.workers = NODES;
+    service.started = true;
+    service.node = calloc(NODES, sizeof *service.node);
+    service.report = calloc(NODES, sizeof *service.report);
+    assert_non_null(service.node);
+    assert_non_null(service.report);
+    assert_int_equal(
+        host_ledger_init(&service.ledger, order.bricks, NODES, &error), 0);
+    assert_int_equal(host_spill_init(&service.spill, 0, &error), 0);
+    for (uint32_t i = 0; i < NODES; i++) {
+        (void)host_ledger_open(&service.ledger, i, order.region[i].first,
+                               order.region[i].last);
+    }
+}
+
+static void end(void)
+{
+    free(cube_arena);
+    free(service.node);
+    free(service.report);
+    host_ledger_free(&service.ledger);
+    host_spill_free(&service.spill);
+    host_tetrahedra_free(&tets);
+}
+
+static bool gap; /* letters do not say how many went before them */
+
+static int send(uint16_t source, uint8_t type, const void *data, size_t size,
+                struct host_error *error)
+{
+    /* A copy of the right size, so that a sanitizer sees reads past it. */
+    uint8_t *copy = malloc(size + 1);
+    assert_non_null(copy);
+    if (size > 0) {
+        memcpy(copy, data, size);
+    }
+    if (type == NODE_RESULT && size >= 8 && source < NODES && !gap) {
+        memcpy(copy + 4, &service.node[source].received, 4);
+    }
+    if (type == NODE_UNSPILL_REQUEST && size >= 20 && source < NODES && !gap) {
+        memcpy(copy + 16, &service.node[source].received, 4);
+    }
+    if (type == NODE_FINISHED && size >= 16 && source < NODES && !gap) {
+        memcpy(copy + 8, &service.node[source].received, 4);
+    }
+    struct cube_message message = {source, (uint16_t)size, type, copy};
+    int status = host_intake(&service, &message, error);
+    free(copy);
+    return status;
+}
+
+static void test_any_bytes(void **unused)
+{
+    (void)unused;
+    for (uint32_t round = 0; round < 2000; round++) {
+        begin();
+        for (uint32_t k = 0; k < 40; k++) {
+            uint8_t data[CUBE_PAYLOAD_MAX];
+            uint32_t size = draw(draw(4) == 0 ? CUBE_PAYLOAD_MAX : 40);
+            struct host_error error = {0};
+            for (uint32_t i = 0; i < size; i++) {
+                data[i] = (uint8_t)(draw(2) == 0 ? 0 : draw(256));
+            }
+            uint32_t epoch = 1 + draw(NODES);
+            if (size >= 4 && draw(2) == 0) {
+                memcpy(data, &epoch, 4);
+            }
+            uint8_t type =
+                (uint8_t)(draw(8) == 0 ? draw(256) : NODE_READY + draw(8));
+            if (send((uint16_t)draw(NODES + 1), type, data, size, &error) !=
+                0) {
+                assert_true(error.code == HOST_CUBE ||
+                            error.code == HOST_BROKEN);
+                assert_int_equal(strncmp(error.text, "node ", 5), 0);
+                break;
+            }
+        }
+        for (uint64_t i = 0; i < tets.count; i++) {
+            for (int k = 0; k < 4; k++) {
+                assert_true(tets.v[i][k] < 64 * order.bricks);
+            }
+        }
+        end();
+    }
+}
+
+static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick)
+{
+    struct node_result_writer writer;
+    const uint32_t apexes[1][3] = {{1, 2, 3}};
+    struct node_result_header header = {epoch, 0};
+    memcpy(data, &header, sizeof header);
+    node_result_begin(&writer, data + sizeof header, 100);
+    assert_int_equal(node_result_star(&writer, 0, apexes, 1), 1);
+    assert_int_equal(node_result_commit(&writer, brick), 1);
+    return sizeof header + writer.size;
+}
+
+/* Results of a job that is no more are counted as read, and dropped. */
+static void test_epochs(void **unused)
+{
+    (void)unused;
+    uint8_t data[128];
+    struct host_error error = {0};
+    begin();
+    size_t size = batch(data, service.ledger.job[1].epoch, 0);
+    assert_int_equal(send(0, NODE_RESULT, data, size, &error), 0);
+    assert_int_equal(tets.count, 0);
+    assert_int_equal(service.ledger.committed, 0);
+    assert_int_equal(service.node[0].results, 1);
+    size = batch(data, service.ledger.job[0].epoch, 0);
+    assert_int_equal(send(0, NODE_RESULT, data, size, &error), 0);
+    assert_int_equal(tets.count, 1);
+    assert_int_equal(service.ledger.committed, 1);
+    /* The same brick a second time cannot be. */
+    assert_int_equal(send(0, NODE_RESULT, data, size, &error), HOST_CUBE);
+    end();
+}
+
+/* What comes after a letter that was lost does not count, and is a loss. */
+static void test_gaps(void **unused)
+{
+    (void)unused;
+    static struct node_finished_message finished;
+    uint8_t data[128];
+    struct host_error error = {0};
+    for (int i = 0; i < 2; i++) {
+        begin();
+        size_t size = batch(data, service.ledger.job[0].epoch, 0);
+        service.node[0].received = 1;
+        finished.epoch = service.ledger.job[0].epoch;
+        gap = true;
+        assert_int_equal(
+            i == 0 ? send(0, NODE_RESULT, data, size, &error)
+                   : send(0, NODE_FINISHED, &finished, sizeof finished, &error),
+            0);
+        gap = false;
+        assert_true(service.loss);
+        assert_int_equal(service.ledger.committed, 0);
+        assert_int_equal(tets.count, 0);
+        assert_false(service.node[0].reported);
+        end();
+    }
+}
+
+/* A node that has not committed all its bricks is not done. */
+static void test_unfinished(void **unused)
+{
+    (void)unused;
+    static struct node_finished_message finished;
+    struct host_error error = {0};
+    begin();
+    finished.epoch = service.ledger.job[2].epoch;
+    assert_int_equal(send(2, NODE_FINISHED, &finished, sizeof finished, &error),
+                     HOST_BROKEN);
+    assert_non_null(strstr(error.text, "node 2: "));
+    assert_false(service.node[2].reported);
+    memset(&error, 0, sizeof error);
+    assert_int_equal(send(1, NODE_FINISHED, &finished, sizeof finished, &error),
+                     HOST_CUBE); /* that job is another node's */
+    end();
+}
+
+static void answer(uint32_t start, uint32_t called, uint32_t received,
+                   uint32_t sent)
+{
+    struct node_here_message here = {start, called, received, sent, 0};
+    struct host_error error = {0};
+    assert_int_equal(send(1, NODE_HERE, &here, sizeof here, &error), 0);
+}
+
+/* Letters that are missing, either way, and another start are losses; calls
+ * that got lost before the first answer are none. */
+static void test_answers(void **unused)
+{
+    (void)unused;
+    static const struct {
+        uint32_t start, called, received, sent;
+        bool loss;
+    } then[] = {{7, 5, 3, 1, false}, {7, 5, 4, 1, true}, {7, 5, 2, 1, true},
+                {7, 5, 3, 2, true},  {7, 5, 3, 0, true}, {8, 5, 3, 1, true}};
+    for (size_t i = 0; i < sizeof then / sizeof then[0]; i++) {
+        begin();
+        answer(7, 3, 1, 0); /* two calls went astray */
+        assert_false(service.loss);
+        assert_int_equal(service.here, 1);
+        answer(then[i].start, then[i].called, then[i].received, then[i].sent);
+        assert_int_equal(service.loss, then[i].loss);
+        assert_int_equal(service.here, 1);
+        end();
+    }
+}
+
+/* Statistics replace those of the same start, and add to those of others; of
+ * what no statistics tell, the tetrahedra that came are counted. */
+static void test_starts(void **unused)
+{
+    (void)unused;
+    static struct node_finished_message told;
+    const struct incode_statistics *sum;
+    struct host_error error = {0};
+    uint8_t data[128];
+    begin();
+    sum = &service.report[1].statistics.statistics;
+    answer(7, 0, 0, 0);
+    told.start = 7;
+    told.statistics.make_tetra_calls = 50;
+    told.statistics.afl_max = 9;
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(send(1, NODE_FINISHED, &told, sizeof told, &error), 0);
+        assert_int_equal(sum->make_tetra_calls, 50);
+    }
+    size_t size =
+        batch(data, service.ledger.job[1].epoch, service.ledger.job[1].first);
+    assert_int_equal(send(1, NODE_RESULT, data, size, &error), 0);
+    service.report[1].here = false; /* a new generation */
+    service.node[1].received = 0;
+    answer(8, 0, 0, 0);
+    assert_int_equal(sum->make_tetra_calls, 51);
+    assert_int_equal(sum->tetrahedra_built, 1);
+    told.start = 8;
+    told.statistics.make_tetra_calls = 20;
+    told.statistics.afl_max = 4;
+    assert_int_equal(send(1, NODE_FINISHED, &told, sizeof told, &error), 0);
+    assert_int_equal(sum->make_tetra_calls, 71);
+    assert_int_equal(sum->afl_max, 9);
+    assert_true(service.node[1].reported);
+    end();
+}
+
+static void test_fault(void **unused)
+{
+    (void)unused;
+    struct host_error error = {0};
+    begin();
+    assert_int_equal(send(3, NODE_FAULT, "no memory", 9, &error), HOST_CUBE);
+    assert_non_null(strstr(error.text, "node 3: no memory; "));
+    assert_non_null(strstr(error.text, "give the nodes more memory"));
+    end();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_any_bytes), cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_gaps),      cmocka_unit_test(test_unfinished),
+        cmocka_unit_test(test_answers),   cmocka_unit_test(test_starts),
+        cmocka_unit_test(test_fault),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,244 @@
+/* The active face list against a plain array of faces. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "incode/front/afl.h"
+#include "incode/pages/pages.h"
+
+enum { FACES = 300, BRICKS = 40, GUARD = 64 };
+
+static uint64_t state;
+
+static uint32_t draw(uint32_t below)
+{
+    state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
+    return (uint32_t)((state >> 33) % below);
+}
+
+struct plain {
+    uint32_t face[FACES][3];
+    uint32_t count, most;
+};
+
+static uint32_t find(const struct plain *p, uint32_t key, uint32_t b,
+                     uint32_t c)
+{
+    uint32_t i = 0;
+    while (i < p->count &&
+           (p->face[i][0] != key || p->face[i][1] != b || p->face[i][2] != c))
+        i++;
+    return i;
+}
+
+static bool take_out(struct plain *p, uint32_t key, uint32_t b, uint32_t c)
+{
+    uint32_t i = find(p, key, b, c);
+    if (i == p->count)
+        return false;
+    memcpy(p->face[i], p->face[--p->count], sizeof p->face[i]);
+    return true;
+}
+
+static uint32_t faces_at(const struct plain *p, uint32_t first, uint32_t end)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < p->count; i++)
+        n += p->face[i][0] >= first && p->face[i][0] < end;
+    return n;
+}
+
+static uint8_t *open_list(struct incode_afl *afl, uint32_t faces,
+                          uint32_t bricks)
+{
+    size_t bytes = incode_afl_bytes(faces, bricks);
+    uint8_t *memory = aligned_alloc(64, (bytes + GUARD + 63) / 64 * 64);
+    assert_non_null(memory);
+    memset(memory, 0xa5, bytes + GUARD);
+    incode_afl_init(afl, memory, faces, bricks);
+    return memory;
+}
+
+static void close_list(uint8_t *memory, uint32_t faces, uint32_t bricks)
+{
+    size_t bytes = incode_afl_bytes(faces, bricks);
+    for (size_t i = bytes; i < bytes + GUARD; i++)
+        assert_int_equal(memory[i], 0xa5);
+    free(memory);
+}
+
+/* What is known of every brick agrees with the faces. */
+static void compare(const struct incode_afl *afl, const struct plain *p)
+{
+    assert_int_equal(afl->count, p->count);
+    assert_int_equal(afl->count_max, p->most);
+    for (uint32_t brick = 0; brick < BRICKS; brick++) {
+        const struct incode_touched *entry = incode_afl_find(afl, brick);
+        uint32_t first = brick * INCODE_BRICK_POINTS;
+        uint32_t n = faces_at(p, first, first + INCODE_BRICK_POINTS);
+        assert_int_equal(entry == NULL ? 0 : entry->faces, n);
+        for (uint32_t v = 0; v < INCODE_BRICK_POINTS && entry != NULL; v++) {
+            bool pending = (entry->pending >> v & 1) != 0;
+            /* The mark may outlast the faces, but never fails them. */
+            if (faces_at(p, first + v, first + v + 1) > 0)
+                assert_true(pending);
+        }
+    }
+}
+
+/* A vertex of few bricks, so that faces meet their twins. */
+static uint32_t draw_vertex(void)
+{
+    return draw(BRICKS) * INCODE_BRICK_POINTS + draw(2);
+}
+
+static void toggle_one(struct incode_afl *afl, struct plain *p)
+{
+    uint32_t f[3];
+    if (p->count > 0 && draw(8) < 3) { /* the twin of an open one */
+        uint32_t i = draw(p->count);
+        f[0] = p->face[i][0];
+        f[1] = p->face[i][2];
+        f[2] = p->face[i][1];
+    } else {
+        if (p->count == FACES)
+            return;
+        f[0] = draw_vertex();
+        f[1] = draw(4) + 100000;
+        f[2] = draw(4) + 200000;
+        if (find(p, f[0], f[1], f[2]) < p->count)
+            return; /* opening a face twice is not allowed */
+    }
+    bool closes = take_out(p, f[0], f[2], f[1]);
+    if (draw(4) == 0) {
+        assert_int_equal(incode_afl_close_twin(afl, f[0], f[1], f[2]), closes);
+        return;
+    }
+    incode_afl_toggle(afl, f[0], f[1], f[2]);
+    if (closes)
+        return;
+    memcpy(p->face[p->count++], f, sizeof f);
+    p->most = p->count > p->most ? p->count : p->most;
+}
+
+static void take_some(struct incode_afl *afl, struct plain *p)
+{
+    uint32_t v = draw_vertex(), pairs[8][2], limit = draw(8) + 1;
+    uint32_t n = faces_at(p, v, v + 1);
+    bool more = true;
+    uint32_t taken = incode_afl_take(afl, v, pairs, limit, &more);
+    assert_int_equal(taken, n < limit ? n : limit);
+    assert_int_equal(more, n > taken);
+    for (uint32_t i = 0; i < taken; i++)
+        assert_true(take_out(p, v, pairs[i][0], pairs[i][1]));
+    const struct incode_touched *entry =
+        incode_afl_find(afl, v / INCODE_BRICK_POINTS);
+    if (entry != NULL && !more)
+        assert_int_equal(entry->pending >> (v % INCODE_BRICK_POINTS) & 1, 0);
+}
+
+static void drop_one(struct incode_afl *afl, const struct plain *p)
+{
+    uint32_t brick = draw(BRICKS), first = brick * INCODE_BRICK_POINTS;
+    if (faces_at(p, first, first + INCODE_BRICK_POINTS) > 0)
+        return;
+    incode_afl_drop(afl, brick);
+    assert_null(incode_afl_find(afl, brick));
+}
+
+static void against_plain(void **unused)
+{
+    (void)unused;
+    for (uint32_t round = 0; round < 4; round++) {
+        struct incode_afl afl;
+        uint8_t *memory = open_list(&afl, FACES, BRICKS);
+        struct plain p = {.count = 0};
+        state = round;
+        for (int step = 0; step < 20000; step++) {
+            uint32_t what = draw(16);
+            if (what == 0)
+                take_some(&afl, &p);
+            else if (what == 1)
+                drop_one(&afl, &p);
+            else
+                toggle_one(&afl, &p);
+            if (step % 256 == 0)
+                compare(&afl, &p);
+        }
+        compare(&afl, &p);
+        assert_true(afl.count_max > FACES / 4);
+        incode_afl_clear(&afl);
+        p.count = 0;
+        compare(&afl, &p);
+        assert_int_equal(afl.touched_count, 0);
+        close_list(memory, FACES, BRICKS);
+    }
+}
+
+/* To the last face and the last brick, and back. */
+static void full(void **unused)
+{
+    (void)unused;
+    static const uint32_t sizes[][2] = {
+        {1, 1}, {2, 1}, {3, 5}, {64, 32}, {100, 100}};
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+        uint32_t faces = sizes[k][0], bricks = sizes[k][1];
+        struct incode_afl afl;
+        uint8_t *memory = open_list(&afl, faces, bricks);
+        for (int round = 0; round < 3; round++) {
+            for (uint32_t i = 0; i < faces; i++)
+                incode_afl_toggle(&afl, i % bricks * INCODE_BRICK_POINTS,
+                                  1000 + i, 5000 + i);
+            for (uint32_t i = 0; i < bricks; i++)
+                (void)incode_afl_touch(&afl, i);
+            assert_int_equal(afl.count, faces);
+            assert_int_equal(afl.touched_count, bricks);
+            for (uint32_t i = 0; i < faces; i++)
+                incode_afl_toggle(&afl, i % bricks * INCODE_BRICK_POINTS,
+                                  5000 + i, 1000 + i);
+            assert_int_equal(afl.count, 0);
+            for (uint32_t i = 0; i < bricks; i++)
+                incode_afl_drop(&afl, i);
+            assert_int_equal(afl.touched_count, 0);
+        }
+        close_list(memory, faces, bricks);
+    }
+}
+
+/* A long list is noticed, once, and not before it is long. */
+static void crowded(void **unused)
+{
+    (void)unused;
+    enum { MANY = 1024 };
+    struct incode_afl afl;
+    uint8_t *memory = open_list(&afl, MANY, BRICKS);
+    for (uint32_t i = 0; i <= INCODE_AFL_CROWD; i++) {
+        assert_int_equal(afl.crowded, INCODE_NONE);
+        incode_afl_toggle(&afl, 77, 1000 + i, 5000 + i);
+        incode_afl_toggle(&afl, 200 + i, 1000 + i, 5000 + i);
+    }
+    assert_int_equal(afl.crowded, 77);
+    uint32_t pairs[MANY][2];
+    bool more;
+    assert_int_equal(incode_afl_take(&afl, 77, pairs, MANY, &more),
+                     INCODE_AFL_CROWD + 1);
+    assert_false(more);
+    incode_afl_clear(&afl);
+    assert_int_equal(afl.crowded, INCODE_NONE);
+    close_list(memory, MANY, BRICKS);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(against_plain),
+        cmocka_unit_test(full),
+        cmocka_unit_test(crowded),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

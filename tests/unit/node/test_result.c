@@ -1,0 +1,265 @@
+/* Batches of tetrahedra: what is written is read, whatever the numbers; and
+ * no bytes at all make the reader leave its buffer or invent vertices. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+#include "node/result.h"
+#include "tests/unit/emulated.h"
+
+enum { BATCH = 1592, STARS = 4000, APEXES = 40 };
+
+static uint64_t state = 88172645463325252u;
+
+static uint32_t draw(void)
+{
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return (uint32_t)(state >> 32);
+}
+
+/* A vertex near `v` or anywhere below `vertices`. */
+static uint32_t draw_near(uint32_t v, uint32_t vertices)
+{
+    uint32_t bits = draw() % 33;
+    uint32_t step = bits == 0 ? 0 : draw() >> (32 - bits);
+    return (uint32_t)(((uint64_t)v + step) % vertices);
+}
+
+struct expected {
+    uint32_t rows[STARS * APEXES][4];
+    size_t rows_count;
+    uint32_t bricks[STARS];
+    size_t bricks_at[STARS], bricks_count;
+};
+
+struct seen {
+    size_t rows, bricks;
+};
+
+/* Reads a batch and compares it with what was written. */
+static void compare(const struct expected *e, struct seen *seen,
+                    const uint8_t *data, size_t size, uint32_t vertices,
+                    size_t rows_max)
+{
+    /* A copy without slack, so that a sanitizer sees reads past the end. */
+    uint8_t *copy = malloc(size + 1);
+    struct node_result_reader reader;
+    uint32_t rows[64][4];
+    size_t count;
+    enum node_result_event event;
+    assert_non_null(copy);
+    memcpy(copy, data, size);
+    node_result_open(&reader, copy, size, vertices);
+    do {
+        event = node_result_read(&reader, rows, rows_max, &count);
+        assert_int_not_equal(event, NODE_RESULT_GARBAGE);
+        assert_true(count <= rows_max);
+        assert_memory_equal(rows, e->rows[seen->rows], count * sizeof rows[0]);
+        seen->rows += count;
+        if (event == NODE_RESULT_COMMIT) {
+            assert_int_equal(reader.brick, e->bricks[seen->bricks]);
+            assert_int_equal(seen->rows, e->bricks_at[seen->bricks]);
+            seen->bricks++;
+        }
+    } while (event != NODE_RESULT_END);
+    free(copy);
+}
+
+static void round_trip(uint32_t vertices, size_t rows_max)
+{
+    static struct expected e;
+    static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
+    struct node_result_writer writer;
+    struct seen seen = {0, 0};
+    e.rows_count = e.bricks_count = 0;
+    node_result_begin(&writer, buffer, BATCH);
+    for (size_t s = 0; s < STARS; s++) {
+        uint32_t vertex = draw_near(0, vertices);
+        uint32_t apexes[APEXES][3];
+        size_t count = draw() % (APEXES + 1), done = 0;
+        for (size_t i = 0; i < count; i++) {
+            uint32_t *row = e.rows[e.rows_count++];
+            row[0] = vertex;
+            for (size_t k = 0; k < 3; k++) {
+                row[k + 1] = apexes[i][k] = draw_near(vertex, vertices);
+            }
+        }
+        while (done < count) {
+            done += node_result_star(
+                &writer, vertex,
+                (const uint32_t(*)[3])(const void *)&apexes[done],
+                count - done);
+            if (done < count) {
+                assert_true(writer.size <= BATCH);
+                compare(&e, &seen, buffer, writer.size, vertices, rows_max);
+                node_result_begin(&writer, buffer, BATCH);
+            }
+        }
+        e.bricks[e.bricks_count] = draw_near(vertex, vertices) / 64;
+        e.bricks_at[e.bricks_count] = e.rows_count;
+        e.bricks_count++;
+        if (!node_result_commit(&writer, e.bricks[e.bricks_count - 1])) {
+            e.bricks_count--;
+        }
+    }
+    compare(&e, &seen, buffer, writer.size, vertices, rows_max);
+    assert_int_equal(seen.rows, e.rows_count);
+    assert_int_equal(seen.bricks, e.bricks_count);
+}
+
+static void test_round_trip(void **unused)
+{
+    (void)unused;
+    static const uint32_t sizes[] = {1,       64,         1000,
+                                     1 << 20, UINT32_MAX, 0x80000001u};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        round_trip(sizes[i], 64);
+        round_trip(sizes[i], 1);
+        round_trip(sizes[i], 7);
+    }
+}
+
+/* Any bytes: an end, and only vertices in range. */
+static void test_garbage(void **unused)
+{
+    (void)unused;
+    for (size_t round = 0; round < 100000; round++) {
+        size_t size = draw() % 100;
+        uint8_t *data = malloc(size + 1);
+        struct node_result_reader reader;
+        uint32_t rows[16][4];
+        size_t count, events = 0;
+        enum node_result_event event;
+        assert_non_null(data);
+        for (size_t i = 0; i < size; i++) {
+            data[i] = (uint8_t)draw();
+            if (draw() % 2 == 0) {
+                data[i] &= 0xd5; /* small numbers and valid kinds */
+            }
+        }
+        node_result_open(&reader, data, size, 5000);
+        do {
+            event = node_result_read(&reader, rows, 16, &count);
+            assert_true(++events <= size + 1);
+            for (size_t i = 0; event != NODE_RESULT_GARBAGE && i < count; i++) {
+                for (size_t k = 0; k < 4; k++) {
+                    assert_true(rows[i][k] < 5000);
+                }
+            }
+            if (event == NODE_RESULT_COMMIT) {
+                assert_true(reader.brick < 79);
+            }
+        } while (event == NODE_RESULT_ROWS || event == NODE_RESULT_COMMIT);
+        free(data);
+    }
+}
+
+/* A batch cut short is garbage or a shorter batch, never other tetrahedra. */
+static void test_truncated(void **unused)
+{
+    (void)unused;
+    uint8_t buffer[200 + NODE_RESULT_SLACK];
+    struct node_result_writer writer;
+    const uint32_t apexes[3][3] = {{1, 2, 3}, {70000, 4, 5}, {6, 900, 7}};
+    node_result_begin(&writer, buffer, 200);
+    assert_int_equal(node_result_star(&writer, 500, apexes, 3), 3);
+    assert_int_equal(node_result_commit(&writer, 7), 1);
+    for (size_t size = 0; size < writer.size; size++) {
+        struct node_result_reader reader;
+        uint32_t rows[4][4];
+        size_t count;
+        uint8_t *copy = malloc(size + 1);
+        assert_non_null(copy);
+        memcpy(copy, buffer, size);
+        node_result_open(&reader, copy, size, 100000);
+        enum node_result_event event =
+            node_result_read(&reader, rows, 4, &count);
+        assert_true(event == NODE_RESULT_END || event == NODE_RESULT_GARBAGE);
+        for (size_t i = 0; i < count; i++) {
+            assert_int_equal(rows[i][0], 500);
+            assert_memory_equal(&rows[i][1], apexes[i], sizeof apexes[i]);
+        }
+        free(copy);
+    }
+}
+
+static double seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* The stated speed, with room for a slow or instrumented machine. */
+static void test_speed(void **unused)
+{
+    (void)unused;
+    if (emulated()) {
+        print_message("no speed is to be had under valgrind\n");
+        skip();
+    }
+    static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
+    static uint32_t apexes[1024][7][3];
+    struct node_result_writer writer;
+    size_t total = 0, bytes = 0, seen = 0;
+    double writing = 0.0, reading = 0.0;
+    for (size_t s = 0; s < 1024; s++) {
+        for (size_t i = 0; i < 21; i++) {
+            apexes[s][i / 3][i % 3] = 100000 + (draw() >> (20 + draw() % 6));
+        }
+    }
+    for (size_t round = 0; round < 2000; round++) {
+        double start = seconds();
+        size_t batch = 0;
+        node_result_begin(&writer, buffer, BATCH);
+        for (size_t s = round % 900;; s++) {
+            size_t n = node_result_star(
+                &writer, (uint32_t)(100000 + s),
+                (const uint32_t(*)[3])(const void *)apexes[s % 1024], 7);
+            batch += n;
+            if (n < 7) {
+                break;
+            }
+        }
+        double middle = seconds();
+        struct node_result_reader reader;
+        uint32_t rows[256][4];
+        size_t count;
+        enum node_result_event event;
+        node_result_open(&reader, buffer, writer.size, 1 << 20);
+        do {
+            event = node_result_read(&reader, rows, 256, &count);
+            seen += count;
+        } while (event == NODE_RESULT_ROWS);
+        assert_int_equal(event, NODE_RESULT_END);
+        writing += middle - start;
+        reading += seconds() - middle;
+        total += batch;
+        bytes += writer.size;
+    }
+    assert_int_equal(total, seen);
+    print_message("%.1f bytes, write %.1f ns, read %.1f ns a tetrahedron\n",
+                  (double)bytes / (double)total, 1e9 * writing / (double)total,
+                  1e9 * reading / (double)total);
+    assert_true(1e9 * writing / (double)total < 200.0);
+    assert_true(1e9 * reading / (double)total < 200.0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_garbage),
+        cmocka_unit_test(test_truncated),
+        cmocka_unit_test(test_speed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,361 @@
+/* Wires over TCP between machines: addresses, calls before anybody listens,
+ * connections that break, and strangers. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <netinet/in.h>
+#include <stdio.h>
+#include <sys/random.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "transport/drivers/secure_sodium.h"
+#include "transport/drivers/tcp_wire.h"
+
+static uint64_t clock_us(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
+}
+
+static void addresses(void **unused)
+{
+    static const char *const good[] = {"127.0.0.1:7000", "[::1]:65535",
+                                       "127.9.9.9:1"};
+    static const char *const bad[] = {
+        "127.0.0.1",    "127.0.0.1:",  "127.0.0.1:0", "127.0.0.1:65536",
+        "localhost:7",  "::1:7",       "[::1:7",      "[::1]7",
+        "127.0.0.1:7x", "1.2.3.4.5:7", ":7",          ""};
+    struct tcp_address a;
+    (void)unused;
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        assert_int_equal(tcp_address_parse(&a, good[i]), 0);
+        assert_true(tcp_address_is_loopback(&a));
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        assert_int_equal(tcp_address_parse(&a, bad[i]), -1);
+    }
+    assert_int_equal(tcp_address_parse(&a, "[2001:db8::7]:7000"), 0);
+    assert_false(tcp_address_is_loopback(&a));
+    tcp_address_to_loopback(&a);
+    assert_true(tcp_address_is_loopback(&a));
+    assert_int_equal(tcp_address_parse(&a, "10.1.2.3:7000"), 0);
+    assert_false(tcp_address_is_loopback(&a));
+    tcp_address_to_loopback(&a);
+    assert_true(tcp_address_is_loopback(&a));
+}
+
+static const uint8_t key[SECURE_KEY_BYTES] = "the cube's key, 32 bytes of it ";
+static const uint8_t other_key[SECURE_KEY_BYTES] = "another key";
+
+struct end {
+    struct tcp_wire wire;
+    struct link *link;
+    void *memory;
+    uint32_t written, read;
+};
+
+/* A port that was free a moment ago. */
+static struct tcp_address free_address(int family)
+{
+    struct tcp_address a;
+    assert_int_equal(
+        tcp_address_parse(&a, family == AF_INET ? "127.0.0.1:1" : "[::1]:1"),
+        0);
+    if (family == AF_INET) {
+        ((struct sockaddr_in *)&a.to)->sin_port = 0;
+    } else {
+        ((struct sockaddr_in6 *)&a.to)->sin6_port = 0;
+    }
+    int fd = socket(family, SOCK_STREAM, 0);
+    assert_true(fd >= 0);
+    assert_int_equal(bind(fd, &a.to.any, a.size), 0);
+    assert_int_equal(getsockname(fd, &a.to.any, &a.size), 0);
+    close(fd);
+    return a;
+}
+
+static void open_end(struct end *end, unsigned who,
+                     const struct tcp_address *address, const uint8_t *with)
+{
+    struct tcp_wire_config wire = {.address = *address, .listens = who == 1};
+    struct link_config c = {.epoch = 5 + who,
+                            .node = (uint16_t)who,
+                            .peer_node = (uint16_t)(1 - who),
+                            .window = 8};
+    memset(end, 0, sizeof *end);
+    wire.suite = with == NULL ? NULL : &secure_sodium;
+    wire.key = with;
+    assert_int_equal(tcp_wire_open(&end->wire, &wire), 0);
+    c.pipe = tcp_wire_pipe(&end->wire);
+    end->memory = malloc(link_bytes(&c));
+    end->link = link_init(end->memory, link_bytes(&c), &c);
+    assert_non_null(end->link);
+}
+
+static void close_end(struct end *end)
+{
+    tcp_wire_close(&end->wire);
+    free(end->memory);
+}
+
+static void step(struct end *end)
+{
+    static uint8_t bytes[1500];
+    struct link_message message;
+    link_poll(end->link, clock_us());
+    while (link_read(end->link, &message)) {
+        uint32_t number;
+        memcpy(&number, message.data, sizeof number);
+        assert_int_equal(number, end->read);
+        end->read++;
+        link_release(end->link);
+    }
+    while (link_write(end->link, &end->written, 4, bytes, sizeof bytes) == 0) {
+        end->written++;
+    }
+}
+
+/* Steps until both have read so many more; no longer than 10 s. */
+static bool exchange(struct end *ends, uint32_t messages)
+{
+    uint32_t want[2] = {ends[0].read + messages, ends[1].read + messages};
+    uint64_t begin = clock_us();
+    while (ends[0].read < want[0] || ends[1].read < want[1]) {
+        step(&ends[0]);
+        step(&ends[1]);
+        if (clock_us() - begin > 10000000) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void wires_that_break_go_on(void **unused)
+{
+    static struct end ends[2];
+    static const int families[] = {AF_INET, AF_INET6};
+    (void)unused;
+    for (unsigned keyed = 0; keyed < 2; keyed++) {
+        for (unsigned f = 0; f < 2; f++) {
+            struct tcp_address at = free_address(families[f]);
+            /* The caller is there first. */
+            open_end(&ends[0], 0, &at, keyed ? key : NULL);
+            for (unsigned i = 0; i < 20; i++) {
+                step(&ends[0]);
+                usleep(1000);
+            }
+            assert_true(ends[0].wire.tcp.fd < 0);
+            open_end(&ends[1], 1, &at, keyed ? key : NULL);
+            assert_true(exchange(ends, 300));
+            for (unsigned round = 0; round < 6; round++) {
+                shutdown(ends[round % 2].wire.tcp.fd, SHUT_RDWR);
+                assert_true(exchange(ends, 100));
+            }
+            assert_true(ends[1].wire.connections >= 7);
+            assert_int_equal(link_statistics(ends[0].link)->sessions, 1);
+            assert_int_equal(ends[1].wire.channel.refused, 0);
+            close_end(&ends[0]);
+            close_end(&ends[1]);
+        }
+    }
+}
+
+static void another_key_never_connects(void **unused)
+{
+    static struct end ends[2];
+    struct tcp_address at = free_address(AF_INET);
+    (void)unused;
+    open_end(&ends[1], 1, &at, key);
+    for (unsigned keyed = 2; keyed-- > 0;) {
+        open_end(&ends[0], 0, &at, keyed ? other_key : NULL);
+        /* Until both have seen it, where there is a key, and a while. */
+        bool seen = false;
+        for (uint64_t begin = clock_us(), now = begin;
+             now - begin < (seen ? 300000 : 5000000); now = clock_us()) {
+            step(&ends[0]);
+            step(&ends[1]);
+            seen = keyed == 0 ||
+                   (ends[0].wire.other_key && ends[1].wire.strangers > 0);
+        }
+        assert_int_equal(ends[1].wire.connections, 0);
+        assert_int_equal(ends[0].read + ends[1].read, 0);
+        assert_int_equal(link_statistics(ends[1].link)->bytes_received, 0);
+        assert_true(ends[0].wire.other_key == (keyed != 0));
+        close_end(&ends[0]);
+    }
+    assert_true(ends[1].wire.strangers > 0);
+    close_end(&ends[1]);
+}
+
+static int stranger(const struct tcp_address *at)
+{
+    int fd = socket(at->to.any.sa_family, SOCK_STREAM, 0);
+    assert_true(fd >= 0);
+    assert_int_equal(tcp_prepare(fd), 0);
+    (void)connect(fd, &at->to.any, at->size);
+    return fd;
+}
+
+/* Strangers who say nothing, or noise, while two talk and lose their connection
+ * now and then.  Those two are disturbed no more often than that, and look at
+ * few strangers at a time. */
+static void with_strangers(const uint8_t *with)
+{
+    enum { STRANGERS = 60 };
+    static struct end ends[2];
+    static uint8_t noise[3000];
+    int fds[STRANGERS];
+    struct tcp_address at = free_address(AF_INET);
+    assert_int_equal(getrandom(noise, sizeof noise, 0), sizeof noise);
+    open_end(&ends[1], 1, &at, with);
+    open_end(&ends[0], 0, &at, with);
+    assert_true(exchange(ends, 20));
+    for (unsigned i = 0; i < STRANGERS; i++) {
+        fds[i] = -1;
+    }
+    uint64_t looks = 0;
+    for (unsigned round = 0; round < 20; round++) {
+        uint64_t begin = clock_us(), strangers = ends[1].wire.strangers;
+        for (unsigned i = 0; i < STRANGERS; i++) {
+            if (fds[i] >= 0) {
+                close(fds[i]);
+            }
+            fds[i] = stranger(&at);
+            step(&ends[0]);
+            step(&ends[1]);
+            if (i % 3 != 0) {
+                size_t size = i % 3 == 1 ? sizeof noise : 32;
+                (void)!write(fds[i], noise, size);
+            }
+        }
+        while (ends[1].wire.strangers - strangers < 5) {
+            assert_true(exchange(ends, 20));
+            assert_true(clock_us() - begin < 10000000);
+        }
+        looks = (clock_us() - begin) / TCP_LOOK_US + 2;
+        assert_true(ends[1].wire.strangers - strangers <=
+                    looks * TCP_ACCEPTS_MAX + TCP_CANDIDATES_MAX);
+        if (round % 5 == 4) {
+            shutdown(ends[0].wire.tcp.fd, SHUT_RDWR);
+            assert_true(exchange(ends, 20));
+        }
+    }
+    unsigned open = 0;
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+        open += ends[1].wire.candidate[i].fd >= 0;
+    }
+    assert_true(open <= TCP_CANDIDATES_MAX);
+    assert_true(ends[1].wire.strangers >= 20 * 5);
+    assert_true(with == NULL || ends[1].wire.connections == 5);
+    assert_true(ends[1].wire.connections <= 10);
+    assert_int_equal(link_statistics(ends[1].link)->sessions, 1);
+    for (unsigned i = 0; i < STRANGERS; i++) {
+        close(fds[i]);
+    }
+    close_end(&ends[0]);
+    close_end(&ends[1]);
+}
+
+static void strangers_change_nothing(void **unused)
+{
+    (void)unused;
+    with_strangers(key);
+}
+
+static void strangers_without_a_key_change_nothing(void **unused)
+{
+    (void)unused;
+    with_strangers(NULL);
+}
+
+/* Without a key, and with nobody better there, one who only listens is taken:
+ * a node that does not know who it is; and gives way to one who greets. */
+static void a_silent_caller_is_taken_for_want_of_a_better(void **unused)
+{
+    static struct end ends[2];
+    struct tcp_address at = free_address(AF_INET);
+    uint8_t byte;
+    (void)unused;
+    open_end(&ends[1], 1, &at, NULL);
+    int silent = stranger(&at);
+    uint64_t begin = clock_us();
+    while (recv(silent, &byte, 1, MSG_DONTWAIT) != 1) {
+        step(&ends[1]);
+        assert_true(clock_us() - begin < 5000000);
+    }
+    assert_int_equal(ends[1].wire.connections, 1);
+    open_end(&ends[0], 0, &at, NULL);
+    assert_true(exchange(ends, 20));
+    assert_int_equal(ends[1].wire.connections, 2);
+    close(silent);
+    close_end(&ends[0]);
+    close_end(&ends[1]);
+}
+
+/* One that answers a call and proves nothing, as its bytes were lost, is called
+ * again before it gives up itself. */
+static void a_lost_proof_is_asked_for_again(void **unused)
+{
+    static struct end end;
+    struct tcp_address at = free_address(AF_INET);
+    unsigned calls = 0;
+    (void)unused;
+    int on = 1, listener = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    assert_true(listener >= 0);
+    (void)setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    assert_int_equal(bind(listener, &at.to.any, at.size), 0);
+    assert_int_equal(listen(listener, 16), 0);
+    open_end(&end, 0, &at, key);
+    uint64_t begin = clock_us();
+    while (calls < 3) {
+        int fd = accept(listener, NULL, NULL);
+        calls += fd >= 0; /* left open */
+        step(&end);
+        usleep(1000);
+        assert_true(clock_us() - begin < TCP_PROVE_US);
+    }
+    assert_true(clock_us() - begin > 2 * TCP_PROVE_MIN_US);
+    assert_false(end.wire.other_key);
+    close(listener);
+    close_end(&end);
+}
+
+static void without_a_key_on_loopback_only(void **unused)
+{
+    static struct tcp_wire wire;
+    struct tcp_wire_config c = {.listens = true};
+    (void)unused;
+    assert_int_equal(tcp_address_parse(&c.address, "0.0.0.0:7001"), 0);
+    assert_int_equal(tcp_wire_open(&wire, &c), -1);
+    assert_int_equal(errno, EACCES);
+    c.listens = false;
+    assert_int_equal(tcp_address_parse(&c.address, "192.0.2.1:7001"), 0);
+    assert_int_equal(tcp_wire_open(&wire, &c), -1);
+    assert_int_equal(errno, EACCES);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(addresses),
+        cmocka_unit_test(wires_that_break_go_on),
+        cmocka_unit_test(another_key_never_connects),
+        cmocka_unit_test(strangers_change_nothing),
+        cmocka_unit_test(strangers_without_a_key_change_nothing),
+        cmocka_unit_test(a_silent_caller_is_taken_for_want_of_a_better),
+        cmocka_unit_test(a_lost_proof_is_asked_for_again),
+        cmocka_unit_test(without_a_key_on_loopback_only),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

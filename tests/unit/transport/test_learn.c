@@ -1,0 +1,127 @@
+/* Nodes without straps learn who they are from their neighbours, over bad wires
+ * too, and never from noise or from a wire in another socket. */
+#include "cube_machine.h"
+
+#include "transport/learn.h"
+
+/* Only the host knows what it is. */
+static void forget(struct machine *m, struct learner *learners)
+{
+    for (unsigned i = 0; i < m->nodes; i++) {
+        struct place *p = &m->places[i];
+        bool host_wire = i == 0 || p->config.host_wire;
+        p->gone = true;
+        learner_init(&learners[i], p->config.pipes,
+                     m->dimension + (host_wire ? 1u : 0u));
+    }
+}
+
+static void learn_all(struct machine *m, struct learner *learners,
+                      unsigned *heard_host)
+{
+    struct learned learned;
+    unsigned known = 0;
+    for (unsigned round = 0; known < m->nodes; round++) {
+        assert_true(round < 100000);
+        for (unsigned i = 0; i < m->nodes; i++) {
+            struct place *p = &m->places[i];
+            if (!p->gone || !learner_poll(&learners[i], &learned)) {
+                continue;
+            }
+            assert_int_equal(learned.self, i);
+            assert_int_equal(learned.dimension, m->dimension);
+            *heard_host += learned.host_wire;
+            free(p->arena);
+            p->config.epoch = draw(m) | 1;
+            open_place(m, i);
+            p->gone = false;
+            known++;
+        }
+        poll_all(m, 500);
+    }
+}
+
+static void a_cube_learns_from_its_host(void **unused)
+{
+    struct learner learners[ENDS_MAX];
+    unsigned heard_host = 0;
+    (void)unused;
+    for (unsigned d = 0; d <= 5; d++) {
+        struct line_quality bad = perfect;
+        bad.bit_error = d % 2 ? 1e-4 : 0;
+        bad.drop = bad.insert = d % 2 ? 1e-3 : 0;
+        struct cube_config c = {.window = 2};
+        c.spare_node = d == 4 ? 9 : 0;
+        struct machine *m = build(d, &c, &bad, d);
+        forget(m, learners);
+        learn_all(m, learners, &heard_host);
+        for (unsigned i = 0; i < m->wires_count; i++) {
+            line_set(&m->wires[i], &perfect);
+        }
+        m->broadcasts = 1;
+        settle(m, 1);
+        run(m, 2, 1000000000);
+        destroy(m);
+    }
+    assert_int_equal(heard_host, 1);
+}
+
+static void a_wire_in_another_socket_teaches_nothing(void **unused)
+{
+    struct cube_config c = {.window = 2};
+    struct learner learner;
+    struct learned learned;
+    struct link_pipe pipes[3];
+    (void)unused;
+    struct machine *m = build(3, &c, &perfect, 1);
+    memcpy(pipes, m->places[5].config.pipes, sizeof pipes);
+    struct link_pipe first = pipes[0];
+    pipes[0] = pipes[1];
+    pipes[1] = pipes[2];
+    pipes[2] = first;
+    learner_init(&learner, pipes, 3);
+    m->places[5].gone = true;
+    for (unsigned i = 0; i < 1000; i++) {
+        poll_all(m, 500);
+        assert_false(learner_poll(&learner, &learned));
+    }
+    assert_true(learner.misplaced > 3);
+    assert_true(learner.misplaced_expected ==
+                (learner.misplaced_link + 1u) % 3);
+    destroy(m);
+}
+
+static void noise_teaches_nothing(void **unused)
+{
+    struct learner learner;
+    struct learned learned;
+    struct line_wire *wire = calloc(1, sizeof *wire);
+    uint64_t now_us = 0, random = 99;
+    uint8_t noise[97];
+    (void)unused;
+    assert_non_null(wire);
+    line_wire(wire, &now_us, &perfect, 7);
+    struct link_pipe pipe = line_pipe(&wire->ends[0]);
+    learner_init(&learner, &pipe, 1);
+    for (unsigned i = 0; i < 20000; i++) {
+        size_t size = 1 + line_draw(&random) % sizeof noise;
+        for (size_t k = 0; k < size; k++) {
+            uint64_t byte = line_draw(&random) >> 32;
+            noise[k] = byte % 5 == 0 ? 0 : (uint8_t)(byte >> 8);
+        }
+        line_put(wire, 1, noise, size);
+        now_us += 100;
+        assert_false(learner_poll(&learner, &learned));
+    }
+    free(wire);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_cube_learns_from_its_host),
+        cmocka_unit_test(a_wire_in_another_socket_teaches_nothing),
+        cmocka_unit_test(noise_teaches_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
