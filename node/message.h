@@ -19,7 +19,7 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 3,         /* both ends must agree */
+    NODE_PROTOCOL = 4,         /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64, /* page numbers in one NODE_PAGE_REQUEST */
     NODE_FAULT_TEXT_MAX = 200,
     NODE_FACES_A_MESSAGE = 128 /* faces in one NODE_SPILL or NODE_UNSPILL */
@@ -46,9 +46,10 @@ enum node_message_type {
     NODE_HERE             /* struct node_here_message */
 };
 
-enum node_role {
-    NODE_WORKS, /* triangulates the jobs that it is given */
-    NODE_HOLDS  /* keeps pages for node 0 */
+/* What a node does in a generation of the wiring: a row of roles/roles.c. */
+enum node_role_number {
+    NODE_WORKER = 1, /* triangulates the jobs that it is given */
+    NODE_HOLDER = 2  /* keeps pages for node 0 */
 };
 
 /* Letters are all that goes between the host and one node, NODE_STOP apart;
@@ -71,7 +72,8 @@ struct node_setup_message {
     uint16_t nodes;
     uint16_t holders; /* nodes 1 .. holders keep pages for node 0; or 0 */
     uint32_t credits; /* NODE_RESULT messages allowed at first */
-    uint32_t reserved;
+    uint8_t role;     /* enum node_role_number: of the node it is sent to */
+    uint8_t reserved[3];
     struct incode_setup setup;
 };
 

@@ -16,7 +16,7 @@ struct node {
     size_t role_bytes, cube_bytes;
     uint16_t window;
     bool set_up, stopping, closing;
-    enum node_role role;
+    uint8_t role; /* enum node_role_number */
     struct node_worker worker;
     struct node_holder holder;
     uint32_t generation; /* of the wiring that this node has followed */
@@ -130,9 +130,12 @@ static void take_setup(struct node *n, const struct cube_message *message)
         n->fault = "host and node are of different versions";
         return;
     }
-    uint16_t self = n->board->identity.self;
-    n->role = self >= 1 && self <= setup.holders ? NODE_HOLDS : NODE_WORKS;
-    if (n->role == NODE_HOLDS) {
+    n->role = setup.role;
+    if (n->role != NODE_WORKER && n->role != NODE_HOLDER) {
+        n->fault = "a role that is not known; are host and node of one version";
+        return;
+    }
+    if (n->role == NODE_HOLDER) {
         status = node_holder_start(&n->holder, n->role_memory, n->role_bytes,
                                    &n->letters, &setup, &why);
     } else {
@@ -154,7 +157,7 @@ static void take_job(struct node *n, const struct cube_message *message)
     if (n->fault != NULL || !n->set_up) {
         return;
     }
-    if (n->role != NODE_WORKS || message->size != sizeof job) {
+    if (n->role != NODE_WORKER || message->size != sizeof job) {
         n->fault = "a job that is none";
         return;
     }
@@ -193,7 +196,7 @@ static void take_message(struct node *n, const struct cube_message *message)
         n->stop_us = n->now_us;
         break;
     default:
-        if (n->set_up && n->role == NODE_HOLDS) {
+        if (n->set_up && n->role == NODE_HOLDER) {
             node_holder_message(&n->holder, message);
         } else if (n->set_up) {
             node_worker_message(&n->worker, message);
@@ -212,7 +215,7 @@ static void fill_map(const struct node *n, struct node_map *map)
     map->cube = (uint32_t)n->cube_bytes;
     map->window = n->window;
     map->node = (uint32_t)up64(sizeof *n);
-    if (n->role == NODE_HOLDS) {
+    if (n->role == NODE_HOLDER) {
         map->frame_count = n->holder.frame_count;
         map->frames = (uint32_t)n->role_bytes;
         return;
@@ -236,7 +239,7 @@ static bool send_ready(struct node *n)
     struct node_ready_message ready;
     memset(&ready, 0, sizeof ready);
     ready.protocol = NODE_PROTOCOL;
-    ready.role = (uint32_t)n->role;
+    ready.role = n->role;
     fill_map(n, &ready.map);
     return node_letters_write(&n->letters, CUBE_HOST, NODE_READY, &ready,
                               sizeof ready) == 0;
@@ -277,7 +280,7 @@ static void role_totals(const struct node *n, struct node_finished_message *sum)
     struct node_finished_message totals;
     size_t used = n->board->fixed_bytes + up64(sizeof *n) + n->cube_bytes;
     memset(&totals, 0, sizeof totals);
-    if (n->role == NODE_HOLDS) {
+    if (n->role == NODE_HOLDER) {
         totals.pages_held = n->holder.hits;
         totals.pages_forwarded = n->holder.misses;
         totals.bytes_in = n->holder.bytes_in;
@@ -346,7 +349,7 @@ static void send_fault(struct node *n)
 static unsigned serve_role(struct node *n)
 {
     unsigned moved = 0;
-    if (n->role == NODE_HOLDS) {
+    if (n->role == NODE_HOLDER) {
         moved += node_holder_send(&n->holder);
         n->fault = n->holder.fault;
     } else {
@@ -436,8 +439,8 @@ uint32_t node_held(const struct node *node)
     if (!node->set_up) {
         return 0;
     }
-    return node->role == NODE_HOLDS ? node->holder.queued
-                                    : node_worker_held(&node->worker);
+    return node->role == NODE_HOLDER ? node->holder.queued
+                                     : node_worker_held(&node->worker);
 }
 
 void node_run(struct node *node)

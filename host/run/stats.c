@@ -50,7 +50,7 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     const struct incode_statistics *s = &f->statistics;
     json_t *o = json_object();
     put(o, "node", i);
-    put_text(o, "role", report->map.role == NODE_HOLDS ? "holder" : "worker");
+    put_text(o, "role", report->map.role == NODE_HOLDER ? "holder" : "worker");
     put(o, "tetrahedra_built", s->tetrahedra_built);
     put(o, "tetrahedra_kept", s->tetrahedra_kept);
     put(o, "make_tetra_calls", s->make_tetra_calls);

@@ -216,6 +216,16 @@ static void deal(struct host_service *s)
     s->ledger.cursor = s->ledger.bricks;
 }
 
+/* Whoever does not compute keeps pages for node 0. */
+static struct node_setup_message setup_of(const struct host_service *s,
+                                          unsigned node)
+{
+    struct node_setup_message setup = s->setup;
+    bool holds = node >= 1 && node <= setup.holders;
+    setup.role = holds ? NODE_HOLDER : NODE_WORKER;
+    return setup;
+}
+
 /* Begins with the nodes as after their start: nothing is out, nothing asked
  * for, and each has to have its setup. */
 static void set_up(struct host_service *s)
@@ -248,8 +258,8 @@ static bool serve_work(struct host_service *s, uint16_t to,
         return false; /* what goes before the first answer may get lost */
     }
     if (node->setup_due) {
-        node->setup_due =
-            !send_letter(s, to, NODE_SETUP, &s->setup, sizeof s->setup);
+        struct node_setup_message setup = setup_of(s, to);
+        node->setup_due = !send_letter(s, to, NODE_SETUP, &setup, sizeof setup);
         return !node->setup_due;
     }
     if (s->dealt && !node->working) {

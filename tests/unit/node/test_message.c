@@ -13,6 +13,7 @@
 static void test_layouts(void **unused)
 {
     (void)unused;
+    assert_int_equal(offsetof(struct node_setup_message, role), 12);
     assert_int_equal(offsetof(struct node_setup_message, setup), 16);
     assert_int_equal(offsetof(struct node_setup_message, setup.shuffle_seed),
                      24);

@@ -335,9 +335,12 @@ static void run(const struct host_points *points, struct shape shape,
     world.setup.setup.shuffle_seed = shape.shuffle_seed;
     memcpy(world.setup.setup.lo, world.order.lo, sizeof world.order.lo);
     memcpy(world.setup.setup.hi, world.order.hi, sizeof world.order.hi);
-    while (cube_write(world.cube, CUBE_ALL, NODE_SETUP, &world.setup,
-                      sizeof world.setup) != 0) {
-        step();
+    for (unsigned i = 0; i < world.nodes; i++) {
+        world.setup.role = i < world.workers ? NODE_WORKER : NODE_HOLDER;
+        while (cube_write(world.cube, (uint16_t)i, NODE_SETUP, &world.setup,
+                          sizeof world.setup) != 0) {
+            step();
+        }
     }
     while (world.ready < world.nodes) {
         step();
