@@ -21,76 +21,76 @@ static void sleep_us(uint64_t us)
 
 static uint64_t now_us(void *context)
 {
-    struct host_hindered *h = context;
-    return h->machine.now_us(h->machine.context);
+    struct host_throttled *t = context;
+    return t->machine.now_us(t->machine.context);
 }
 
 static int send_on(void *context, const uint8_t *bytes, size_t size)
 {
-    struct host_hindered *h = context;
-    return h->machine.pipe.send(h->machine.pipe.context, bytes, size);
+    struct host_throttled *t = context;
+    return t->machine.pipe.send(t->machine.pipe.context, bytes, size);
 }
 
 static int receive_slowly(void *context, uint8_t *bytes, size_t size)
 {
-    struct host_hindered *h = context;
-    uint64_t passed = now_us(h) - h->start_us;
-    if (h->hindrance.stall_us_max != 0 && draw(&h->random) % 32 == 0) {
-        sleep_us(draw(&h->random) % h->hindrance.stall_us_max);
+    struct host_throttled *t = context;
+    uint64_t passed = now_us(t) - t->start_us;
+    if (t->throttle.stall_us_max != 0 && draw(&t->random) % 32 == 0) {
+        sleep_us(draw(&t->random) % t->throttle.stall_us_max);
     }
-    if (h->hindrance.bytes_a_second != 0 && passed < h->hindrance.slow_us) {
-        uint64_t allowed = passed * h->hindrance.bytes_a_second / 1000000 + 1;
-        if (h->taken >= allowed) {
+    if (t->throttle.bytes_a_second != 0 && passed < t->throttle.slow_us) {
+        uint64_t allowed = passed * t->throttle.bytes_a_second / 1000000 + 1;
+        if (t->taken >= allowed) {
             return 0;
         }
-        size = allowed - h->taken < size ? (size_t)(allowed - h->taken) : size;
+        size = allowed - t->taken < size ? (size_t)(allowed - t->taken) : size;
     }
-    int got = h->machine.pipe.receive(h->machine.pipe.context, bytes, size);
-    h->taken += got > 0 ? (uint64_t)got : 0;
+    int got = t->machine.pipe.receive(t->machine.pipe.context, bytes, size);
+    t->taken += got > 0 ? (uint64_t)got : 0;
     return got;
 }
 
 /* Bytes that may not be read yet must not wake. */
 static void idle(void *context, uint64_t wait_us)
 {
-    struct host_hindered *h = context;
-    if (h->hindrance.bytes_a_second != 0) {
+    struct host_throttled *t = context;
+    if (t->throttle.bytes_a_second != 0) {
         sleep_us(wait_us < RATE_IDLE_US ? wait_us : RATE_IDLE_US);
     } else {
-        h->machine.idle(h->machine.context, wait_us);
+        t->machine.idle(t->machine.context, wait_us);
     }
 }
 
 static int check(void *context, struct host_error *error)
 {
-    struct host_hindered *h = context;
-    return h->machine.check(h->machine.context, error);
+    struct host_throttled *t = context;
+    return t->machine.check(t->machine.context, error);
 }
 
 static bool ended(void *context)
 {
-    struct host_hindered *h = context;
-    return h->machine.ended(h->machine.context);
+    struct host_throttled *t = context;
+    return t->machine.ended(t->machine.context);
 }
 
 static void stop(void *context)
 {
-    struct host_hindered *h = context;
-    h->machine.stop(h->machine.context);
+    struct host_throttled *t = context;
+    t->machine.stop(t->machine.context);
 }
 
-struct host_machine host_hinder(struct host_hindered *hindered,
-                                const struct host_machine *machine,
-                                const struct host_hindrance *hindrance)
+struct host_machine host_throttle_machine(struct host_throttled *throttled,
+                                          const struct host_machine *machine,
+                                          const struct host_throttle *throttle)
 {
     struct host_machine result = *machine;
-    hindered->machine = *machine;
-    hindered->hindrance = *hindrance;
-    hindered->taken = 0;
-    hindered->random = hindrance->seed * 2 + 88172645463325253u;
-    hindered->start_us = machine->now_us(machine->context);
-    result.context = hindered;
-    result.pipe = (struct link_pipe){hindered, send_on, receive_slowly};
+    throttled->machine = *machine;
+    throttled->throttle = *throttle;
+    throttled->taken = 0;
+    throttled->random = throttle->seed * 2 + 88172645463325253u;
+    throttled->start_us = machine->now_us(machine->context);
+    result.context = throttled;
+    result.pipe = (struct link_pipe){throttled, send_on, receive_slowly};
     result.now_us = now_us;
     result.idle = idle;
     result.check = check;

@@ -279,22 +279,22 @@ static bool parse_testing(int key, const char *value, struct parse *p)
         return true;
     case KEY_HOST_STALL:
         (void)number(p, "host-stall", value, 0, 60000, &n);
-        o->hindrance.stall_us_max = 1000 * n;
+        o->throttle.stall_us_max = 1000 * n;
         return true;
     case KEY_HOST_RATE:
         (void)number(p, "host-rate", value, 1, 1000000000,
-                     &o->hindrance.bytes_a_second);
+                     &o->throttle.bytes_a_second);
         return true;
     case KEY_HOST_RATE_TIME:
         (void)number(p, "host-rate-time", value, 0, 86400, &n);
-        o->hindrance.slow_us = 1000000 * n;
+        o->throttle.slow_us = 1000000 * n;
         return true;
     case KEY_HOST_UNPLUG:
         (void)number(p, "host-unplug", value, 50, 86400000, &n);
         o->unplug_us = 1000 * n;
         return true;
     case KEY_SEED:
-        (void)number(p, "seed", value, 0, UINT64_MAX, &o->hindrance.seed);
+        (void)number(p, "seed", value, 0, UINT64_MAX, &o->throttle.seed);
         return true;
     case KEY_NODE_PROGRAM:
         o->node_program = value;
@@ -444,9 +444,9 @@ static int parse_run(int argc, char **argv, unsigned flags,
         return host_fail(error, HOST_USAGE,
                          "incode run: wrong usage; see incode run --help");
     }
-    if (options->hindrance.bytes_a_second != 0 &&
-        options->hindrance.slow_us == 0) {
-        options->hindrance.slow_us = 30000000;
+    if (options->throttle.bytes_a_second != 0 &&
+        options->throttle.slow_us == 0) {
+        options->throttle.slow_us = 30000000;
     }
     return error->code != 0 ? error->code : check_together(&parse);
 }

@@ -207,16 +207,16 @@ int host_triangulate_on(const struct host_run_options *options,
                         struct host_error *error)
 {
     static struct host_service service;
-    struct host_hindered hindered;
+    struct host_throttled throttled;
     struct host_machine slowed;
     struct host_order order;
     uint64_t start = host_now_us();
     memset(&service, 0, sizeof service);
     memset(&order, 0, sizeof order);
     service.machine = machine;
-    if (options->hindrance.stall_us_max != 0 ||
-        options->hindrance.bytes_a_second != 0) {
-        slowed = host_hinder(&hindered, machine, &options->hindrance);
+    if (options->throttle.stall_us_max != 0 ||
+        options->throttle.bytes_a_second != 0) {
+        slowed = host_throttle_machine(&throttled, machine, &options->throttle);
         service.machine = &slowed;
     }
     service.window = options->window;

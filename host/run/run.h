@@ -47,7 +47,7 @@ struct host_run_options {
     unsigned window;
     uint64_t shuffle_seed;
     uint64_t unplug_us;
-    struct host_hindrance hindrance;
+    struct host_throttle throttle;
     const char *node_program;
     /* Begins a cube of result->nodes where it is not host_cluster that does. */
     int (*begin)(const struct host_run_options *options,

@@ -64,7 +64,7 @@ static void call_next(struct host_service *s)
     }
 }
 
-void host_watch_begin(struct host_service *service, uint64_t now_us)
+void host_detector_begin(struct host_service *service, uint64_t now_us)
 {
     struct host_service *s = service;
     s->generation = cube_wiring(s->cube)->generation;
@@ -94,7 +94,7 @@ void host_watch_begin(struct host_service *service, uint64_t now_us)
     }
 }
 
-void host_watch_end(struct host_service *service)
+void host_detector_end(struct host_service *service)
 {
     for (unsigned i = 0; i < service->machine->nodes; i++) {
         close_start(service, i);
@@ -103,7 +103,7 @@ void host_watch_end(struct host_service *service)
 
 /* --- calls and answers ---------------------------------------------------- */
 
-bool host_watch_call(struct host_service *service, uint16_t to)
+bool host_detector_call(struct host_service *service, uint16_t to)
 {
     struct host_node *node = &service->node[to];
     struct node_call_message call = {node->sent};
@@ -116,9 +116,9 @@ bool host_watch_call(struct host_service *service, uint16_t to)
     return true;
 }
 
-int host_watch_answer(struct host_service *service,
-                      const struct cube_message *message,
-                      struct host_error *error)
+int host_detector_answer(struct host_service *service,
+                         const struct cube_message *message,
+                         struct host_error *error)
 {
     struct host_service *s = service;
     struct host_node *node = &s->node[message->source];
@@ -129,7 +129,7 @@ int host_watch_answer(struct host_service *service,
                          "node %u link %u: is here in another language; are "
                          "host and node of one version? run make",
                          message->source,
-                         host_watch_link(service, message->source));
+                         host_detector_link(service, message->source));
     }
     memcpy(&here, message->data, sizeof here);
     if (node->start != 0 && node->start != here.start) {
@@ -154,7 +154,7 @@ int host_watch_answer(struct host_service *service,
         here.sent != node->received) {
         s->loss = true;
     }
-    host_missing_heard(s, message->source, here.links);
+    host_missing_links_heard(s, message->source, here.links);
     node->calling = false;
     node->call_due = false; /* what would have been asked again, is answered */
     if (first && s->probing) {
@@ -204,7 +204,7 @@ static void call_in_turn(struct host_service *s, uint64_t now_us)
 
 /* --- what is wrong -------------------------------------------------------- */
 
-unsigned host_watch_link(const struct host_service *service, unsigned node)
+unsigned host_detector_link(const struct host_service *service, unsigned node)
 {
     return host_link_to(node, cube_wiring(service->cube)->gate,
                         service->machine->dimension);
@@ -332,28 +332,29 @@ static uint64_t patience_of(const struct host_service *s)
     return s->machine->restarts != NULL ? BRING_UP_US_MAX : s->patience_us;
 }
 
-int host_watch_doubt(const struct host_service *service, unsigned node,
-                     struct host_error *error)
+int host_detector_doubt(const struct host_service *service, unsigned node,
+                        struct host_error *error)
 {
     const struct host_machine *m = service->machine;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
     return doubt == NULL
                ? 0
                : host_fail(error, HOST_CUBE, "node %u link %u: %s", node,
-                           host_watch_link(service, node), doubt);
+                           host_detector_link(service, node), doubt);
 }
 
 static int fail_silent(const struct host_service *s, unsigned node,
                        struct host_error *error)
 {
-    if (host_watch_doubt(s, node, error) != 0) {
+    if (host_detector_doubt(s, node, error) != 0) {
         return error->code;
     }
     return host_fail(error, HOST_CUBE,
                      "node %u link %u: no answer, %u of %u nodes are there; is "
                      "the node's program of this version%s, and the machine "
                      "not too busy?",
-                     node, host_watch_link(s, node), s->here, s->machine->nodes,
+                     node, host_detector_link(s, node), s->here,
+                     s->machine->nodes,
                      s->machine->keyed ? ", its key file the same" : "");
 }
 
@@ -363,7 +364,7 @@ static int check_bring_up(const struct host_service *s, uint64_t now_us,
 {
     if (s->started || s->here == s->living ||
         now_us - s->began_us <= patience_of(s) ||
-        host_missing_undecided(s, now_us, patience_of(s))) {
+        host_missing_links_undecided(s, now_us, patience_of(s))) {
         return 0;
     }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -374,8 +375,8 @@ static int check_bring_up(const struct host_service *s, uint64_t now_us,
     return 0;
 }
 
-int host_watch_check(struct host_service *service, uint64_t now_us,
-                     struct host_error *error)
+int host_detector_check(struct host_service *service, uint64_t now_us,
+                        struct host_error *error)
 {
     struct host_service *s = service;
     const struct cube_wiring *wiring = cube_wiring(s->cube);
@@ -395,13 +396,13 @@ int host_watch_check(struct host_service *service, uint64_t now_us,
         s->restarts = s->machine->restarts(s->machine->context);
         s->loss = true;
     }
-    if (!host_missing_check(s, now_us, patience_of(s))) {
+    if (!host_missing_links_check(s, now_us, patience_of(s))) {
         s->loss = s->loss || wiring->dead_count > wiring->settled;
     }
     call_in_turn(s, now_us);
     elapsed = elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX;
     listen(s, now_us, elapsed);
-    host_missing_look(s, elapsed);
+    host_missing_links_look(s, elapsed);
     if (check_wire(s, now_us, error) != 0) {
         return error->code;
     }

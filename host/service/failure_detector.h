@@ -11,39 +11,39 @@
  * Memory: none of its own.  Work: constant a message; one pass over the nodes
  * at each check, every 20 ms.
  *
- *     host_watch_begin(service);
- *     status = host_watch_answer(service, &message, &error);
- *     status = host_watch_check(service, now_us, &error);
+ *     host_detector_begin(service);
+ *     status = host_detector_answer(service, &message, &error);
+ *     status = host_detector_check(service, now_us, &error);
  */
-#ifndef HOST_WATCH_H
-#define HOST_WATCH_H
+#ifndef HOST_FAILURE_DETECTOR_H
+#define HOST_FAILURE_DETECTOR_H
 
 #include "service.h"
 
 /* A generation begins: who is living by the wiring, and all are called. */
-void host_watch_begin(struct host_service *service, uint64_t now_us);
+void host_detector_begin(struct host_service *service, uint64_t now_us);
 
 /* The run is over, for those too whose statistics have not come. */
-void host_watch_end(struct host_service *service);
+void host_detector_end(struct host_service *service);
 
 /* The link by which a node is reached first. */
-unsigned host_watch_link(const struct host_service *service, unsigned node);
+unsigned host_detector_link(const struct host_service *service, unsigned node);
 
 /* Sends the call that is due to a node; false: no room. */
-bool host_watch_call(struct host_service *service, uint16_t to);
+bool host_detector_call(struct host_service *service, uint16_t to);
 
 /* NODE_HERE. */
-int host_watch_answer(struct host_service *service,
-                      const struct cube_message *message,
-                      struct host_error *error);
+int host_detector_answer(struct host_service *service,
+                         const struct cube_message *message,
+                         struct host_error *error);
 
 /* HOST_CUBE, if the machine knows why a node is not heard; else 0. */
-int host_watch_doubt(const struct host_service *service, unsigned node,
-                     struct host_error *error);
+int host_detector_doubt(const struct host_service *service, unsigned node,
+                        struct host_error *error);
 
 /* Sets service->loss where a new generation is due.  HOST_CUBE where the cube
  * cannot go on. */
-int host_watch_check(struct host_service *service, uint64_t now_us,
-                     struct host_error *error);
+int host_detector_check(struct host_service *service, uint64_t now_us,
+                        struct host_error *error);
 
 #endif

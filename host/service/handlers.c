@@ -181,7 +181,7 @@ static int take_finished(struct host_service *s,
         s->working--;
     }
     node->reported = true;
-    host_missing_heard(s, message->source, finished.links);
+    host_missing_links_heard(s, message->source, finished.links);
     node->unreported = 0;
     report->statistics = node->before;
     node_totals_add(&report->statistics, &finished);
@@ -216,7 +216,7 @@ static int take(struct host_service *service,
         report->ready = true;
         return 0;
     case NODE_HERE:
-        return host_watch_answer(service, message, error);
+        return host_detector_answer(service, message, error);
     case NODE_PAGE_REQUEST:
         return take_requests(service, message, error);
     case NODE_RESULT:
@@ -234,7 +234,7 @@ static int take(struct host_service *service,
     }
 }
 
-int host_intake(struct host_service *service,
+int host_handle(struct host_service *service,
                 const struct cube_message *message, struct host_error *error)
 {
     if (message->source >= service->machine->nodes) {

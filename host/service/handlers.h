@@ -4,16 +4,16 @@
  * rest.
  *
  *     while (cube_read(cube, &message) && status == 0) {
- *         status = host_intake(service, &message, &error);
+ *         status = host_handle(service, &message, &error);
  *         cube_release(cube);
  *     }
  */
-#ifndef HOST_INTAKE_H
-#define HOST_INTAKE_H
+#ifndef HOST_HANDLERS_H
+#define HOST_HANDLERS_H
 
 #include "service.h"
 
-int host_intake(struct host_service *service,
+int host_handle(struct host_service *service,
                 const struct cube_message *message, struct host_error *error);
 
 #endif

@@ -105,8 +105,8 @@ static uint64_t search_us(uint64_t patience_us)
     return most < SEARCH_US_MAX ? most : SEARCH_US_MAX;
 }
 
-bool host_missing_undecided(const struct host_service *service, uint64_t now_us,
-                            uint64_t patience_us)
+bool host_missing_links_undecided(const struct host_service *service,
+                                  uint64_t now_us, uint64_t patience_us)
 {
     const struct host_service *s = service;
     return s->machine->absent_s != 0 &&
@@ -114,8 +114,8 @@ bool host_missing_undecided(const struct host_service *service, uint64_t now_us,
                          : now_us - s->news_us < wait_us(patience_us));
 }
 
-bool host_missing_check(struct host_service *service, uint64_t now_us,
-                        uint64_t patience_us)
+bool host_missing_links_check(struct host_service *service, uint64_t now_us,
+                              uint64_t patience_us)
 {
     struct host_service *s = service;
     struct cube_wiring found = *cube_wiring(s->cube);
@@ -150,8 +150,8 @@ static uint32_t bit_of(unsigned link)
     return (uint32_t)1 << link;
 }
 
-void host_missing_heard(struct host_service *service, unsigned node,
-                        uint32_t links)
+void host_missing_links_heard(struct host_service *service, unsigned node,
+                              uint32_t links)
 {
     struct host_service *s = service;
     s->node[node].links_heard_us = s->uncabled_us;
@@ -241,7 +241,7 @@ static void call_all(struct host_service *s)
     }
 }
 
-void host_missing_look(struct host_service *service, uint64_t elapsed_us)
+void host_missing_links_look(struct host_service *service, uint64_t elapsed_us)
 {
     struct host_service *s = service;
     unsigned certain;
@@ -260,7 +260,7 @@ void host_missing_look(struct host_service *service, uint64_t elapsed_us)
     }
 }
 
-bool host_missing_awaited(const struct host_service *service)
+bool host_missing_links_awaited(const struct host_service *service)
 {
     const struct host_service *s = service;
     unsigned certain;

@@ -18,32 +18,32 @@
  * links until every wire has been up; at the end of a search such a pass for
  * each hop from the gate.
  *
- *     searching = host_missing_check(service, now_us, patience_us);
- *     host_missing_heard(service, node, answer.links);
- *     host_missing_look(service, elapsed_us);
+ *     searching = host_missing_links_check(service, now_us, patience_us);
+ *     host_missing_links_heard(service, node, answer.links);
+ *     host_missing_links_look(service, elapsed_us);
  */
-#ifndef HOST_MISSING_H
-#define HOST_MISSING_H
+#ifndef HOST_MISSING_LINKS_H
+#define HOST_MISSING_LINKS_H
 
 #include "service.h"
 
 /* patience_us: for nodes to come.  True: what the wiring has as dead is only
  * absent so far. */
-bool host_missing_check(struct host_service *service, uint64_t now_us,
-                        uint64_t patience_us);
+bool host_missing_links_check(struct host_service *service, uint64_t now_us,
+                              uint64_t patience_us);
 
 /* Whether a search is on or due, so that nobody is to be blamed yet. */
-bool host_missing_undecided(const struct host_service *service, uint64_t now_us,
-                            uint64_t patience_us);
+bool host_missing_links_undecided(const struct host_service *service,
+                                  uint64_t now_us, uint64_t patience_us);
 
 /* A node has said which of its links have been up. */
-void host_missing_heard(struct host_service *service, unsigned node,
-                        uint32_t links);
+void host_missing_links_heard(struct host_service *service, unsigned node,
+                              uint32_t links);
 
 /* At each check: names the wires that never came up, when it is time. */
-void host_missing_look(struct host_service *service, uint64_t elapsed_us);
+void host_missing_links_look(struct host_service *service, uint64_t elapsed_us);
 
 /* After the run: whether there is a wire of which it is not known yet. */
-bool host_missing_awaited(const struct host_service *service);
+bool host_missing_links_awaited(const struct host_service *service);
 
 #endif

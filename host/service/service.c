@@ -72,7 +72,7 @@ static int read_all(struct host_service *s, unsigned *moved,
     struct cube_message message;
     int status = 0;
     while (status == 0 && cube_read(s->cube, &message)) {
-        status = host_intake(s, &message, error);
+        status = host_handle(s, &message, error);
         cube_release(s->cube);
         (*moved)++;
     }
@@ -299,14 +299,14 @@ static bool serve_node(struct host_service *s, uint16_t to,
         return false;
     }
     if (node->call_due && !node->called) {
-        node->called = host_watch_call(s, to);
+        node->called = host_detector_call(s, to);
         return node->called;
     }
     if (serve_work(s, to, error)) {
         node->called = false;
         return true;
     }
-    return node->call_due && host_watch_call(s, to);
+    return node->call_due && host_detector_call(s, to);
 }
 
 /* Serves the nodes in turn, while the wire takes it. */
@@ -366,14 +366,14 @@ static int check_renewed(const struct host_service *s, struct host_error *error)
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         bool dead = wiring_is_dead(w, w->dead_count, i, dimension, dimension);
         if (i == w->gate ? dead : s->node[i].given_up && !dead) {
-            return host_watch_doubt(s, i, error) != 0
+            return host_detector_doubt(s, i, error) != 0
                        ? error->code
                        : host_fail(
                              error, HOST_CUBE,
                              "node %u link %u: lost, and the cube cannot go "
                              "on without it; look after that node and its "
                              "wires, and run again",
-                             i, host_watch_link(s, i));
+                             i, host_detector_link(s, i));
         }
     }
     return 0;
@@ -383,7 +383,7 @@ static int check_renewed(const struct host_service *s, struct host_error *error)
 static int begin_again(struct host_service *s, uint64_t now_us,
                        struct host_error *error)
 {
-    host_watch_begin(s, now_us);
+    host_detector_begin(s, now_us);
     if (check_renewed(s, error) != 0) {
         return error->code;
     }
@@ -408,7 +408,7 @@ static int check_progress(struct host_service *s, struct host_error *error)
                            "node %u link %u: %u losses in a row, and nothing "
                            "done between them; look after that node and its "
                            "wires, and run again",
-                           s->blamed, host_watch_link(s, s->blamed),
+                           s->blamed, host_detector_link(s, s->blamed),
                            s->fruitless);
 }
 
@@ -468,7 +468,7 @@ int host_service_round(struct host_service *service, struct host_error *error)
     uint64_t begun = pages ? now_of(s) : 0;
     moved += serve(s, error);
     s->pages_us += pages ? now_of(s) - begun : 0;
-    if (error->code != 0 || host_watch_check(s, now, error) != 0) {
+    if (error->code != 0 || host_detector_check(s, now, error) != 0) {
         return error->code;
     }
     if (s->loss) {
@@ -495,7 +495,7 @@ int host_service_open(struct host_service *service, struct host_error *error)
     }
     s->generations = 1;
     s->check_us = s->wire_down_us = now_of(s);
-    host_watch_begin(s, s->check_us);
+    host_detector_begin(s, s->check_us);
     return 0;
 }
 
@@ -575,7 +575,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
                            s->tets->count);
     }
     host_progress_end(&s->progress);
-    host_watch_end(s);
+    host_detector_end(s);
     for (unsigned d = 0; d < cube_links(s->cube); d++) {
         s->retransmitted += cube_link_statistics(s->cube, d)->retransmitted;
     }
@@ -586,7 +586,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
 int host_service_wires(struct host_service *service, struct host_error *error)
 {
     int status = 0;
-    while (status == 0 && host_missing_awaited(service)) {
+    while (status == 0 && host_missing_links_awaited(service)) {
         status = host_service_round(service, error);
     }
     return status;

@@ -3,9 +3,9 @@
  * watches over the nodes.  One loop, one thread; it never waits to write while
  * there is something to read.
  *
- * On any loss (watch.h) it begins a new generation of the cube's wiring: every
- * node drops its job and its role, uncommitted tetrahedra are dropped here, and
- * their bricks are given out again, in ranges.
+ * On any loss (failure_detector.h) it begins a new generation of the cube's
+ * wiring: every node drops its job and its role, uncommitted tetrahedra are
+ * dropped here, and their bricks are given out again, in ranges.
  *
  * Memory: the cube's windows, 3 KiB a node, a bit a brick, the spilled faces
  * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
@@ -47,7 +47,7 @@ struct host_node {
     struct node_job_message job;
     bool working;  /* a job is out */
     bool reported; /* statistics of all that it has done are here */
-    /* Whether it is there: watch.h. */
+    /* Whether it is there: failure_detector.h. */
     bool lost;     /* not reached in this generation: nothing is sent to it */
     bool given_up; /* for the rest of the run */
     bool calling;  /* a call has not been answered */
@@ -91,7 +91,7 @@ struct host_service {
     uint64_t retransmitted;          /* frames, on the host's wire */
     unsigned restarts;               /* of nodes, by the machine */
     unsigned generations;            /* of the cube's wiring; 1: no loss */
-    unsigned missing_wires;          /* that were named: missing.h */
+    unsigned missing_wires;          /* that were named: missing_links.h */
     /* Private. */
     struct cube *cube;
     void *cube_memory;
@@ -109,7 +109,7 @@ struct host_service {
     unsigned fruitless;
     uint32_t committed_before;
     bool wire_lost; /* the one in use is dead */
-    /* Wires that never came up are looked for: missing.h. */
+    /* Wires that never came up are looked for: missing_links.h. */
     bool searching;
     uint64_t search_us;   /* since when, */
     uint64_t news_us;     /* and when a node answered for the first time last */
@@ -147,8 +147,8 @@ int host_service_run(struct host_service *service, struct host_error *error);
  * have been, as is the rule. */
 int host_service_wires(struct host_service *service, struct host_error *error);
 
-/* For missing.h: the node by which the host speaks from now on: as before, or
- * the other one that has a wire to the host. */
+/* For missing_links.h: the node by which the host speaks from now on: as
+ * before, or the other one that has a wire to the host. */
 uint16_t host_service_gate(const struct host_service *service,
                            const struct cube_wiring *next);
 

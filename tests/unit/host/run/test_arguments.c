@@ -125,8 +125,8 @@ static void test_options(void **unused)
     assert_int_equal(o.window, 1);
     assert_int_equal(o.shuffle_seed, 9);
     assert_true(o.verify);
-    assert_int_equal(o.hindrance.bytes_a_second, 1024);
-    assert_int_equal(o.hindrance.slow_us, 30000000);
+    assert_int_equal(o.throttle.bytes_a_second, 1024);
+    assert_int_equal(o.throttle.slow_us, 30000000);
     assert_int_equal(o.patience_s, 7);
 }
 

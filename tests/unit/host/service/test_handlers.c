@@ -127,7 +127,7 @@ static int send(uint16_t source, uint8_t type, const void *data, size_t size,
         memcpy(copy + 8, &service.node[source].received, 4);
     }
     struct cube_message message = {source, (uint16_t)size, type, copy};
-    int status = host_intake(&service, &message, error);
+    int status = host_handle(&service, &message, error);
     free(copy);
     return status;
 }
