@@ -3,22 +3,24 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sim_draw.h"
+
 /* --- its machine ---------------------------------------------------------- */
 
 /* The world's clock goes on without it. */
 static uint64_t machine_now_us(void *context)
 {
-    const struct host_rival *r = context;
-    return r->world->now_us + r->ahead_us;
+    const struct host_second_host *h = context;
+    return h->world->now_us + h->ahead_us;
 }
 
 static void machine_idle(void *context, uint64_t wait_us)
 {
-    struct host_rival *r = context;
-    if (r->there) {
-        r->sleep_us = r->world->now_us + wait_us;
+    struct host_second_host *h = context;
+    if (h->there) {
+        h->sleep_us = h->world->now_us + wait_us;
     } else {
-        r->ahead_us += wait_us + 1;
+        h->ahead_us += wait_us + 1;
     }
 }
 
@@ -30,8 +32,8 @@ static int machine_check(void *context, struct host_error *error)
 
 static void machine_rest(void *context, uint64_t rest_us)
 {
-    struct host_rival *r = context;
-    host_world_rest(r->world, rest_us);
+    struct host_second_host *h = context;
+    host_world_rest(h->world, rest_us);
 }
 
 static bool machine_ended(void *context)
@@ -47,80 +49,81 @@ static void machine_stop(void *context)
 
 /* --- rounds --------------------------------------------------------------- */
 
-void host_rival_come(struct host_rival *rival, struct host_world *world,
-                     uint64_t leave_us, uint32_t host_us)
+void host_second_host_come(struct host_second_host *host,
+                           struct host_world *world, uint64_t leave_us,
+                           uint32_t host_us)
 {
-    struct host_rival *r = rival;
+    struct host_second_host *h = host;
     struct host_error error = {0};
-    r->world = world;
-    r->leave_us = leave_us;
-    r->host_us = host_us;
-    r->random = sim_seed(world->options.seed, 3);
-    r->machine = host_world_machine(world);
-    r->machine.context = r;
-    r->machine.pipe = host_world_pipe(world, 1);
-    r->machine.now_us = machine_now_us;
-    r->machine.idle = machine_idle;
-    r->machine.check = machine_check;
-    r->machine.rest = machine_rest;
-    r->machine.ended = machine_ended;
-    r->machine.stop = machine_stop;
-    r->service.machine = &r->machine;
-    r->there = true;
-    host_world_knock(world, true);
-    if (host_service_open(&r->service, &error) != 0) {
-        snprintf(r->fault, sizeof r->fault, "%.250s", error.text);
-        host_rival_leave(r);
+    h->world = world;
+    h->leave_us = leave_us;
+    h->host_us = host_us;
+    h->random = sim_seed(world->options.cube.seed, 3);
+    h->machine = host_world_machine(world);
+    h->machine.context = h;
+    h->machine.pipe = host_sim_cube_pipe(&world->cube, world->nodes + 1, 0);
+    h->machine.now_us = machine_now_us;
+    h->machine.idle = machine_idle;
+    h->machine.check = machine_check;
+    h->machine.rest = machine_rest;
+    h->machine.ended = machine_ended;
+    h->machine.stop = machine_stop;
+    h->service.machine = &h->machine;
+    h->there = true;
+    host_world_second_host(world, true);
+    if (host_service_open(&h->service, &error) != 0) {
+        snprintf(h->fault, sizeof h->fault, "%.250s", error.text);
+        host_second_host_leave(h);
     }
 }
 
-void host_rival_leave(struct host_rival *rival)
+void host_second_host_leave(struct host_second_host *host)
 {
-    if (rival->there) {
-        rival->there = false;
-        host_world_knock(rival->world, false);
-        host_service_end(&rival->service);
+    if (host->there) {
+        host->there = false;
+        host_world_second_host(host->world, false);
+        host_service_end(&host->service);
     }
 }
 
 /* Nobody answers it, and it is not given the cube. */
-static bool let_in(const struct host_rival *r)
+static bool let_in(const struct host_second_host *h)
 {
-    return r->service.here > 0 ||
-           cube_link_statistics(r->service.cube, 0)->sessions > 0;
+    return h->service.here > 0 ||
+           cube_link_statistics(h->service.cube, 0)->sessions > 0;
 }
 
-void host_rival_round(void *rival)
+void host_second_host_round(void *host)
 {
-    struct host_rival *r = rival;
-    struct host_world *w = r->world;
+    struct host_second_host *h = host;
+    struct host_world *w = h->world;
     struct host_error error = {0};
-    if (!r->there) {
+    if (!h->there) {
         return;
     }
-    if (w->now_us < r->busy_us) {
-        w->guest_us = r->busy_us;
+    if (w->now_us < h->busy_us) {
+        w->second_us = h->busy_us;
         return;
     }
-    r->busy_us = w->now_us + host_world_draw(&r->random, 1, 2 * r->host_us);
-    r->sleep_us = 0;
-    int status = host_service_round(&r->service, &error);
+    h->busy_us = w->now_us + host_sim_draw(&h->random, 1, 2 * h->host_us);
+    h->sleep_us = 0;
+    int status = host_service_round(&h->service, &error);
     bool in_use = status == HOST_CUBE && strstr(error.text, "in use") != NULL;
-    unsigned told = cube_link_peer(r->service.cube, 0)->in_use;
-    r->told_us = told != r->told ? w->now_us : r->told_us;
-    r->told = told;
-    if (let_in(r)) {
-        snprintf(r->fault, sizeof r->fault, "a second host got in");
+    unsigned refused = cube_link_peer(h->service.cube, 0)->in_use;
+    h->refused_us = refused != h->refused ? w->now_us : h->refused_us;
+    h->refused = refused;
+    if (let_in(h)) {
+        snprintf(h->fault, sizeof h->fault, "a second host got in");
     } else if (status != 0 && !in_use) {
-        snprintf(r->fault, sizeof r->fault, "a second host: %.230s",
+        snprintf(h->fault, sizeof h->fault, "a second host: %.230s",
                  error.text);
     }
-    if (status != 0 || w->now_us >= r->leave_us || r->fault[0] != '\0') {
-        host_rival_leave(r);
+    if (status != 0 || w->now_us >= h->leave_us || h->fault[0] != '\0') {
+        host_second_host_leave(h);
         return;
     }
-    uint64_t due = host_world_door_due(w, 1);
-    due = r->sleep_us < due ? r->sleep_us : due;
-    due = r->leave_us < due ? r->leave_us : due;
-    w->guest_us = r->busy_us > due ? r->busy_us : due;
+    uint64_t due = host_world_host_due(w, 1);
+    due = h->sleep_us < due ? h->sleep_us : due;
+    due = h->leave_us < due ? h->leave_us : due;
+    w->second_us = h->busy_us > due ? h->busy_us : due;
 }

@@ -1,21 +1,21 @@
-/* A second host that knocks at the simulated cube while the first is at work:
+/* A second host that comes to the simulated cube while the first is at work:
  * the host's service as it is, a round at a time, on a connection that takes
  * the place of the first host's, as over TCP.  It has to be sent away.
  *
  * Memory: the service's, while it is there.  Work: its rounds.
  *
- *     host_rival_come(&rival, &world, leave_us, host_us);
- *     ... the world calls host_rival_round as its guest ...
- *     host_rival_leave(&rival);
- *     if (rival.fault != NULL) it was let in;
+ *     options.second = host_second_host_round;
+ *     host_second_host_come(&second, &world, leave_us, host_us);
+ *     host_second_host_leave(&second);
+ *     bool let_in = second.fault[0] != '\0';
  */
-#ifndef HOST_SIM_RIVAL_H
-#define HOST_SIM_RIVAL_H
+#ifndef HOST_SIM_SECOND_HOST_H
+#define HOST_SIM_SECOND_HOST_H
 
 #include "host/service/service.h"
 #include "sim_world.h"
 
-struct host_rival {
+struct host_second_host {
     struct host_world *world;
     struct host_service service;
     struct host_machine machine;
@@ -24,18 +24,19 @@ struct host_rival {
     uint64_t ahead_us;          /* of that clock, once it has hung up */
     uint32_t host_us;           /* a round, more or less */
     bool there;
-    unsigned told;    /* times that it was sent away, */
-    uint64_t told_us; /* and when last */
+    unsigned refused;    /* times that it was sent away, */
+    uint64_t refused_us; /* and when last */
     char fault[256];
 };
 
-/* The rival is clear before.  It goes by itself at leave_us at the latest. */
-void host_rival_come(struct host_rival *rival, struct host_world *world,
-                     uint64_t leave_us, uint32_t host_us);
+/* The host is clear before.  It goes by itself at leave_us at the latest. */
+void host_second_host_come(struct host_second_host *host,
+                           struct host_world *world, uint64_t leave_us,
+                           uint32_t host_us);
 
-/* The guest of the world: rival is a struct host_rival. */
-void host_rival_round(void *rival);
+/* The `second` of the world: host is a struct host_second_host. */
+void host_second_host_round(void *host);
 
-void host_rival_leave(struct host_rival *rival);
+void host_second_host_leave(struct host_second_host *host);
 
 #endif

@@ -3,278 +3,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/mesh/gen.h"
-#include "host/service/service.h"
-#include "sim_reference.h"
-#include "second_host.h"
 #include "host/check/verify.h"
+#include "host/mesh/gen.h"
+#include "sim_draw.h"
+#include "sim_reference.h"
+#include "sim_run.h"
 
 enum {
-    LASTING_MAX = 32, /* faults that are to be taken back */
-    TRIES_MAX = 50,   /* for a kind of fault that is wanted and possible */
-    REBOOT_US = 3000,
-    TOLD_US = 1000000,
-    KNOCK_AGAIN_US = 5000,
-    HOST_US_CALM = 200,       /* for a look at the clock, at most, in the end */
     TIME_US_MAX = 1800000000, /* half an hour in virtual time, */
     STEPS_MAX = 60000000      /* or so many steps: it hangs */
 };
 
-/* A fault to be taken back.  A partition has a node and a link: all wires of
- * that dimension, or the node's own where link is the cube's dimension. */
-struct lasting {
-    uint64_t until_us;
-    enum host_sim_fault kind;
-    unsigned wire, side, node, link;
-};
-
-struct run {
-    const struct host_sim_plan *plan;
-    struct host_sim_outcome *outcome;
-    struct host_world world;
-    struct host_service service;
-    struct host_rival rival;
-    struct host_points points;
-    struct host_order order;
-    struct host_tetrahedra tets;
-    uint64_t random, calm_us, event_us, knock_us;
-    unsigned events;
-    bool open, crash_due, broken;
-    uint64_t frames;                  /* seen by `decide` */
-    uint64_t before[HOST_SIM_FAULTS]; /* strikes before work was open */
-    struct lasting lasting[LASTING_MAX];
-    unsigned lasting_count;
-};
-
-/* --- faults at their times ----------------------------------------------- */
-
-static uint64_t draw(struct run *r, uint64_t lo, uint64_t hi)
-{
-    return host_world_draw(&r->random, lo, hi);
-}
-
-/* Cuts or mends all wires that a partition names. */
-static void part(struct run *r, const struct lasting *l, bool cut)
-{
-    struct host_world *w = &r->world;
-    unsigned dimension = w->options.dimension;
-    for (unsigned i = 0; l->link == dimension && i < dimension; i++) {
-        host_world_cut(w, host_world_wire_of(w, l->node, i), cut);
-    }
-    for (unsigned i = 0; l->link < dimension && i < w->options.nodes / 2; i++) {
-        host_world_cut(w, l->link * (w->options.nodes / 2) + i, cut);
-    }
-}
-
-static void take_back(struct run *r, const struct lasting *l)
-{
-    if (l->kind == HOST_SIM_ONE_WAY) {
-        host_world_deaf(&r->world, l->wire, l->side, false);
-    } else if (l->kind == HOST_SIM_CUT) {
-        host_world_cut(&r->world, l->wire, false);
-    } else {
-        part(r, l, false);
-    }
-}
-
-/* Takes back what is over by now, or all. */
-static void mend(struct run *r, bool all)
-{
-    unsigned left = 0;
-    for (unsigned i = 0; i < r->lasting_count; i++) {
-        struct lasting one = r->lasting[i];
-        if (all || one.until_us <= r->world.now_us) {
-            take_back(r, &one);
-        } else {
-            r->lasting[left++] = one;
-        }
-    }
-    r->lasting_count = left;
-}
-
-static void weather(struct run *r, bool bad)
-{
-    for (unsigned i = 0; i < r->world.wires; i++) {
-        for (unsigned side = 0; side < 2; side++) {
-            bool here = bad && draw(r, 0, 2) > 0;
-            sim_line_faults(&r->world.wire[i].wire.line[side],
-                            here ? &r->plan->weather : NULL);
-        }
-    }
-}
-
-/* Node 0 forgets which host it keeps to, and is his who comes first: no other
- * may come then but one that has just been told. */
-static bool may_crash(const struct run *r)
-{
-    return !r->rival.there ||
-           (r->rival.told > 0 && r->world.now_us - r->rival.told_us < TOLD_US);
-}
-
-static bool may_knock(const struct run *r)
-{
-    const struct host_world_node *node = &r->world.node[0];
-    return node->state == HOST_WORLD_UP &&
-           r->service.node[0].start == node->board.identity.epoch;
-}
-
-/* One fault of those that the plan wants; false: none was possible. */
-static bool happen(struct run *r)
-{
-    struct host_world *w = &r->world;
-    enum host_sim_fault kind =
-        (enum host_sim_fault)draw(r, HOST_SIM_ONE_WAY, HOST_SIM_SLOW_HOST);
-    uint64_t us = host_world_draw_log(&r->random, 1000, r->plan->lasts_us_max);
-    unsigned node = (unsigned)draw(r, 0, w->options.nodes - 1);
-    struct lasting l = {.until_us = w->now_us + us, .kind = kind};
-    l.wire = (unsigned)draw(r, 0, w->wires - 1);
-    l.side = (unsigned)draw(r, 0, 1);
-    l.node = node;
-    l.link = (unsigned)draw(r, 0, w->options.dimension);
-    if (!r->plan->wanted[kind]) {
-        return false;
-    }
-    if (kind == HOST_SIM_CRASH && node == 0 && !may_crash(r)) {
-        return false;
-    }
-    if (kind == HOST_SIM_PAUSE) {
-        host_world_pause(w, node, us);
-    } else if (kind == HOST_SIM_CRASH) {
-        host_world_crash(w, node, us, draw(r, 0, 1) == 0);
-    } else if (kind == HOST_SIM_SLOW_HOST) {
-        w->host_pause_us = us;
-    } else if (r->lasting_count == LASTING_MAX ||
-               (kind == HOST_SIM_PARTITION && w->options.dimension == 0)) {
-        return false;
-    } else {
-        r->lasting[r->lasting_count++] = l;
-        if (kind == HOST_SIM_ONE_WAY) {
-            host_world_deaf(w, l.wire, l.side, true);
-        } else if (kind == HOST_SIM_CUT) {
-            host_world_cut(w, l.wire, true);
-        } else {
-            part(r, &l, true);
-        }
-    }
-    r->outcome->struck[kind] += r->open;
-    return true;
-}
-
-static bool any_event_wanted(const struct host_sim_plan *plan)
-{
-    bool any = false;
-    for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_SLOW_HOST; k++) {
-        any = any || plan->wanted[k];
-    }
-    return any;
-}
-
-static void break_for_good(struct run *r)
-{
-    struct host_world *w = &r->world;
-    r->broken = true;
-    if (r->plan->wanted[HOST_SIM_DEAD_WIRE]) {
-        host_world_cut(w, (unsigned)draw(r, 0, w->host_wire - 1), true);
-        r->outcome->struck[HOST_SIM_DEAD_WIRE] += r->open;
-    }
-    if (r->plan->wanted[HOST_SIM_DEAD_NODE]) {
-        host_world_kill(w, (unsigned)draw(r, 1, w->options.nodes - 1));
-        r->outcome->struck[HOST_SIM_DEAD_NODE] += r->open;
-    }
-}
-
-/* The world's clock has come to where something is to be done. */
-static void strike(void *context)
-{
-    struct run *r = context;
-    struct host_world *w = &r->world;
-    if (r->crash_due) {
-        r->crash_due = false;
-        host_world_crash(w, r->plan->restart_node, REBOOT_US, false);
-    }
-    mend(r, false);
-    if (w->now_us >= r->knock_us && !may_knock(r)) {
-        r->knock_us = w->now_us + KNOCK_AGAIN_US;
-    } else if (w->now_us >= r->knock_us) {
-        r->knock_us = UINT64_MAX;
-        host_rival_come(&r->rival, w, w->now_us + r->plan->knock_lasts_us,
-                        w->options.host_us);
-        r->outcome->struck[HOST_SIM_SECOND_HOST] += r->open;
-    }
-    if (w->now_us >= r->calm_us) {
-        mend(r, true);
-        weather(r, false);
-        w->strike_us = r->knock_us;
-        if (w->options.host_us > HOST_US_CALM) {
-            w->options.host_us = HOST_US_CALM;
-        }
-        return;
-    }
-    if (w->now_us >= r->event_us && !r->broken) {
-        break_for_good(r);
-    }
-    if (w->now_us >= r->event_us) {
-        bool more = any_event_wanted(r->plan) && r->events > 0;
-        for (unsigned tries = 0; more && tries < TRIES_MAX; tries++) {
-            if (happen(r)) {
-                break;
-            }
-        }
-        r->events -= more;
-        r->event_us =
-            !more ? UINT64_MAX
-                  : w->now_us + draw(r, 1, 2 * (uint64_t)r->plan->gap_us);
-    }
-    w->strike_us = r->calm_us < r->event_us ? r->calm_us : r->event_us;
-    w->strike_us = r->knock_us < w->strike_us ? r->knock_us : w->strike_us;
-    for (unsigned i = 0; i < r->lasting_count; i++) {
-        uint64_t until = r->lasting[i].until_us;
-        w->strike_us = until < w->strike_us ? until : w->strike_us;
-    }
-}
-
-/* The frame that the plan names meets its fate. */
-static enum sim_fate decide(void *context, struct sim_line *line)
-{
-    struct run *r = context;
-    (void)line;
-    if (++r->frames != r->plan->frame) {
-        return SIM_PASSES;
-    }
-    r->crash_due = r->plan->restart;
-    r->world.strike_us = r->plan->restart ? 0 : r->world.strike_us;
-    return r->plan->fate;
-}
-
-static void watch_frames(struct run *r)
-{
-    struct host_world *w = &r->world;
-    for (unsigned i = 0; r->plan->frame != 0 && i < w->wires; i++) {
-        for (unsigned side = 0; side < 2; side++) {
-            struct sim_line *line = &w->wire[i].wire.line[side];
-            line->decide = r->plan->restart ? NULL : decide;
-            line->context = r;
-        }
-    }
-    struct host_world_node *node = &w->node[r->plan->restart_node];
-    for (unsigned d = 0; r->plan->restart && d < node->links; d++) {
-        node->port[d].end->out->decide = decide;
-    }
-}
-
-/* --- the run -------------------------------------------------------------- */
-
-static void sum_strikes(const struct host_world *w, uint64_t *struck)
-{
-    for (unsigned i = 0; i < w->wires; i++) {
-        for (unsigned k = 0; k < 2 * SIM_CHANCES; k++) {
-            struck[k / 2] += w->wire[i].wire.line[k % 2].struck[k / 2];
-        }
-    }
-}
-
 /* Bytes that every node needs: node 0 has the most links. */
-static uint64_t memory_of(const struct run *r)
+static uint64_t memory_of(const struct host_sim_run *r)
 {
     const struct host_sim_plan *p = r->plan;
     struct incode_setup setup = {.bricks = r->order.bricks,
@@ -293,43 +34,44 @@ static uint64_t memory_of(const struct run *r)
     return memory + p->memory_more / 64 * 64;
 }
 
-static int open_world(struct run *r, struct host_error *error)
+static int open_world(struct host_sim_run *r, struct host_error *error)
 {
     const struct host_sim_plan *p = r->plan;
     struct host_world_options o = {
-        .nodes = p->nodes,
-        .dimension = (unsigned)__builtin_ctz(p->nodes),
+        .cube = {.dimension = (unsigned)__builtin_ctz(p->nodes),
+                 .seed = p->seed,
+                 .wire = p->wire,
+                 .host_wire = p->host_wire,
+                 .second_host = p->wanted[HOST_SIM_SECOND_HOST],
+                 .gather_us = p->gather_us},
         .memory = memory_of(r),
         .window = (uint8_t)p->window,
         .dead_us = p->dead_us,
-        .wire = p->wire,
-        .host_wire = p->host_wire,
-        .gather_us = p->gather_us,
         .step_us = p->step_us,
         .host_us = p->host_us,
-        .seed = p->seed,
         .time_us_max = TIME_US_MAX,
         .steps_max = STEPS_MAX,
         .absent_s = p->absent_s,
-        .second_host = p->wanted[HOST_SIM_SECOND_HOST],
-        .strike = strike,
+        .strike = host_sim_faults_strike,
         .context = r,
-        .guest = host_rival_round,
-        .guest_context = &r->rival,
+        .second = host_second_host_round,
+        .second_context = &r->second,
     };
     if (host_world_open(&r->world, &o, error) != 0) {
         return error->code;
     }
+    struct host_sim_cube *cube = &r->world.cube;
     for (unsigned i = 0; i < p->missing; i++) {
-        unsigned wire = (unsigned)draw(r, 0, r->world.host_wire - 1);
-        if (!r->world.wire[wire].missing) {
-            host_world_leave_out(&r->world, wire);
+        unsigned wire =
+            (unsigned)host_sim_draw(&r->random, 0, cube->host_wire - 1);
+        if (!cube->wire[wire].missing) {
+            host_sim_cube_leave_out(cube, wire);
         }
     }
     return 0;
 }
 
-static int make_work(struct run *r, struct host_error *error)
+static int make_work(struct host_sim_run *r, struct host_error *error)
 {
     const struct host_sim_plan *p = r->plan;
     if (host_gen(p->kind, p->points, p->seed, &r->points, error) != 0) {
@@ -340,58 +82,8 @@ static int make_work(struct run *r, struct host_error *error)
                            p->index == INCODE_GRID, error);
 }
 
-/* The work is open: from now on faults count. */
-static void begin(struct run *r)
-{
-    struct host_world *w = &r->world;
-    r->open = true;
-    r->outcome->work_us = w->now_us;
-    r->calm_us = w->now_us + r->plan->calm_us;
-    r->event_us = w->now_us + draw(r, 1, r->plan->gap_us);
-    r->events = r->plan->events_max;
-    r->knock_us = r->plan->wanted[HOST_SIM_SECOND_HOST]
-                      ? w->now_us + r->plan->knock_us
-                      : UINT64_MAX;
-    for (unsigned i = 0; i < w->wires; i++) {
-        r->outcome->struck[HOST_SIM_MISSING_WIRE] += w->wire[i].missing;
-    }
-    sum_strikes(w, r->before);
-    weather(r, true);
-    w->strike_us = r->event_us < r->knock_us ? r->event_us : r->knock_us;
-}
-
-/* Pages that were dropped and faces that were spilled. */
-static uint64_t shortages(const struct run *r)
-{
-    uint64_t sum = r->service.spill.faces_total;
-    for (unsigned i = 0; i < r->plan->nodes; i++) {
-        sum += r->service.report[i].statistics.statistics.page_evictions;
-    }
-    return sum;
-}
-
-static void finish(struct run *r)
-{
-    struct host_sim_outcome *out = r->outcome;
-    uint64_t now[HOST_SIM_FAULTS] = {0};
-    sum_strikes(&r->world, now);
-    for (int k = 0; k < SIM_CHANCES; k++) {
-        out->struck[k] = now[k] - r->before[k];
-    }
-    r->open = false;
-    r->knock_us = UINT64_MAX;
-    host_rival_leave(&r->rival);
-    out->work_us = r->world.now_us - out->work_us;
-    if (r->plan->wanted[HOST_SIM_SLOW_HOST]) {
-        out->struck[HOST_SIM_SLOW_HOST]++;
-    }
-    if (r->plan->wanted[HOST_SIM_TINY]) {
-        out->struck[HOST_SIM_TINY] = shortages(r);
-    }
-}
-
 /* What is left in the queues of host and nodes when all is done. */
-static int check_queues(const struct run *r, struct host_error *error)
+static int check_queues(const struct host_sim_run *r, struct host_error *error)
 {
     const struct host_service *s = &r->service;
     uint64_t left = s->over ? 0 : s->spill.faces;
@@ -412,24 +104,25 @@ static int check_queues(const struct run *r, struct host_error *error)
     return 0;
 }
 
-static int check_rival(const struct run *r, struct host_error *error)
+static int check_second_host(const struct host_sim_run *r,
+                             struct host_error *error)
 {
-    return r->rival.fault[0] == '\0'
+    return r->second.fault[0] == '\0'
                ? 0
                : host_fail(error, HOST_BROKEN, "node 0: %s; replay it",
-                           r->rival.fault);
+                           r->second.fault);
 }
 
 /* Every wire that was missing was named, and no other. */
-static int check_wires(const struct run *r, struct host_error *error)
+static int check_wires(const struct host_sim_run *r, struct host_error *error)
 {
     const struct host_world *w = &r->world;
     const bool *wanted = r->plan->wanted;
     /* What died or was lost since may be named as dead, or not at all. */
     bool all = !r->service.over && !wanted[HOST_SIM_DEAD_WIRE] &&
                !wanted[HOST_SIM_DEAD_NODE];
-    for (unsigned i = 0; i < w->wires; i++) {
-        bool missing = w->wire[i].missing, named = w->wire[i].named;
+    for (unsigned i = 0; i < w->cube.wires; i++) {
+        bool missing = w->cube.wire[i].missing, named = w->named[i];
         if (missing ? all && !named : named) {
             return host_fail(error, HOST_BROKEN, "host: wire %u %s; replay it",
                              i,
@@ -440,7 +133,7 @@ static int check_wires(const struct run *r, struct host_error *error)
     return 0;
 }
 
-static int serve(struct run *r, struct host_machine *machine,
+static int serve(struct host_sim_run *r, struct host_machine *machine,
                  struct host_error *error)
 {
     const struct host_sim_plan *p = r->plan;
@@ -454,21 +147,18 @@ static int serve(struct run *r, struct host_machine *machine,
     s->setup.setup.index = (uint8_t)p->index;
     s->setup.setup.face_rule = (uint8_t)p->face_rule;
     s->setup.setup.shuffle_seed = p->shuffle_seed;
-    /* Early weather ends too, while there is patience left to come up. */
-    uint64_t patience = p->patience_us != 0 ? p->patience_us : HOST_PATIENCE_US;
-    r->calm_us = p->calm_us < patience / 2 ? p->calm_us : patience / 2;
-    r->event_us = r->knock_us = UINT64_MAX;
-    r->world.strike_us = r->calm_us;
-    weather(r, p->early);
-    watch_frames(r);
+    host_sim_faults_prepare(r);
     int status = host_service_start(s, error);
     if (status == 0) {
-        begin(r);
+        uint64_t start_us = r->world.now_us;
+        host_sim_faults_begin(r);
         status = host_service_run(s, error);
-        finish(r);
+        host_sim_faults_finish(r);
+        host_second_host_leave(&r->second);
+        r->outcome->work_us = r->world.now_us - start_us;
     }
     status = status != 0 ? status : check_queues(r, error);
-    status = status != 0 ? status : check_rival(r, error);
+    status = status != 0 ? status : check_second_host(r, error);
     status = status != 0 ? status : host_service_wires(s, error);
     status = status != 0 ? status : check_wires(r, error);
     r->calm_us = 0;
@@ -477,7 +167,7 @@ static int serve(struct run *r, struct host_machine *machine,
     return status;
 }
 
-static int compare(struct run *r, struct host_error *error)
+static int compare(struct host_sim_run *r, struct host_error *error)
 {
     static struct host_verify_report report;
     struct host_tetrahedra right = {0};
@@ -504,29 +194,30 @@ static int compare(struct run *r, struct host_error *error)
     return status;
 }
 
-static void tell(struct run *r)
+static void tell(struct host_sim_run *r)
 {
     struct host_sim_outcome *out = r->outcome;
     const struct host_world *w = &r->world;
-    out->trace = w->trace;
+    out->trace = w->cube.trace;
     out->steps = w->steps;
     out->time_us = w->now_us;
-    for (unsigned i = 0; i < w->options.nodes; i++) {
+    for (unsigned i = 0; i < w->nodes; i++) {
         out->restarts += w->node[i].starts - 1;
         for (unsigned d = 0; i < 16 && d < w->node[i].links; d++) {
-            out->node_frames[i] += w->node[i].port[d].end->out->frames;
+            const struct host_sim_port *port =
+                host_sim_cube_port(&w->cube, i, d);
+            out->node_frames[i] += port->end->out->frames;
         }
     }
-    for (unsigned i = 0; i < w->wires; i++) {
-        out->frames +=
-            w->wire[i].wire.line[0].frames + w->wire[i].wire.line[1].frames;
+    for (unsigned i = 0; i < 2 * w->cube.wires; i++) {
+        out->frames += host_sim_cube_line(&w->cube, i / 2, i % 2)->frames;
     }
 }
 
 int host_sim_run(const struct host_sim_plan *plan,
                  struct host_sim_outcome *outcome, struct host_error *error)
 {
-    struct run *r = calloc(1, sizeof *r);
+    struct host_sim_run *r = calloc(1, sizeof *r);
     memset(outcome, 0, sizeof *outcome);
     if (r == NULL) {
         return host_fail_memory(error, "the simulation");

@@ -12,8 +12,8 @@
 #ifndef HOST_SIM_H
 #define HOST_SIM_H
 
-#include "sim_plan.h"
 #include "host/mesh/tetrahedra.h"
+#include "sim_plan.h"
 
 struct host_sim_outcome {
     uint64_t trace;  /* of all that went over the wires */

@@ -3,20 +3,12 @@
 #include <string.h>
 
 #include "host/run/run.h"
-
-const char *const host_sim_fault_names[HOST_SIM_FAULTS] = {
-    "loss",      "flip",         "delete",     "insert", "repeat",
-    "burst",     "stall",        "one-way",    "cut",    "partition",
-    "pause",     "crash",        "slow-host",  "tiny",   "dead-wire",
-    "dead-node", "missing-wire", "second-host"};
+#include "sim_draw.h"
 
 /* A slow wire does not wake its node for every byte. */
 enum {
     FIFO_BYTES = 64,
-    SPHERE_MAX = 150, /* points of that kind on a large cube */
-    ABSENT_S = 30,
-    ABSENT_S_MIN = 3,
-    HOST_KEEPS_US = 3000000 /* node 0 to a host that it does not hear */
+    SPHERE_MAX = 150 /* points of that kind on a large cube */
 };
 
 /* Numbers of nodes, by weight. */
@@ -27,7 +19,7 @@ static const struct {
 
 static uint64_t draw(uint64_t *state, uint64_t lo, uint64_t hi)
 {
-    return host_world_draw(state, lo, hi);
+    return host_sim_draw(state, lo, hi);
 }
 
 static bool one_in(uint64_t *state, unsigned n)
@@ -62,7 +54,7 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
                     : p->index == INCODE_KD   ? 3000
                     : p->index == INCODE_GRID ? 1000
                                               : 300;
-    p->points = host_world_draw_log(state, 30, most);
+    p->points = host_sim_draw_log(state, 30, most);
     if (p->nodes > 64 && strcmp(p->kind, "sphere") == 0 &&
         p->points > SPHERE_MAX) {
         p->points = SPHERE_MAX; /* every node asks for nearly all */
@@ -78,11 +70,11 @@ static void draw_wire(struct sim_quality *q, uint64_t *state, bool fast)
 {
     q->bytes_per_s = one_in(state, 5)
                          ? 0
-                         : (uint32_t)host_world_draw_log(
+                         : (uint32_t)host_sim_draw_log(
                                state, fast ? 4000000 : 60000, 100000000);
-    q->latency_us = (uint32_t)host_world_draw_log(state, 1, fast ? 50 : 3000);
-    q->room = (uint32_t)host_world_draw_log(state, 300, 32768);
-    q->bytes = q->room + (uint32_t)host_world_draw_log(state, 2048, 32768);
+    q->latency_us = (uint32_t)host_sim_draw_log(state, 1, fast ? 50 : 3000);
+    q->room = (uint32_t)host_sim_draw_log(state, 300, 32768);
+    q->bytes = q->room + (uint32_t)host_sim_draw_log(state, 2048, 32768);
     q->bytes = q->bytes < SIM_BYTES_MIN ? SIM_BYTES_MIN : q->bytes;
 }
 
@@ -93,7 +85,7 @@ static void draw_cube(struct host_sim_plan *p, uint64_t *state)
     p->host_window = one_in(state, 2) ? 0 : (unsigned)draw(state, 1, 32);
     p->memory_more = p->wanted[HOST_SIM_TINY] || large
                          ? draw(state, 0, 8) * 1024
-                         : host_world_draw_log(state, 16384, 1 << 20);
+                         : host_sim_draw_log(state, 16384, 1 << 20);
     bool fast = large || p->wanted[HOST_SIM_TINY];
     draw_wire(&p->wire, state, fast);
     draw_wire(&p->host_wire, state, fast || p->nodes > 16);
@@ -103,15 +95,15 @@ static void draw_cube(struct host_sim_plan *p, uint64_t *state)
         p->host_wire.room += 8192;
         p->host_wire.bytes += 8192;
     }
-    p->gather_us = (uint32_t)host_world_draw_log(state, 1, 500);
+    p->gather_us = (uint32_t)host_sim_draw_log(state, 1, 500);
     uint64_t slow = p->wire.bytes_per_s == 0 ? UINT32_MAX : p->wire.bytes_per_s;
     if (p->gather_us < FIFO_BYTES * UINT64_C(1000000) / slow) {
         p->gather_us = (uint32_t)(FIFO_BYTES * UINT64_C(1000000) / slow);
     }
-    p->step_us = (uint32_t)host_world_draw_log(state, 5, 1000);
+    p->step_us = (uint32_t)host_sim_draw_log(state, 5, 1000);
     p->host_us = p->wanted[HOST_SIM_SLOW_HOST]
-                     ? (uint32_t)host_world_draw_log(state, 500, 5000)
-                     : (uint32_t)host_world_draw_log(state, 2, 200);
+                     ? (uint32_t)host_sim_draw_log(state, 500, 5000)
+                     : (uint32_t)host_sim_draw_log(state, 2, 200);
 }
 
 static void draw_faults(struct host_sim_plan *p, uint64_t *state)
@@ -121,75 +113,20 @@ static void draw_faults(struct host_sim_plan *p, uint64_t *state)
     double worst = large ? 0.02 : 0.3;
     double part = (double)draw(state, 1, 1000) * 1e-3;
     for (int k = 0; k < SIM_CHANCES; k++) {
-        uint64_t one = host_world_draw_log(state, 1500, large ? 100000 : 30000);
+        uint64_t one = host_sim_draw_log(state, 1500, large ? 100000 : 30000);
         w->chance[k] = p->wanted[k] ? 1 / (double)one : 0;
     }
     w->chance[SIM_LOSS] = p->wanted[SIM_LOSS] ? worst * part * part : 0;
     w->chance[SIM_FLIP] /= 8;
     w->chance[SIM_STALL] /= 4;
     w->chance[SIM_BURST] /= 4;
-    w->burst_bytes = (uint32_t)host_world_draw_log(state, 2, 2000);
-    w->stall_us = (uint32_t)host_world_draw_log(state, 1000, 1000000);
+    w->burst_bytes = (uint32_t)host_sim_draw_log(state, 2, 2000);
+    w->stall_us = (uint32_t)host_sim_draw_log(state, 1000, 1000000);
     p->early = one_in(state, 2);
-    p->gap_us = (uint32_t)host_world_draw_log(state, 3000, 300000);
-    p->lasts_us_max = (uint32_t)host_world_draw_log(state, 5000, 2000000);
+    p->gap_us = (uint32_t)host_sim_draw_log(state, 3000, 300000);
+    p->lasts_us_max = (uint32_t)host_sim_draw_log(state, 5000, 2000000);
     p->events_max = (unsigned)draw(state, 1, large ? 4 : 24);
-    p->calm_us = host_world_draw_log(state, 200000, 20000000);
-}
-
-/* A wire breaks or a node dies for good where another way is left.  What else
- * would have links given up that come back, until none is left, does not happen
- * then. */
-static void draw_death(struct host_sim_plan *p)
-{
-    uint64_t state = sim_seed(p->seed, 78);
-    if (p->nodes < 4 || p->nodes > 64 || draw(&state, 1, 5) > 2) {
-        return;
-    }
-    bool node = one_in(&state, 2);
-    p->wanted[HOST_SIM_DEAD_WIRE] = !node || one_in(&state, 4);
-    p->wanted[HOST_SIM_DEAD_NODE] = node;
-    p->patience_us = draw(&state, 9000000, 15000000);
-    for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_CRASH; k++) {
-        p->wanted[k] = false;
-    }
-    p->dead_us = (uint32_t)draw(&state, 4000000, 8000000);
-}
-
-/* Fewer wires than a node has may be missing anywhere: the cube holds together.
- * With dead ones one less, so that node 0 keeps one. */
-static void draw_missing(struct host_sim_plan *p)
-{
-    uint64_t state = sim_seed(p->seed, 79);
-    unsigned dimension = (unsigned)__builtin_ctz(p->nodes);
-    unsigned dead =
-        p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_DEAD_NODE];
-    if (p->nodes > 64 || dimension < 2 + dead || draw(&state, 1, 4) > 1) {
-        return;
-    }
-    p->wanted[HOST_SIM_MISSING_WIRE] = true;
-    p->missing = (unsigned)draw(&state, 1, dimension - 1 - dead);
-    p->absent_s = dead == 0 ? ABSENT_S : (uint8_t)(p->dead_us / 1000000);
-    p->absent_s = p->absent_s < ABSENT_S_MIN ? ABSENT_S_MIN : p->absent_s;
-}
-
-/* A second host is sent away as long as node 0 hears the first: nothing else
- * then keeps it from that for long. */
-static void draw_second_host(struct host_sim_plan *p)
-{
-    uint64_t state = sim_seed(p->seed, 80);
-    if (p->nodes > 64 || draw(&state, 1, 4) > 1) {
-        return;
-    }
-    p->wanted[HOST_SIM_SECOND_HOST] = true;
-    p->knock_us = host_world_draw_log(&state, 100, 200000);
-    p->knock_lasts_us = host_world_draw_log(&state, 10000, 10000000);
-    p->events_max = p->events_max < 8 ? p->events_max : 8;
-    uint32_t most = HOST_KEEPS_US / 10;
-    p->lasts_us_max = p->lasts_us_max < most ? p->lasts_us_max : most;
-    most = HOST_KEEPS_US / 30;
-    p->weather.stall_us =
-        p->weather.stall_us < most ? p->weather.stall_us : most;
+    p->calm_us = host_sim_draw_log(state, 200000, 20000000);
 }
 
 void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
@@ -201,15 +138,18 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
     plan->nodes_given = nodes;
     plan->nodes = draw_nodes(&state);
     plan->nodes = nodes != 0 ? nodes : plan->nodes;
-    for (int k = 0; k < HOST_SIM_DEAD_WIRE; k++) {
-        plan->wanted[k] = one_in(&state, 3);
+    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+        unsigned n = host_sim_kinds[k].one_in;
+        plan->wanted[k] = n > 0 && one_in(&state, n);
     }
     draw_work(plan, &state);
     draw_cube(plan, &state);
     draw_faults(plan, &state);
-    draw_death(plan);
-    draw_missing(plan);
-    draw_second_host(plan);
+    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+        if (host_sim_kinds[k].draw != NULL) {
+            host_sim_kinds[k].draw(plan);
+        }
+    }
 }
 
 void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)

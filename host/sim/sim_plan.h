@@ -13,26 +13,8 @@
 #include <stdio.h>
 
 #include "host/order/order.h"
-#include "sim_world.h"
-
-/* Kinds of faults: those of a line by chance, then what happens at a time. */
-enum host_sim_fault {
-    HOST_SIM_ONE_WAY = SIM_CHANCES, /* a line brings nothing any more */
-    HOST_SIM_CUT,                   /* a wire is closed at both ends */
-    HOST_SIM_PARTITION, /* all wires between two parts of the cube */
-    HOST_SIM_PAUSE,     /* a node stands still */
-    HOST_SIM_CRASH,     /* a node forgets all and starts again */
-    HOST_SIM_SLOW_HOST,
-    HOST_SIM_TINY, /* memories so small that pages are dropped or faces spilled
-                    */
-    HOST_SIM_DEAD_WIRE,    /* a wire between two nodes breaks for good */
-    HOST_SIM_DEAD_NODE,    /* a node, but for node 0, never comes back */
-    HOST_SIM_MISSING_WIRE, /* a wire between two nodes was never there */
-    HOST_SIM_SECOND_HOST,  /* knocks at the cube while it is at work */
-    HOST_SIM_FAULTS
-};
-
-extern const char *const host_sim_fault_names[HOST_SIM_FAULTS];
+#include "incode/triangulator.h"
+#include "sim_faults.h"
 
 struct host_sim_plan {
     uint64_t seed;
@@ -66,7 +48,7 @@ struct host_sim_plan {
     uint8_t absent_s; /* as in struct host_machine */
     /* When a second host comes, after the work began, and when it goes by
      * itself. */
-    uint64_t knock_us, knock_lasts_us;
+    uint64_t second_us, second_lasts_us;
     /* One fault alone, at frame `frame` of all that are sent: what becomes of
      * it, or a restart of the node that sends it.  0: none. */
     uint64_t frame;

@@ -68,7 +68,7 @@ static void print_struck(const uint64_t *struck)
     bool any = false;
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
         if (struck[k] > 0) {
-            printf("%s%s %llu", comma, host_sim_fault_names[k],
+            printf("%s%s %llu", comma, host_sim_kinds[k].name,
                    (unsigned long long)struck[k]);
             comma = ", ";
             any = true;
@@ -126,7 +126,7 @@ static void print_totals(const struct totals *t, double seconds)
     printf("%-12s %12s %8s  while work was open\n", "fault", "strikes",
            "seeds");
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
-        printf("%-12s %12llu %8llu\n", host_sim_fault_names[k],
+        printf("%-12s %12llu %8llu\n", host_sim_kinds[k].name,
                (unsigned long long)t->struck[k],
                (unsigned long long)t->seeds_struck[k]);
     }

@@ -3,28 +3,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim_draw.h"
+
 enum {
     GUARD_BYTES = 256,
     GUARD = 0xa5,
     BOOT_US = 2000,
-    CALL_AGAIN_US = 20000, /* as TCP_PAUSE_MIN_US, */
-    CALL_AGAIN_US_MAX = 1000000
+    START_US_MAX = 100000, /* after which all nodes have been started */
+    CONNECT_US = 20000,    /* between attempts, as TCP_PAUSE_MIN_US, */
+    CONNECT_US_MAX = 1000000
 };
-
-uint64_t host_world_draw(uint64_t *state, uint64_t lo, uint64_t hi)
-{
-    return lo + (sim_draw(state) >> 16) % (hi - lo + 1);
-}
-
-uint64_t host_world_draw_log(uint64_t *state, uint64_t lo, uint64_t hi)
-{
-    unsigned doublings = 0;
-    while (lo << doublings < hi) {
-        doublings++;
-    }
-    uint64_t top = lo << host_world_draw(state, 0, doublings);
-    return host_world_draw(state, lo, top < hi ? top : hi);
-}
 
 /* --- the nodes in the order of their clocks ------------------------------ */
 
@@ -43,7 +31,7 @@ static void place(struct host_world *w, uint32_t at, uint32_t node)
 /* Wakes a node at that time, whenever it was to wake before. */
 static void wake_at(struct host_world *w, uint32_t node, uint64_t us)
 {
-    uint32_t at = w->node[node].place, count = w->options.nodes;
+    uint32_t at = w->node[node].place, count = w->nodes;
     w->node[node].wake_us = us;
     while (at > 0 && before(w, node, w->heap[(at - 1) / 2])) {
         place(w, at, w->heap[(at - 1) / 2]);
@@ -64,13 +52,14 @@ static void wake_at(struct host_world *w, uint32_t node, uint64_t us)
     place(w, at, node);
 }
 
-/* Something comes for a node: it looks once it is free. */
-static void rouse(struct host_world *w, unsigned node, uint64_t us)
+/* Something comes for a place: a node looks once it is free. */
+static void rouse(void *context, unsigned node, uint64_t us)
 {
-    if (node > w->options.nodes && us < w->guest_us) {
-        w->guest_us = us;
+    struct host_world *w = context;
+    if (node > w->nodes && us < w->second_us) {
+        w->second_us = us;
     }
-    if (node >= w->options.nodes || w->node[node].state != HOST_WORLD_UP) {
+    if (node >= w->nodes || w->node[node].state != HOST_WORLD_UP) {
         return;
     }
     struct host_world_node *n = &w->node[node];
@@ -80,155 +69,50 @@ static void rouse(struct host_world *w, unsigned node, uint64_t us)
     }
 }
 
-/* --- wires --------------------------------------------------------------- */
-
-static void remember(struct host_world *w, uint64_t word)
-{
-    w->trace = (w->trace ^ word) * UINT64_C(0x9fb21c651e98df25);
-    w->trace ^= w->trace >> 28;
-}
-
-static void remember_bytes(struct host_world *w, const uint8_t *bytes,
-                           size_t size)
-{
-    for (; size >= 8; bytes += 8, size -= 8) {
-        uint64_t word;
-        memcpy(&word, bytes, 8);
-        remember(w, word);
-    }
-    uint64_t rest = size;
-    for (size_t i = 0; i < size; i++) {
-        rest = rest << 8 | bytes[i];
-    }
-    remember(w, rest);
-}
-
-static int port_send(void *context, const uint8_t *bytes, size_t size)
-{
-    struct host_world_port *port = context;
-    struct host_world *w = port->world;
-    if (port->replaced) {
-        return LINK_PIPE_CLOSED;
-    }
-    int taken = port->pipe.send(port->pipe.context, bytes, size);
-    if (taken > 0) {
-        remember(w, w->now_us << 16 ^ port->wire << 1 ^ port->side);
-        remember_bytes(w, bytes, (size_t)taken);
-        rouse(w, port->peer, sim_next_us(port->end->out, w->options.gather_us));
-    }
-    return taken;
-}
-
-static int port_receive(void *context, uint8_t *bytes, size_t size)
-{
-    struct host_world_port *port = context;
-    if (port->replaced) {
-        port->replaced = false;
-        return LINK_PIPE_CLOSED;
-    }
-    int got = port->pipe.receive(port->pipe.context, bytes, size);
-    if (got > 0 && port->end->in->blocked) {
-        rouse(port->world, port->peer, port->world->now_us);
-    }
-    return got;
-}
-
-static struct link_pipe port_pipe(struct host_world_port *port)
-{
-    return (struct link_pipe){port, port_send, port_receive};
-}
-
-unsigned host_world_wire_of(const struct host_world *world, unsigned node,
-                            unsigned link)
-{
-    if (link == world->options.dimension) {
-        return world->host_wire;
-    }
-    unsigned low = node & ((1u << link) - 1);
-    return link * (world->options.nodes / 2) + (node >> (link + 1) << link) +
-           low;
-}
-
-static void open_port(struct host_world *w, struct host_world_port *port,
-                      unsigned owner, unsigned link, unsigned peer)
-{
-    unsigned nodes = w->options.nodes;
-    port->world = w;
-    port->owner = owner;
-    port->peer = peer;
-    port->wire = owner >= nodes  ? w->host_wire + owner - nodes
-                 : peer >= nodes ? w->host_wire + peer - nodes
-                                 : host_world_wire_of(w, owner, link);
-    port->side = owner > peer;
-    port->end = &w->wire[port->wire].wire.end[port->side];
-    port->pipe = sim_pipe(port->end);
-}
-
-void host_world_cut(struct host_world *world, unsigned wire, bool cut)
-{
-    struct host_world_wire *one = &world->wire[wire];
-    one->cuts += cut ? 1u : UINT32_MAX;
-    if (cut ? one->cuts == 1 : one->cuts == 0) {
-        sim_wire_cut(&one->wire, cut);
-    }
-}
-
-void host_world_deaf(struct host_world *world, unsigned wire, unsigned side,
-                     bool deaf)
-{
-    struct host_world_wire *one = &world->wire[wire];
-    one->deaf[side] += deaf ? 1u : UINT32_MAX;
-    sim_line_deaf(&one->wire.line[side], one->deaf[side] > 0);
-}
-
-void host_world_leave_out(struct host_world *world, unsigned wire)
-{
-    world->wire[wire].missing = true;
-    host_world_cut(world, wire, true);
-}
-
 /* --- two hosts ------------------------------------------------------------ */
 
-static void hang_up(struct host_world *w, unsigned k, uint64_t rest_us)
+static void cut_host(struct host_world *w, unsigned host, bool cut)
 {
-    struct host_world_door *door = &w->door[k];
-    if (door->connected) {
-        door->connected = false;
-        host_world_cut(w, door->port.wire, true);
-    }
-    door->call_us = w->now_us + rest_us;
-    door->pause_us = CALL_AGAIN_US;
+    unsigned place = w->nodes + host;
+    host_sim_cube_cut(&w->cube, host_sim_cube_wire(&w->cube, place, 0), cut);
 }
 
-static void call(struct host_world *w, unsigned k)
+static void hang_up(struct host_world *w, unsigned host, uint64_t rest_us)
 {
-    unsigned dimension = w->options.dimension;
-    struct host_world_door *door = &w->door[k];
-    struct host_world_port *at = &w->node[0].port[dimension];
+    struct host_world_connection *c = &w->connection[host];
+    if (c->connected) {
+        c->connected = false;
+        cut_host(w, host, true);
+    }
+    c->next_us = w->now_us + rest_us;
+    c->pause_us = CONNECT_US;
+}
+
+static void connect_host(struct host_world *w, unsigned host)
+{
+    struct host_world_connection *c = &w->connection[host];
     if (w->node[0].state != HOST_WORLD_UP) { /* nobody listens */
-        door->call_us = w->now_us + door->pause_us;
-        door->pause_us = 2 * door->pause_us < CALL_AGAIN_US_MAX
-                             ? 2 * door->pause_us
-                             : CALL_AGAIN_US_MAX;
+        c->next_us = w->now_us + c->pause_us;
+        c->pause_us =
+            2 * c->pause_us < CONNECT_US_MAX ? 2 * c->pause_us : CONNECT_US_MAX;
         return;
     }
-    hang_up(w, 1 - k, CALL_AGAIN_US);
-    door->connected = true;
-    host_world_cut(w, door->port.wire, false);
-    open_port(w, at, 0, dimension, w->options.nodes + k);
-    at->replaced = true;
+    hang_up(w, 1 - host, CONNECT_US);
+    c->connected = true;
+    cut_host(w, host, false);
+    host_sim_cube_connect(&w->cube, host);
     rouse(w, 0, w->now_us);
 }
 
-/* When a host calls, or UINT64_MAX. */
-static uint64_t next_call(const struct host_world *w, unsigned *k)
+/* When a host connects next, and which; or UINT64_MAX. */
+static uint64_t next_connection(const struct host_world *w, unsigned *host)
 {
     uint64_t next = UINT64_MAX;
     for (unsigned i = 0; i < 2; i++) {
-        const struct host_world_door *door = &w->door[i];
-        if (door->wanted && !door->connected && door->call_us < next) {
-            next = door->call_us;
-            *k = i;
+        const struct host_world_connection *c = &w->connection[i];
+        if (c->wanted && !c->connected && c->next_us < next) {
+            next = c->next_us;
+            *host = i;
         }
     }
     return next;
@@ -239,11 +123,11 @@ void host_world_rest(struct host_world *world, uint64_t rest_us)
     hang_up(world, 1, rest_us);
 }
 
-void host_world_knock(struct host_world *world, bool comes)
+void host_world_second_host(struct host_world *world, bool comes)
 {
     hang_up(world, 1, 0);
-    world->door[1].wanted = comes;
-    world->guest_us = comes ? world->now_us : UINT64_MAX;
+    world->connection[1].wanted = comes;
+    world->second_us = comes ? world->now_us : UINT64_MAX;
 }
 
 /* --- nodes --------------------------------------------------------------- */
@@ -303,11 +187,11 @@ static void plug_in(struct host_world *w, unsigned i, bool in)
 {
     struct host_world_node *n = &w->node[i];
     for (unsigned d = 0; d < n->links; d++) {
-        struct host_world_port *port = &n->port[d];
+        struct host_sim_port *port = host_sim_cube_port(&w->cube, i, d);
         if (n->unplugged) {
-            host_world_cut(w, port->wire, !in);
+            host_sim_cube_cut(&w->cube, port->wire, !in);
         } else {
-            host_world_deaf(w, port->wire, 1 - port->side, !in);
+            host_sim_cube_deaf(&w->cube, port->wire, 1 - port->side, !in);
             sim_line_flush(port->end->in);
         }
     }
@@ -321,9 +205,9 @@ void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
         return;
     }
     n->state = HOST_WORLD_OFF;
-    if (node == 0 && world->options.second_host) {
-        hang_up(world, 0, CALL_AGAIN_US);
-        hang_up(world, 1, CALL_AGAIN_US);
+    if (node == 0 && world->options.cube.second_host) {
+        hang_up(world, 0, CONNECT_US);
+        hang_up(world, 1, CONNECT_US);
     }
     n->unplugged = unplugged;
     plug_in(world, node, false);
@@ -341,6 +225,11 @@ void host_world_kill(struct host_world *world, unsigned node)
     }
 }
 
+void host_world_late(struct host_world *world, unsigned node, uint64_t us)
+{
+    wake_at(world, node, world->now_us + us);
+}
+
 void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
 {
     struct host_world_node *n = &world->node[node];
@@ -355,9 +244,11 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
 static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
 {
     uint64_t due = w->now_us + node_wait_us(n->node);
+    unsigned i = n->board.identity.self;
     for (unsigned d = 0; d < n->links; d++) {
-        uint64_t bytes = sim_next_us(n->port[d].end->in, w->options.gather_us);
-        uint64_t room = sim_room_us(n->port[d].end->out);
+        const struct sim_end *end = host_sim_cube_port(&w->cube, i, d)->end;
+        uint64_t bytes = sim_next_us(end->in, w->options.cube.gather_us);
+        uint64_t room = sim_room_us(end->out);
         due = bytes < due ? bytes : due;
         due = room < due ? room : due;
     }
@@ -367,7 +258,7 @@ static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
 static void step(struct host_world *w, unsigned i)
 {
     struct host_world_node *n = &w->node[i];
-    uint64_t cost = host_world_draw(&w->random, 1, 2 * w->options.step_us);
+    uint64_t cost = host_sim_draw(&w->random, 1, 2 * w->options.step_us);
     if (n->state == HOST_WORLD_OFF) {
         plug_in(w, i, true);
         boot(w, i);
@@ -376,7 +267,7 @@ static void step(struct host_world *w, unsigned i)
         return;
     }
     for (unsigned d = 0; d < n->links; d++) {
-        n->port[d].end->out->blocked = false;
+        host_sim_cube_port(&w->cube, i, d)->end->out->blocked = false;
     }
     enum node_event event = node_step(n->node);
     if (event == NODE_STOPPED) {
@@ -385,6 +276,7 @@ static void step(struct host_world *w, unsigned i)
         wake_at(w, i, UINT64_MAX);
         return;
     }
+    n->worked = event == NODE_IDLE ? 0 : n->worked + 1;
     cost = event == NODE_IDLE ? cost / 8 + 1 : cost;
     n->busy_us += cost;
     n->busy_until_us = w->now_us + cost;
@@ -394,53 +286,79 @@ static void step(struct host_world *w, unsigned i)
 
 /* --- time ---------------------------------------------------------------- */
 
-uint64_t host_world_door_due(const struct host_world *world, unsigned host)
+uint64_t host_world_host_due(const struct host_world *world, unsigned host)
 {
-    const struct sim_end *end = world->door[host].port.end;
-    uint64_t bytes = sim_next_us(end->in, world->options.gather_us);
-    uint64_t room = sim_room_us(end->out);
-    return bytes < room ? bytes : room;
+    uint64_t due = UINT64_MAX;
+    unsigned place = world->nodes + host;
+    for (unsigned d = 0; d < host_sim_cube_links(&world->cube, place); d++) {
+        struct sim_end *end = host_sim_cube_port(&world->cube, place, d)->end;
+        uint64_t bytes = sim_next_us(end->in, world->options.cube.gather_us);
+        uint64_t room = sim_room_us(end->out);
+        due = bytes < due ? bytes : due;
+        due = room < due ? room : due;
+    }
+    return due;
+}
+
+/* What happens next, and when: of two at the same time, the first named. */
+enum what { STRIKE, STEP, SECOND, CONNECT };
+
+static uint64_t next_event(const struct host_world *w, enum what *what,
+                           unsigned *host)
+{
+    uint64_t next = w->node[w->heap[0]].wake_us;
+    uint64_t connects = next_connection(w, host);
+    *what = w->strike_us <= next ? STRIKE : STEP;
+    next = *what == STRIKE ? w->strike_us : next;
+    *what = w->second_us < next ? SECOND : *what;
+    next = *what == SECOND ? w->second_us : next;
+    *what = connects < next ? CONNECT : *what;
+    return *what == CONNECT ? connects : next;
+}
+
+static void happen(struct host_world *w, enum what what, unsigned host)
+{
+    switch (what) {
+    case STRIKE:
+        w->strike_us = UINT64_MAX;
+        w->options.strike(w->options.context);
+        break;
+    case STEP:
+        step(w, w->heap[0]);
+        break;
+    case SECOND:
+        w->second_us = UINT64_MAX;
+        w->options.second(w->options.second_context);
+        break;
+    case CONNECT:
+        connect_host(w, host);
+        break;
+    }
+    if (++w->steps > w->options.steps_max) {
+        give_up(w, w->nodes, "too many steps");
+    }
 }
 
 /* Runs the world until that time, or until the host has something to do. */
 static void run_until(struct host_world *w, uint64_t until, bool for_host)
 {
     while (w->fault == NULL) {
-        unsigned caller = 0;
-        uint64_t next = w->node[w->heap[0]].wake_us;
-        uint64_t called = next_call(w, &caller);
-        bool strike = w->strike_us <= next;
-        next = strike ? w->strike_us : next;
-        bool guest = w->guest_us < next;
-        next = guest ? w->guest_us : next;
-        bool calls = called < next;
-        next = calls ? called : next;
-        uint64_t host = for_host ? host_world_door_due(w, 0) : UINT64_MAX;
-        if (host <= next && host < until) {
-            until = host;
+        enum what what;
+        unsigned host = 0;
+        uint64_t next = next_event(w, &what, &host);
+        uint64_t due = for_host ? host_world_host_due(w, 0) : UINT64_MAX;
+        if (due <= next && due < until) {
+            until = due;
         }
         if (next >= until) {
             break;
         }
         w->now_us = next > w->now_us ? next : w->now_us;
-        if (calls) {
-            call(w, caller);
-        } else if (guest) {
-            w->guest_us = UINT64_MAX;
-            w->options.guest(w->options.guest_context);
-        } else if (strike) {
-            w->strike_us = UINT64_MAX;
-            w->options.strike(w->options.context);
-        } else {
-            step(w, w->heap[0]);
-        }
-        if (++w->steps > w->options.steps_max) {
-            give_up(w, w->options.nodes, "too many steps");
-        }
+        happen(w, what, host);
     }
     w->now_us = until > w->now_us ? until : w->now_us;
     if (w->now_us > w->options.time_us_max) {
-        give_up(w, w->options.nodes, "too long");
+        give_up(w, w->nodes, "too long");
     }
 }
 
@@ -448,7 +366,7 @@ static void run_until(struct host_world *w, uint64_t until, bool for_host)
 static uint64_t machine_now_us(void *context)
 {
     struct host_world *w = context;
-    uint64_t us = host_world_draw(&w->random, 1, 2 * w->options.host_us);
+    uint64_t us = host_sim_draw(&w->random, 1, 2 * w->options.host_us);
     us += w->host_pause_us;
     w->host_pause_us = 0;
     run_until(w, w->now_us + us, false);
@@ -459,7 +377,10 @@ static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_world *w = context;
     run_until(w, w->now_us + wait_us, true);
-    w->door[0].port.end->out->blocked = false;
+    unsigned host = w->nodes;
+    for (unsigned d = 0; d < host_sim_cube_links(&w->cube, host); d++) {
+        host_sim_cube_port(&w->cube, host, d)->end->out->blocked = false;
+    }
 }
 
 static int machine_check(void *context, struct host_error *error)
@@ -478,36 +399,37 @@ static int machine_check(void *context, struct host_error *error)
 static bool machine_ended(void *context)
 {
     const struct host_world *w = context;
-    return w->ended == w->options.nodes || w->fault != NULL;
+    return w->ended == w->nodes || w->fault != NULL;
 }
 
 static void machine_stop(void *context)
 {
     struct host_world *w = context;
-    for (unsigned i = 0; i < w->options.nodes; i++) {
+    for (unsigned i = 0; i < w->nodes; i++) {
         wake_at(w, i, UINT64_MAX);
     }
-}
-
-struct link_pipe host_world_pipe(struct host_world *world, unsigned host)
-{
-    return port_pipe(&world->door[host].port);
 }
 
 static void machine_missing(void *context, unsigned node, unsigned link)
 {
     struct host_world *w = context;
-    w->wire[host_world_wire_of(w, node, link)].named = true;
+    w->named[host_sim_cube_wire(&w->cube, node, link)] = true;
 }
 
 struct host_machine host_world_machine(struct host_world *world)
 {
     struct host_machine machine = {0};
     machine.context = world;
-    machine.nodes = world->options.nodes;
-    machine.dimension = world->options.dimension;
+    unsigned host = world->nodes;
+    const struct host_sim_cube_options *o = &world->options.cube;
+    machine.nodes = world->nodes;
+    machine.dimension = o->dimension;
     machine.epoch = world->epoch++;
-    machine.pipe = host_world_pipe(world, 0);
+    machine.pipe = host_sim_cube_pipe(&world->cube, host, 0);
+    if (o->spare_node != 0) {
+        machine.spare_node = o->spare_node;
+        machine.spare = host_sim_cube_pipe(&world->cube, host, 1);
+    }
     machine.absent_s = world->options.absent_s;
     machine.missing = machine_missing;
     machine.now_us = machine_now_us;
@@ -523,20 +445,21 @@ struct host_machine host_world_machine(struct host_world *world)
 static int open_node(struct host_world *w, unsigned i)
 {
     struct host_world_node *n = &w->node[i];
-    unsigned dimension = w->options.dimension;
+    const struct host_world_options *o = &w->options;
     n->world = w;
-    n->links = dimension + (i == 0);
+    n->links = host_sim_cube_links(&w->cube, i);
     n->board.context = n;
     n->board.identity.self = (uint16_t)i;
-    n->board.identity.dimension = (uint8_t)dimension;
-    n->board.identity.window = w->options.window;
-    n->board.identity.dead_us = w->options.dead_us;
+    n->board.identity.dimension = (uint8_t)o->cube.dimension;
+    n->board.identity.window = o->window;
+    n->board.identity.host_wire = i != 0 && i == o->cube.spare_node;
+    n->board.identity.dead_us = o->dead_us;
     n->board.now_us = node_now_us;
     n->board.busy_us = node_busy_us;
     n->board.idle = node_idle;
     n->board.reset = node_reset;
     n->board.fixed_bytes = HOST_WORLD_STACK + HOST_WORLD_STATIC;
-    n->board.arena_bytes = w->options.memory - n->board.fixed_bytes;
+    n->board.arena_bytes = o->memory - n->board.fixed_bytes;
     n->board.arena =
         aligned_alloc(64, (n->board.arena_bytes + GUARD_BYTES + 63) / 64 * 64);
     if (n->board.arena == NULL) {
@@ -545,15 +468,33 @@ static int open_node(struct host_world *w, unsigned i)
     memset((uint8_t *)n->board.arena + n->board.arena_bytes, GUARD,
            GUARD_BYTES);
     for (unsigned d = 0; d < n->links; d++) {
-        unsigned peer = d == dimension ? w->options.nodes : i ^ 1u << d;
-        open_port(w, &n->port[d], i, d, peer);
-        n->board.pipes[d] = port_pipe(&n->port[d]);
+        n->board.pipes[d] = host_sim_cube_pipe(&w->cube, i, d);
     }
     /* Nodes start in any order. */
     n->state = HOST_WORLD_OFF;
     n->unplugged = false;
     plug_in(w, i, false);
-    wake_at(w, i, host_world_draw(&w->random, 0, 100000));
+    wake_at(w, i, host_sim_draw(&w->random, 0, START_US_MAX));
+    return 0;
+}
+
+static int open_nodes(struct host_world *w)
+{
+    w->node = calloc(w->nodes, sizeof *w->node);
+    w->heap = calloc(w->nodes, sizeof *w->heap);
+    w->named = calloc(w->cube.wires, sizeof *w->named);
+    if (w->node == NULL || w->heap == NULL || w->named == NULL) {
+        return -1;
+    }
+    for (unsigned i = 0; i < w->nodes; i++) {
+        w->node[i].wake_us = UINT64_MAX;
+        place(w, i, i);
+    }
+    for (unsigned i = 0; i < w->nodes; i++) {
+        if (open_node(w, i) != 0) {
+            return -1;
+        }
+    }
     return 0;
 }
 
@@ -562,68 +503,41 @@ int host_world_open(struct host_world *world,
                     struct host_error *error)
 {
     struct host_world *w = world;
-    unsigned nodes = options->nodes;
     memset(w, 0, sizeof *w);
     w->options = *options;
-    w->random = sim_seed(options->seed, 1);
-    w->strike_us = w->guest_us = UINT64_MAX;
+    w->options.cube.wake = rouse;
+    w->options.cube.context = w;
+    w->nodes = 1u << options->cube.dimension;
+    w->random = sim_seed(options->cube.seed, 1);
+    w->strike_us = w->second_us = UINT64_MAX;
     w->epoch = (uint32_t)(sim_draw(&w->random) >> 33) | 1;
-    w->host_wire = nodes * options->dimension / 2;
-    w->wires = w->host_wire + (options->second_host ? 2 : 1);
-    size_t each = sim_wire_bytes(&options->wire);
-    w->node = calloc(nodes, sizeof *w->node);
-    w->wire = calloc(w->wires, sizeof *w->wire);
-    w->heap = calloc(nodes, sizeof *w->heap);
-    w->bytes =
-        malloc(each * w->host_wire +
-               sim_wire_bytes(&options->host_wire) * (w->wires - w->host_wire));
-    bool good = w->node != NULL && w->wire != NULL && w->heap != NULL &&
-                w->bytes != NULL;
-    for (unsigned i = 0; good && i < w->wires; i++) {
-        bool host = i >= w->host_wire;
-        size_t second =
-            i > w->host_wire ? sim_wire_bytes(&options->host_wire) : 0;
-        size_t at = host ? w->host_wire * each + second : i * each;
-        sim_wire_init(&w->wire[i].wire, w->bytes + at,
-                      host ? &options->host_wire : &options->wire, &w->now_us,
-                      sim_seed(options->seed, 1000 + i));
+    w->connection[0].wanted = w->connection[0].connected = true;
+    if (host_sim_cube_open(&w->cube, &w->options.cube, &w->now_us, error) !=
+        0) {
+        return error->code;
     }
-    for (unsigned i = 0; good && i < nodes; i++) {
-        w->node[i].wake_us = UINT64_MAX;
-        place(w, i, i);
-    }
-    for (unsigned i = 0; good && i < nodes; i++) {
-        good = open_node(w, i) == 0;
-    }
-    if (!good) {
+    if (open_nodes(w) != 0) {
         host_world_close(w);
         return host_fail_memory(error, "the simulated nodes");
-    }
-    for (unsigned k = 0; k < w->wires - w->host_wire; k++) {
-        open_port(w, &w->door[k].port, nodes + k, 0, 0);
-    }
-    w->door[0].wanted = w->door[0].connected = true;
-    if (options->second_host) {
-        host_world_cut(w, w->host_wire + 1, true);
     }
     return 0;
 }
 
 void host_world_close(struct host_world *world)
 {
-    for (unsigned i = 0; world->node != NULL && i < world->options.nodes; i++) {
+    for (unsigned i = 0; world->node != NULL && i < world->nodes; i++) {
         free(world->node[i].board.arena);
     }
     free(world->node);
-    free(world->wire);
     free(world->heap);
-    free(world->bytes);
+    free(world->named);
+    host_sim_cube_close(&world->cube);
     world->node = NULL;
 }
 
 const char *host_world_damage(const struct host_world *world)
 {
-    for (unsigned i = 0; i < world->options.nodes; i++) {
+    for (unsigned i = 0; i < world->nodes; i++) {
         const struct node_board *b = &world->node[i].board;
         const uint8_t *past = (const uint8_t *)b->arena + b->arena_bytes;
         for (unsigned k = 0; k < GUARD_BYTES; k++) {

@@ -1,0 +1,40 @@
+/* A simulated run at work, as sim.c and sim_faults.c share it.
+ *
+ * Memory: the world's, and a few times the points.  Work: none of its own.
+ *
+ *     struct host_sim_run *run = calloc(1, sizeof *run);
+ *     run->plan = &plan;
+ *     run->random = sim_seed(plan.seed, 2);
+ */
+#ifndef HOST_SIM_RUN_H
+#define HOST_SIM_RUN_H
+
+#include "host/mesh/points.h"
+#include "host/service/service.h"
+#include "second_host.h"
+#include "sim.h"
+
+enum { HOST_SIM_LASTING_MAX = 32 }; /* faults that are to be taken back */
+
+struct host_sim_run {
+    const struct host_sim_plan *plan;
+    struct host_sim_outcome *outcome;
+    struct host_world world;
+    struct host_service service;
+    struct host_second_host second;
+    struct host_points points;
+    struct host_order order;
+    struct host_tetrahedra tets;
+    uint64_t random;
+    /* By the world's clock: no more faults; the next event; a second host. */
+    uint64_t calm_us, event_us, second_us;
+    unsigned events; /* left */
+    bool open, crash_due, broken;
+    uint64_t frames;                    /* seen by `decide` */
+    uint64_t before[SIM_CHANCES];       /* strikes before work was open, */
+    uint64_t happened[HOST_SIM_FAULTS]; /* and events since */
+    struct host_sim_event lasting[HOST_SIM_LASTING_MAX];
+    unsigned lasting_count;
+};
+
+#endif
