@@ -1,9 +1,9 @@
 #include "counted.h"
 
-int node_letters_write(struct node_letters *letters, uint16_t dest,
+int node_counted_write(struct node_counted *counted, uint16_t dest,
                        uint8_t type, const void *data, size_t size)
 {
-    int status = cube_write(letters->cube, dest, type, data, size);
-    letters->sent += status == 0 && dest == CUBE_HOST;
+    int status = cube_write(counted->cube, dest, type, data, size);
+    counted->sent += status == 0 && dest == CUBE_HOST;
     return status;
 }

@@ -34,7 +34,7 @@ enum node_message_type {
     NODE_UNSPILL,   /* struct node_spill_header, then faces */
     NODE_REPORT,    /* nothing: asks for NODE_FINISHED, without a job */
     NODE_STOP,      /* nothing, to all: the run is over */
-    NODE_CALL,      /* struct node_call_message: asks for NODE_HERE */
+    NODE_PING,      /* struct node_ping_message: asks for NODE_PONG */
     /* To the host. */
     NODE_READY = 32,   /* struct node_ready_message */
     NODE_PAGE_REQUEST, /* uint32 page numbers; also to a holder */
@@ -43,7 +43,7 @@ enum node_message_type {
     NODE_UNSPILL_REQUEST, /* struct node_spill_header */
     NODE_FINISHED,        /* struct node_finished_message */
     NODE_FAULT,           /* text without a final 0 */
-    NODE_HERE             /* struct node_here_message */
+    NODE_PONG             /* struct node_pong_message */
 };
 
 /* What a node does in a generation of the wiring: a row of roles/roles.c. */
@@ -52,18 +52,18 @@ enum node_role_number {
     NODE_HOLDER = 2  /* keeps pages for node 0 */
 };
 
-/* Letters are all that goes between the host and one node, NODE_STOP apart;
- * both sides count them anew in each generation of the cube's wiring.  They
- * arrive in order, so any that is missing has been lost for good. */
-struct node_call_message {
-    uint32_t sent; /* letters to this node before this one */
+/* Counted messages are all that go between the host and one node, NODE_STOP
+ * apart; both sides count them anew in each generation of the cube's wiring.
+ * They arrive in order, so any that is missing has been lost for good. */
+struct node_ping_message {
+    uint32_t sent; /* counted messages to this node before this one */
 };
 
-struct node_here_message {
+struct node_pong_message {
     uint32_t start;    /* the epoch of this start of the node */
-    uint32_t called;   /* `sent` of the call that is answered */
-    uint32_t received; /* letters from the host before that call */
-    uint32_t sent;     /* letters to the host before this one */
+    uint32_t pinged;   /* `sent` of the ping that is answered */
+    uint32_t received; /* from the host before that ping */
+    uint32_t sent;     /* to the host before this one */
     uint32_t links;    /* bit d: link d has been up since this start */
 };
 
@@ -83,20 +83,20 @@ struct node_job_message {
     struct incode_job job;
 };
 
-/* `letters`, here and below: those to the receiver before this one.  Where it
- * has had others, some were lost, and this one does not count: what follows
- * from a part alone would be wrong. */
+/* `sent`, here and below: counted messages to the receiver before this one.
+ * Where it has had fewer, some were lost, and this one does not count: what
+ * follows from a part alone would be wrong. */
 struct node_result_header {
     uint32_t epoch;
-    uint32_t letters;
+    uint32_t sent;
 };
 
 struct node_spill_header {
     uint32_t epoch;
-    uint32_t brick;   /* of NODE_UNSPILL and its request */
-    uint32_t count;   /* faces that follow */
-    uint32_t last;    /* NODE_UNSPILL: no more of this brick */
-    uint32_t letters; /* NODE_UNSPILL and its request */
+    uint32_t brick; /* of NODE_UNSPILL and its request */
+    uint32_t count; /* faces that follow */
+    uint32_t last;  /* NODE_UNSPILL: no more of this brick */
+    uint32_t sent;  /* NODE_UNSPILL and its request */
 };
 
 /* The memory map of a node, bytes: what its board holds outside the arena,
@@ -119,8 +119,8 @@ struct node_ready_message {
 struct node_finished_message {
     uint32_t epoch; /* of the job that is done; 0: it is a report alone */
     uint32_t start; /* the epoch of this start of the node */
-    uint32_t letters;
-    uint32_t links;   /* as in struct node_here_message */
+    uint32_t sent;
+    uint32_t links;   /* as in struct node_pong_message */
     uint64_t wall_us; /* from each job's arrival to its last result */
     uint64_t busy_us; /* processor time of the node */
     uint64_t bytes_in, bytes_out; /* payload of messages, at this node */

@@ -20,9 +20,9 @@ struct node {
     struct node_worker worker;
     struct node_holder holder;
     uint32_t generation; /* of the wiring that this node has followed */
-    struct node_letters letters;
-    struct node_here_message here; /* the answer that is owed */
-    bool owes_here, owes_ready, owes_report;
+    struct node_counted counted;
+    struct node_pong_message pong; /* the answer that is owed */
+    bool owes_pong, owes_ready, owes_report;
     struct node_finished_message before; /* of roles of older generations */
     const char *fault;
     bool fault_sent;
@@ -112,7 +112,7 @@ struct node *node_start(const struct node_board *board, const char **why)
         *why = "the cube's description is not sound";
         return NULL;
     }
-    node->letters.cube = node->cube;
+    node->counted.cube = node->cube;
     return node;
 }
 
@@ -137,10 +137,10 @@ static void take_setup(struct node *n, const struct cube_message *message)
     }
     if (n->role == NODE_HOLDER) {
         status = node_holder_start(&n->holder, n->role_memory, n->role_bytes,
-                                   &n->letters, &setup, &why);
+                                   &n->counted, &setup, &why);
     } else {
         status = node_worker_start(&n->worker, n->role_memory, n->role_bytes,
-                                   &n->letters, &setup, &why);
+                                   &n->counted, &setup, &why);
     }
     if (status != 0) {
         n->fault = why;
@@ -153,7 +153,7 @@ static void take_setup(struct node *n, const struct cube_message *message)
 static void take_job(struct node *n, const struct cube_message *message)
 {
     struct node_job_message job;
-    /* After a fresh start: a letter that was sent to the one before. */
+    /* After a fresh start: a message that was sent to the one before. */
     if (n->fault != NULL || !n->set_up) {
         return;
     }
@@ -165,14 +165,14 @@ static void take_job(struct node *n, const struct cube_message *message)
     node_worker_job(&n->worker, &job, n->now_us);
 }
 
-static void take_call(struct node *n, const struct cube_message *message)
+static void take_ping(struct node *n, const struct cube_message *message)
 {
-    struct node_call_message call;
-    if (message->size == sizeof call) {
-        memcpy(&call, message->data, sizeof call);
-        n->here.called = call.sent;
-        n->here.received = n->letters.received;
-        n->owes_here = true;
+    struct node_ping_message ping;
+    if (message->size == sizeof ping) {
+        memcpy(&ping, message->data, sizeof ping);
+        n->pong.pinged = ping.sent;
+        n->pong.received = n->counted.received;
+        n->owes_pong = true;
     }
 }
 
@@ -188,8 +188,8 @@ static void take_message(struct node *n, const struct cube_message *message)
     case NODE_REPORT:
         n->owes_report = true;
         break;
-    case NODE_CALL:
-        take_call(n, message);
+    case NODE_PING:
+        take_ping(n, message);
         break;
     case NODE_STOP:
         n->stopping = true;
@@ -202,7 +202,7 @@ static void take_message(struct node *n, const struct cube_message *message)
             node_worker_message(&n->worker, message);
         }
     }
-    n->letters.received +=
+    n->counted.received +=
         message->source == CUBE_HOST && message->type != NODE_STOP;
 }
 
@@ -241,7 +241,7 @@ static bool send_ready(struct node *n)
     ready.protocol = NODE_PROTOCOL;
     ready.role = n->role;
     fill_map(n, &ready.map);
-    return node_letters_write(&n->letters, CUBE_HOST, NODE_READY, &ready,
+    return node_counted_write(&n->counted, CUBE_HOST, NODE_READY, &ready,
                               sizeof ready) == 0;
 }
 
@@ -256,13 +256,13 @@ static uint32_t links_seen(const struct node *n)
     return seen;
 }
 
-static bool send_here(struct node *n)
+static bool send_pong(struct node *n)
 {
-    n->here.start = n->board->identity.epoch;
-    n->here.sent = n->letters.sent;
-    n->here.links = links_seen(n);
-    return node_letters_write(&n->letters, CUBE_HOST, NODE_HERE, &n->here,
-                              sizeof n->here) == 0;
+    n->pong.start = n->board->identity.epoch;
+    n->pong.sent = n->counted.sent;
+    n->pong.links = links_seen(n);
+    return node_counted_write(&n->counted, CUBE_HOST, NODE_PONG, &n->pong,
+                              sizeof n->pong) == 0;
 }
 
 static void link_totals(const struct node *n,
@@ -308,9 +308,9 @@ static bool send_finished(struct node *n, uint32_t epoch)
     finished.busy_us = n->board->busy_us(n->board->context);
     finished.epoch = epoch;
     finished.start = n->board->identity.epoch;
-    finished.letters = n->letters.sent;
+    finished.sent = n->counted.sent;
     finished.links = links_seen(n);
-    INCODE_ASSERT(node_letters_write(&n->letters, CUBE_HOST, NODE_FINISHED,
+    INCODE_ASSERT(node_counted_write(&n->counted, CUBE_HOST, NODE_FINISHED,
                                      &finished, sizeof finished) == 0);
     return true;
 }
@@ -328,10 +328,10 @@ static void follow_wiring(struct node *n)
     }
     n->generation = generation;
     n->set_up = false;
-    n->owes_here = n->owes_ready = n->owes_report = false;
+    n->owes_pong = n->owes_ready = n->owes_report = false;
     n->fault = NULL;
     n->fault_sent = false;
-    n->letters.received = n->letters.sent = 0;
+    n->counted.received = n->counted.sent = 0;
 }
 
 /* Tells the host what is wrong, once.  The node goes on to pass messages of
@@ -342,7 +342,7 @@ static void send_fault(struct node *n)
     while (size < NODE_FAULT_TEXT_MAX && n->fault[size] != '\0') {
         size++;
     }
-    n->fault_sent = node_letters_write(&n->letters, CUBE_HOST, NODE_FAULT,
+    n->fault_sent = node_counted_write(&n->counted, CUBE_HOST, NODE_FAULT,
                                        n->fault, size) == 0;
 }
 
@@ -412,8 +412,8 @@ enum node_event node_step(struct node *node)
         if (!node->fault_sent) {
             send_fault(node);
         }
-    } else if (node->owes_here) {
-        node->owes_here = !send_here(node);
+    } else if (node->owes_pong) {
+        node->owes_pong = !send_pong(node);
     } else if (node->set_up && node->owes_ready) {
         node->owes_ready = !send_ready(node);
     } else if (node->set_up) {

@@ -7,11 +7,11 @@
 enum {
     CHECK_EVERY_US = 20000,
     ELAPSED_US_MAX = 100000,   /* a host that was stopped blames nobody */
-    CALLS_EVERY_US = 250000,   /* all nodes once, */
-    CALL_EVERY_US = 5000,      /* but no more than one node in this time, */
-    CALLS_DUE_MAX = 8,         /* and none while so many wait for the wire */
-    CALL_AGAIN_US = 2000000,   /* a call may have been lost with a node; */
-    CALL_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
+    PINGS_EVERY_US = 250000,   /* all nodes once, */
+    PING_EVERY_US = 5000,      /* but no more than one node in this time, */
+    PINGS_DUE_MAX = 8,         /* and none while so many wait for the wire */
+    PING_AGAIN_US = 2000000,   /* a ping may have been lost with a node; */
+    PING_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
     PROBE_US = 3000000,
     WIRE_DOWN_US_MAX = 8000000,
     BRING_UP_US_MAX = 9000000,
@@ -47,9 +47,9 @@ static unsigned distance(const struct host_service *s, unsigned node)
     return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gate);
 }
 
-/* Calls one more node: of those that have not answered one that is nearest to
+/* Pings one more node: of those that have not answered one that is nearest to
  * the gate, so that the way to it leads over nodes that have. */
-static void call_next(struct host_service *s)
+static void ping_next(struct host_service *s)
 {
     unsigned best = UINT32_MAX;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -60,7 +60,7 @@ static void call_next(struct host_service *s)
     }
     s->probing = best != UINT32_MAX;
     if (s->probing) {
-        s->node[best].call_due = true;
+        s->node[best].ping_due = true;
     }
 }
 
@@ -73,15 +73,15 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
     s->probe = false;
     s->living = s->here = s->ready = 0;
     s->began_us = s->searching ? s->began_us : now_us;
-    s->news_us = s->call_us = now_us;
+    s->news_us = s->ping_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
         node->lost = node->given_up || !cube_reaches(s->cube, (uint16_t)i);
         s->living += !node->lost;
-        node->call_due = !node->lost && !s->probing;
-        node->called_us = now_us;
-        node->calling = false;
-        node->call_again_us = CALL_AGAIN_US_MIN;
+        node->ping_due = !node->lost && !s->probing;
+        node->pinged_us = now_us;
+        node->pinged = false;
+        node->ping_again_us = PING_AGAIN_US_MIN;
         node->sent = node->received = node->missed = 0;
         node->silent_us = 0;
         s->report[i].here = s->report[i].ready = false;
@@ -90,7 +90,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
         }
     }
     if (s->probing) {
-        call_next(s);
+        ping_next(s);
     }
 }
 
@@ -101,104 +101,104 @@ void host_detector_end(struct host_service *service)
     }
 }
 
-/* --- calls and answers ---------------------------------------------------- */
+/* --- pings and pongs ------------------------------------------------------ */
 
-bool host_detector_call(struct host_service *service, uint16_t to)
+bool host_detector_ping(struct host_service *service, uint16_t to)
 {
     struct host_node *node = &service->node[to];
-    struct node_call_message call = {node->sent};
-    if (cube_write(service->cube, to, NODE_CALL, &call, sizeof call) != 0) {
+    struct node_ping_message ping = {node->sent};
+    if (cube_write(service->cube, to, NODE_PING, &ping, sizeof ping) != 0) {
         return false;
     }
     node->sent++;
-    node->call_due = false;
-    node->calling = true;
+    node->ping_due = false;
+    node->pinged = true;
     return true;
 }
 
-int host_detector_answer(struct host_service *service,
-                         const struct cube_message *message,
-                         struct host_error *error)
+int host_detector_pong(struct host_service *service,
+                       const struct cube_message *message,
+                       struct host_error *error)
 {
     struct host_service *s = service;
     struct host_node *node = &s->node[message->source];
     struct host_node_report *report = &s->report[message->source];
-    struct node_here_message here;
-    if (message->size != sizeof here) {
+    struct node_pong_message pong;
+    if (message->size != sizeof pong) {
         return host_fail(error, HOST_CUBE,
                          "node %u link %u: is here in another language; are "
                          "host and node of one version? run make",
                          message->source,
                          host_detector_link(service, message->source));
     }
-    memcpy(&here, message->data, sizeof here);
-    if (node->start != 0 && node->start != here.start) {
+    memcpy(&pong, message->data, sizeof pong);
+    if (node->start != 0 && node->start != pong.start) {
         s->blamed = message->source;
     }
     bool first = !report->here;
     if (first) {
-        /* It has had nothing but calls yet.  The first of them may have gone
+        /* It has had nothing but pings yet.  The first of them may have gone
          * to a link's end that was just about to start again. */
         report->here = true;
         s->here++;
         s->news_us = s->check_us;
-        node->missed = here.called - here.received;
-        node->call_again_us = CALL_AGAIN_US;
-        if (node->start != 0 && node->start != here.start) {
+        node->missed = pong.pinged - pong.received;
+        node->ping_again_us = PING_AGAIN_US;
+        if (node->start != 0 && node->start != pong.start) {
             close_start(s, message->source);
         }
-        node->start = here.start;
+        node->start = pong.start;
     }
-    if (here.start != node->start ||
-        here.called - here.received != node->missed ||
-        here.sent != node->received) {
+    if (pong.start != node->start ||
+        pong.pinged - pong.received != node->missed ||
+        pong.sent != node->received) {
         s->loss = true;
     }
-    host_missing_links_heard(s, message->source, here.links);
-    node->calling = false;
-    node->call_due = false; /* what would have been asked again, is answered */
+    host_missing_links_heard(s, message->source, pong.links);
+    node->pinged = false;
+    node->ping_due = false; /* what would have been asked again, is answered */
     if (first && s->probing) {
-        call_next(s);
+        ping_next(s);
     }
     return 0;
 }
 
-static unsigned calls_due(const struct host_service *s)
+static unsigned pings_due(const struct host_service *s)
 {
     unsigned due = 0;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        due += s->node[i].call_due;
+        due += s->node[i].ping_due;
     }
     return due;
 }
 
-/* Has each node called once a period, one after the other; less often where
+/* Has each node pinged once a period, one after the other; less often where
  * the wire is too slow for that and for the work. */
-static void call_in_turn(struct host_service *s, uint64_t now_us)
+static void ping_in_turn(struct host_service *s, uint64_t now_us)
 {
     if (s->probing) {
         return;
     }
-    uint64_t every = CALLS_EVERY_US / s->machine->nodes;
-    every = every < CALL_EVERY_US ? CALL_EVERY_US : every;
-    if (now_us - s->call_us < every) {
+    uint64_t every = PINGS_EVERY_US / s->machine->nodes;
+    every = every < PING_EVERY_US ? PING_EVERY_US : every;
+    if (now_us - s->ping_us < every) {
         return;
     }
-    unsigned due = calls_due(s);
-    for (unsigned i = 0; i < s->machine->nodes && due < CALLS_DUE_MAX &&
-                         now_us - s->call_us >= every;
+    unsigned due = pings_due(s);
+    for (unsigned i = 0; i < s->machine->nodes && due < PINGS_DUE_MAX &&
+                         now_us - s->ping_us >= every;
          i++) {
-        struct host_node *node = &s->node[s->call_turn];
-        if (!node->lost && !node->calling) {
-            due += !node->call_due;
-            node->call_due = true;
-            node->called_us = now_us;
+        struct host_node *node = &s->node[s->ping_turn];
+        if (!node->lost && !node->pinged) {
+            due += !node->ping_due;
+            node->ping_due = true;
+            node->pinged_us = now_us;
         }
-        s->call_turn = (s->call_turn + 1) % s->machine->nodes;
-        s->call_us += every;
+        s->ping_turn = (s->ping_turn + 1) % s->machine->nodes;
+        s->ping_us += every;
     }
-    if (now_us - s->call_us >= every) {
-        s->call_us = now_us;
+    if (now_us - s->ping_us >= every) {
+        s->ping_us = now_us;
     }
 }
 
@@ -223,7 +223,7 @@ static int fail_wrong(const struct host_service *s, struct host_error *error)
 
 /* Nodes that are silent, and what follows.  One that takes nothing off its
  * links holds up all that is on the way to it and behind, and so makes others
- * silent: at first nobody is blamed, but each is called alone. */
+ * silent: at first nobody is blamed, but each is pinged alone. */
 static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
 {
     uint16_t gate = cube_wiring(s->cube)->gate;
@@ -233,14 +233,14 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
         bool haste = s->probing && (i != gate || s->machine->spare_node != 0);
         uint64_t limit =
             haste && s->patience_us > PROBE_US ? PROBE_US : s->patience_us;
-        if (node->calling && now_us - node->called_us >= node->call_again_us) {
-            node->call_due = true;
-            node->called_us = now_us;
-            node->call_again_us = 2 * node->call_again_us < CALL_AGAIN_US
-                                      ? 2 * node->call_again_us
-                                      : CALL_AGAIN_US;
+        if (node->pinged && now_us - node->pinged_us >= node->ping_again_us) {
+            node->ping_due = true;
+            node->pinged_us = now_us;
+            node->ping_again_us = 2 * node->ping_again_us < PING_AGAIN_US
+                                      ? 2 * node->ping_again_us
+                                      : PING_AGAIN_US;
         }
-        if (!s->started || node->lost || !(node->calling || node->call_due)) {
+        if (!s->started || node->lost || !(node->pinged || node->ping_due)) {
             continue;
         }
         node->silent_us += elapsed_us;
@@ -399,7 +399,7 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     if (!host_missing_links_check(s, now_us, patience_of(s))) {
         s->loss = s->loss || wiring->dead_count > wiring->settled;
     }
-    call_in_turn(s, now_us);
+    ping_in_turn(s, now_us);
     elapsed = elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX;
     listen(s, now_us, elapsed);
     host_missing_links_look(s, elapsed);

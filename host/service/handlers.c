@@ -17,12 +17,12 @@ static int unsound(const struct cube_message *message, const char *what,
                      message->source, what, message->type, message->size);
 }
 
-/* Whether letters of that node have been lost before this one: then what it
+/* Whether messages of that node have been lost before this one: then what it
  * says is a part that must not be taken for the whole. */
 static bool missing(struct host_service *s, const struct host_node *node,
-                    uint32_t letters)
+                    uint32_t sent)
 {
-    if (letters == node->received) {
+    if (sent == node->received) {
         return false;
     }
     s->loss = true;
@@ -70,7 +70,7 @@ static int take_results(struct host_service *s,
         return 0;
     }
 #endif
-    if (missing(s, node, header.letters) ||
+    if (missing(s, node, header.sent) ||
         !host_ledger_current(&s->ledger, message->source, header.epoch)) {
         return 0;
     }
@@ -136,7 +136,7 @@ static int take_unspill_request(struct host_service *s,
                        error);
     }
     memcpy(&header, message->data, sizeof header);
-    if (missing(s, node, header.letters)) {
+    if (missing(s, node, header.sent)) {
         return 0; /* what was lost may have been part of the list */
     }
     uint32_t at =
@@ -160,7 +160,7 @@ static int take_finished(struct host_service *s,
         return unsound(message, "sent statistics in another language", error);
     }
     memcpy(&finished, message->data, sizeof finished);
-    if (missing(s, node, finished.letters)) {
+    if (missing(s, node, finished.sent)) {
         return 0;
     }
     if (finished.epoch != 0 &&
@@ -215,8 +215,8 @@ static int take(struct host_service *service,
         service->ready += !report->ready;
         report->ready = true;
         return 0;
-    case NODE_HERE:
-        return host_detector_answer(service, message, error);
+    case NODE_PONG:
+        return host_detector_pong(service, message, error);
     case NODE_PAGE_REQUEST:
         return take_requests(service, message, error);
     case NODE_RESULT:
@@ -241,7 +241,7 @@ int host_handle(struct host_service *service,
         return unsound(message, "is not of this cube", error);
     }
     struct host_node *node = &service->node[message->source];
-    bool expected = message->type == NODE_HERE || message->type == NODE_FAULT ||
+    bool expected = message->type == NODE_PONG || message->type == NODE_FAULT ||
                     (service->started && !node->setup_due);
     int status = 0;
     if (expected) {

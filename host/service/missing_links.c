@@ -232,12 +232,12 @@ static bool all_attentive(const struct host_service *s)
     return all;
 }
 
-/* When the run is over, calls are all there is to do. */
+/* When the run is over, pings are all there is to do. */
 static void call_all(struct host_service *s)
 {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
-        node->call_due = node->call_due || (!node->lost && !node->calling);
+        node->ping_due = node->ping_due || (!node->lost && !node->pinged);
     }
 }
 

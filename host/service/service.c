@@ -79,8 +79,8 @@ static int read_all(struct host_service *s, unsigned *moved,
     return status;
 }
 
-static bool send_letter(struct host_service *s, uint16_t to, uint8_t type,
-                        const void *data, size_t size)
+static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
+                         const void *data, size_t size)
 {
     bool sent = cube_write(s->cube, to, type, data, size) == 0;
     s->node[to].sent += sent;
@@ -99,7 +99,7 @@ static bool send_page(struct host_service *s, uint16_t to)
     }
     body.page = node->pages[node->pages_first];
     size_t size = host_page(s->order, body.page, body.data);
-    if (!send_letter(s, to, NODE_PAGE, &body, 4 + size)) {
+    if (!send_counted(s, to, NODE_PAGE, &body, 4 + size)) {
         return false;
     }
     node->pages_first = (node->pages_first + 1) % HOST_PAGES_QUEUED_MAX;
@@ -127,14 +127,14 @@ static bool send_unspill(struct host_service *s, uint16_t to,
         return false;
     }
     body.header.last = list->faces == 0;
-    body.header.letters = node->sent - node->missed;
+    body.header.sent = node->sent - node->missed;
     if (body.header.last) {
         node->unspills_first = (node->unspills_first + 1) % HOST_UNSPILLS_MAX;
         node->unspills_count--;
     }
-    return send_letter(s, to, NODE_UNSPILL, &body,
-                       sizeof body.header +
-                           body.header.count * sizeof body.faces[0]);
+    return send_counted(s, to, NODE_UNSPILL, &body,
+                        sizeof body.header +
+                            body.header.count * sizeof body.faces[0]);
 }
 
 /* --- jobs ----------------------------------------------------------------- */
@@ -248,7 +248,7 @@ static void set_up(struct host_service *s)
 
 /* --- the loop ------------------------------------------------------------- */
 
-/* The next message that is due to this node, calls apart; false: none, or no
+/* The next message that is due to this node, pings apart; false: none, or no
  * room. */
 static bool serve_work(struct host_service *s, uint16_t to,
                        struct host_error *error)
@@ -259,7 +259,8 @@ static bool serve_work(struct host_service *s, uint16_t to,
     }
     if (node->setup_due) {
         struct node_setup_message setup = setup_of(s, to);
-        node->setup_due = !send_letter(s, to, NODE_SETUP, &setup, sizeof setup);
+        node->setup_due =
+            !send_counted(s, to, NODE_SETUP, &setup, sizeof setup);
         return !node->setup_due;
     }
     if (s->dealt && !node->working) {
@@ -267,17 +268,17 @@ static bool serve_work(struct host_service *s, uint16_t to,
     }
     if (node->job_due) {
         node->job_due =
-            !send_letter(s, to, NODE_JOB, &node->job, sizeof node->job);
+            !send_counted(s, to, NODE_JOB, &node->job, sizeof node->job);
         return !node->job_due;
     }
     if (node->report_due) {
-        node->report_due = !send_letter(s, to, NODE_REPORT, NULL, 0);
+        node->report_due = !send_counted(s, to, NODE_REPORT, NULL, 0);
         return !node->report_due;
     }
     /* Half of the credit back at a time. */
     uint32_t credit = node->results + s->setup.credits;
     if (credit - node->credit >= s->setup.credits / 2) {
-        if (!send_letter(s, to, NODE_CREDIT, &credit, sizeof credit)) {
+        if (!send_counted(s, to, NODE_CREDIT, &credit, sizeof credit)) {
             return false;
         }
         node->credit = credit;
@@ -289,7 +290,7 @@ static bool serve_work(struct host_service *s, uint16_t to,
     return node->pages_count > 0 && send_page(s, to);
 }
 
-/* A call and a message of work in turn: on a slow wire the calls of many nodes
+/* A ping and a message of work in turn: on a slow wire the pings of many nodes
  * would leave no room for anything else. */
 static bool serve_node(struct host_service *s, uint16_t to,
                        struct host_error *error)
@@ -298,15 +299,15 @@ static bool serve_node(struct host_service *s, uint16_t to,
     if (node->lost) {
         return false;
     }
-    if (node->call_due && !node->called) {
-        node->called = host_detector_call(s, to);
-        return node->called;
+    if (node->ping_due && !node->ping_last) {
+        node->ping_last = host_detector_ping(s, to);
+        return node->ping_last;
     }
     if (serve_work(s, to, error)) {
-        node->called = false;
+        node->ping_last = false;
         return true;
     }
-    return node->call_due && host_detector_call(s, to);
+    return node->ping_due && host_detector_ping(s, to);
 }
 
 /* Serves the nodes in turn, while the wire takes it. */

@@ -43,20 +43,20 @@ struct host_node {
     uint32_t results; /* messages taken */
     uint32_t credit;  /* messages allowed, as the node knows */
     /* What is to be sent, in this order. */
-    bool call_due, setup_due, job_due, report_due;
+    bool ping_due, setup_due, job_due, report_due;
     struct node_job_message job;
     bool working;  /* a job is out */
     bool reported; /* statistics of all that it has done are here */
     /* Whether it is there: failure_detector.h. */
-    bool lost;     /* not reached in this generation: nothing is sent to it */
-    bool given_up; /* for the rest of the run */
-    bool calling;  /* a call has not been answered */
-    bool called;   /* what it was sent last is a call */
-    uint32_t sent, received; /* letters of this generation */
-    uint32_t missed;         /* calls that were lost before the first answer */
+    bool lost;      /* not reached in this generation: nothing is sent to it */
+    bool given_up;  /* for the rest of the run */
+    bool pinged;    /* a ping has not been answered */
+    bool ping_last; /* what it was sent last is a ping */
+    uint32_t sent, received; /* counted messages of this generation */
+    uint32_t missed;         /* pings that were lost before the first answer */
     uint32_t start;          /* the epoch of its start; 0: not heard of */
     uint64_t silent_us;      /* that it has not answered */
-    uint64_t called_us, call_again_us;
+    uint64_t pinged_us, ping_again_us;
     uint32_t links;          /* that have been up, as either end has said */
     uint64_t links_heard_us; /* uncabled_us when this end said so last */
     /* Statistics of starts that are over, and tetrahedra of the present one
@@ -115,14 +115,14 @@ struct host_service {
     uint64_t news_us;     /* and when a node answered for the first time last */
     bool cabled;          /* every wire has been up, or was named */
     uint64_t uncabled_us; /* time without that, while all nodes answer */
-    bool probe, probing; /* nodes are called one by one: in the next generation;
+    bool probe, probing; /* nodes are pinged one by one: in the next generation;
                             now, until all have answered */
     unsigned living;     /* nodes that are not lost */
     unsigned here, ready; /* of them, that are up; that have their setup */
     unsigned working;     /* that have a job */
     unsigned turn;        /* the node to be served next */
-    unsigned call_turn;   /* to be called next */
-    uint64_t call_us, check_us, began_us, wire_down_us;
+    unsigned ping_turn;   /* to be pinged next */
+    uint64_t ping_us, check_us, began_us, wire_down_us;
     uint64_t in_use_us; /* since when another host has the nodes; 0: none */
     uint64_t in_use_told_us; /* and when they said so last */
     uint32_t in_use;         /* times that they said so */

@@ -5,11 +5,11 @@
 #include "incode/predicates/check.h"
 
 int node_holder_start(struct node_holder *holder, void *arena, size_t bytes,
-                      struct node_letters *letters,
+                      struct node_counted *counted,
                       const struct node_setup_message *setup, const char **why)
 {
     memset(holder, 0, sizeof *holder);
-    holder->letters = letters;
+    holder->counted = counted;
     holder->holders = setup->holders;
     holder->frames = arena;
     holder->frame_count = (uint32_t)(bytes / sizeof holder->frames[0]);
@@ -91,13 +91,13 @@ unsigned node_holder_send(struct node_holder *holder)
     uint32_t wanted[NODE_PAGES_A_REQUEST];
     uint32_t wanted_count = 0, i = 0;
     unsigned sent = 0;
-    bool may_ask = cube_room(holder->letters->cube, CUBE_HOST) > 0;
+    bool may_ask = cube_room(holder->counted->cube, CUBE_HOST) > 0;
     while (i < holder->queued) {
         uint32_t page = holder->queue[i];
         struct node_holder_frame *frame = frame_of(holder, page);
         size_t size = sizeof page + frame->size;
         if (frame->page == page && frame->size > 0 &&
-            cube_write(holder->letters->cube, 0, NODE_PAGE, frame, size) == 0) {
+            cube_write(holder->counted->cube, 0, NODE_PAGE, frame, size) == 0) {
             holder->hits += !frame->fresh;
             frame->fresh = false;
             holder->queue[i] = holder->queue[--holder->queued];
@@ -114,7 +114,7 @@ unsigned node_holder_send(struct node_holder *holder)
     }
     if (wanted_count > 0) {
         /* Pages for node 0 may have taken the room on the same link. */
-        if (node_letters_write(holder->letters, CUBE_HOST, NODE_PAGE_REQUEST,
+        if (node_counted_write(holder->counted, CUBE_HOST, NODE_PAGE_REQUEST,
                                wanted, wanted_count * sizeof wanted[0]) != 0) {
             for (i = 0; i < wanted_count; i++) {
                 frame_of(holder, wanted[i])->loading = false;

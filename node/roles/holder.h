@@ -7,7 +7,7 @@
  * frame before the host is asked, the holder always reads what comes, and
  * nothing deadlocks.  Work: one pass over the queue a call.
  *
- *     node_holder_start(&holder, arena, bytes, &letters, &setup, &why);
+ *     node_holder_start(&holder, arena, bytes, &counted, &setup, &why);
  *     node_holder_message(&holder, &message);
  *     moved = node_holder_send(&holder);
  */
@@ -32,7 +32,7 @@ struct node_holder_frame {
 };
 
 struct node_holder {
-    struct node_letters *letters;
+    struct node_counted *counted;
     uint32_t holders;
     struct node_holder_frame *frames;
     uint32_t frame_count, frames_used;
@@ -43,7 +43,7 @@ struct node_holder {
 };
 
 int node_holder_start(struct node_holder *holder, void *arena, size_t bytes,
-                      struct node_letters *letters,
+                      struct node_counted *counted,
                       const struct node_setup_message *setup, const char **why);
 
 /* A message of type NODE_PAGE_REQUEST or NODE_PAGE. */

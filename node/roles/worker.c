@@ -169,7 +169,7 @@ size_t node_worker_outbox_bytes(size_t memory)
 }
 
 int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
-                      struct node_letters *letters,
+                      struct node_counted *counted,
                       const struct node_setup_message *setup, const char **why)
 {
     const struct incode_ports ports = {
@@ -185,7 +185,7 @@ int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
         *why = "the node's memory does not hold its outboxes";
         return -1;
     }
-    worker->letters = letters;
+    worker->counted = counted;
     worker->setup = *setup;
     worker->credit = setup->credits;
     worker->outbox_bytes = (uint32_t)boxes;
@@ -244,7 +244,7 @@ static void take_unspill(struct node_worker *w, const uint8_t *data,
         w->fault = "a spilled list of a wrong size";
         return;
     }
-    if (header.epoch != w->epoch || header.letters != w->letters->received) {
+    if (header.epoch != w->epoch || header.sent != w->counted->received) {
         return;
     }
     memcpy(faces, data + sizeof header, header.count * sizeof faces[0]);
@@ -307,7 +307,7 @@ static void send_wanted(struct node_worker *w)
         uint32_t batch[NODE_PAGES_A_REQUEST];
         uint32_t count = 0, left = 0;
         uint16_t to = keeper(w, w->wanted[0]);
-        if (cube_room(w->letters->cube, to) == 0) {
+        if (cube_room(w->counted->cube, to) == 0) {
             return;
         }
         for (uint32_t i = 0; i < w->wanted_count; i++) {
@@ -319,7 +319,7 @@ static void send_wanted(struct node_worker *w)
         }
         w->wanted_count = left;
         w->in_flight += count;
-        INCODE_ASSERT(node_letters_write(w->letters, to, NODE_PAGE_REQUEST,
+        INCODE_ASSERT(node_counted_write(w->counted, to, NODE_PAGE_REQUEST,
                                          batch, count * sizeof batch[0]) == 0);
         w->bytes_out += count * sizeof batch[0];
     }
@@ -334,11 +334,11 @@ static bool send_first(struct node_worker *w, struct node_outbox *box)
     }
     if (slot->type != NODE_SPILL) {
         size_t at = slot->type == NODE_RESULT
-                        ? offsetof(struct node_result_header, letters)
-                        : offsetof(struct node_spill_header, letters);
-        memcpy(slot->data + at, &w->letters->sent, sizeof w->letters->sent);
+                        ? offsetof(struct node_result_header, sent)
+                        : offsetof(struct node_spill_header, sent);
+        memcpy(slot->data + at, &w->counted->sent, sizeof w->counted->sent);
     }
-    if (node_letters_write(w->letters, CUBE_HOST, slot->type, slot->data,
+    if (node_counted_write(w->counted, CUBE_HOST, slot->type, slot->data,
                            slot->size) != 0) {
         return false;
     }

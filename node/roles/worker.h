@@ -7,7 +7,7 @@
  * triangulator.  Work: node_worker_work closes at most NODE_STEPS stars, and
  * node_worker_send sends what the link takes.
  *
- *     node_worker_start(&worker, arena, bytes, &letters, &setup, &why);
+ *     node_worker_start(&worker, arena, bytes, &counted, &setup, &why);
  *     node_worker_job(&worker, &job, now_us);
  *     moved = node_worker_work(&worker) + node_worker_send(&worker, now_us);
  */
@@ -29,7 +29,7 @@ enum {
 };
 
 struct node_worker {
-    struct node_letters *letters;
+    struct node_counted *counted;
     struct incode_triangulator *triangulator;
     struct node_setup_message setup;
     uint32_t epoch;    /* of the job */
@@ -55,7 +55,7 @@ size_t node_worker_outbox_bytes(size_t memory);
 
 /* 0, or -1 where the memory does not suffice: *why says so. */
 int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
-                      struct node_letters *letters,
+                      struct node_counted *counted,
                       const struct node_setup_message *setup, const char **why);
 
 void node_worker_job(struct node_worker *worker,

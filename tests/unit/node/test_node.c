@@ -190,7 +190,7 @@ static void take(const struct cube_message *m)
     }
 }
 
-/* Letters are counted: they say so themselves, where it matters. */
+/* Messages are counted: they say so themselves, where it matters. */
 static int write_to(uint16_t to, uint8_t type, const void *data, size_t size)
 {
     int status = cube_write(world.cube, to, type, data, size);
@@ -231,7 +231,7 @@ static void serve(uint16_t to)
                                          &back.header.count, &error),
                          0);
         back.header.last = w->list.faces == 0;
-        back.header.letters = w->sent;
+        back.header.sent = w->sent;
         w->unspills = !back.header.last;
         assert_int_equal(write_to(to, NODE_UNSPILL, &back,
                                   sizeof back.header + 12 * back.header.count),

@@ -72,7 +72,7 @@ static void broadcasts_from_everywhere(void **unused)
     }
 }
 
-/* The host is wired to each of the first nodes: no letter of it makes a hop in
+/* The host is wired to each of the first nodes: no message of it makes a hop in
  * the dimensions in which those differ. */
 static void a_host_with_many_wires(void **unused)
 {
@@ -108,7 +108,7 @@ static void a_host_wired_to_all_needs_nobody_between(void **unused)
         assert_int_equal(cube_write(node, CUBE_HOST, 1, "one", 3), 0);
     }
     assert_int_equal(cube_write(host, CUBE_ALL, 2, "all", 3), 0);
-    unsigned letters[9] = {0};
+    unsigned counts[9] = {0};
     for (unsigned turn = 0; turn < 2000; turn++) {
         struct cube_message message;
         m->now_us += 50;
@@ -116,13 +116,13 @@ static void a_host_wired_to_all_needs_nobody_between(void **unused)
             struct cube *cube = m->places[i].cube;
             cube_poll(cube, m->now_us);
             while (cube_read(cube, &message)) {
-                letters[i]++;
+                counts[i]++;
                 cube_release(cube);
             }
         }
     }
     for (unsigned i = 0; i < 9; i++) {
-        assert_int_equal(letters[i], i < 8 ? 2 : 8);
+        assert_int_equal(counts[i], i < 8 ? 2 : 8);
         assert_int_equal(cube_statistics(m->places[i].cube)->passed_on, 0);
     }
     destroy(m);

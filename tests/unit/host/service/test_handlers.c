@@ -106,7 +106,7 @@ static void end(void)
     host_tetrahedra_free(&tets);
 }
 
-static bool gap; /* letters do not say how many went before them */
+static bool gap; /* messages do not say how many went before them */
 
 static int send(uint16_t source, uint8_t type, const void *data, size_t size,
                 struct host_error *error)
@@ -200,7 +200,7 @@ static void test_epochs(void **unused)
     end();
 }
 
-/* What comes after a letter that was lost does not count, and is a loss. */
+/* What comes after a message that was lost does not count, and is a loss. */
 static void test_gaps(void **unused)
 {
     (void)unused;
@@ -244,30 +244,30 @@ static void test_unfinished(void **unused)
     end();
 }
 
-static void answer(uint32_t start, uint32_t called, uint32_t received,
+static void answer(uint32_t start, uint32_t pinged, uint32_t received,
                    uint32_t sent)
 {
-    struct node_here_message here = {start, called, received, sent, 0};
+    struct node_pong_message pong = {start, pinged, received, sent, 0};
     struct host_error error = {0};
-    assert_int_equal(send(1, NODE_HERE, &here, sizeof here, &error), 0);
+    assert_int_equal(send(1, NODE_PONG, &pong, sizeof pong, &error), 0);
 }
 
-/* Letters that are missing, either way, and another start are losses; calls
+/* Messages that are missing, either way, and another start are losses; pings
  * that got lost before the first answer are none. */
 static void test_answers(void **unused)
 {
     (void)unused;
     static const struct {
-        uint32_t start, called, received, sent;
+        uint32_t start, pinged, received, sent;
         bool loss;
     } then[] = {{7, 5, 3, 1, false}, {7, 5, 4, 1, true}, {7, 5, 2, 1, true},
                 {7, 5, 3, 2, true},  {7, 5, 3, 0, true}, {8, 5, 3, 1, true}};
     for (size_t i = 0; i < sizeof then / sizeof then[0]; i++) {
         begin();
-        answer(7, 3, 1, 0); /* two calls went astray */
+        answer(7, 3, 1, 0); /* two pings went astray */
         assert_false(service.loss);
         assert_int_equal(service.here, 1);
-        answer(then[i].start, then[i].called, then[i].received, then[i].sent);
+        answer(then[i].start, then[i].pinged, then[i].received, then[i].sent);
         assert_int_equal(service.loss, then[i].loss);
         assert_int_equal(service.here, 1);
         end();
