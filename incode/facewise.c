@@ -36,7 +36,7 @@ static enum incode_outcome begin(struct incode_triangulator *t,
             return INCODE_WAIT;
     t->stats.make_tetra_calls++;
     incode_search_begin(t, &task->search, f, p[0], p[1], p[2], __builtin_inf());
-    task->search.query.boxed = task->search.query.timid = false;
+    task->search.query.boxed = task->search.query.strictly_beyond = false;
     task->kind = INCODE_TASK_SEARCH;
     if (t->setup.index == INCODE_GRID) {
         const struct incode_grid grid = {&t->walker, t->setup.lo, t->setup.hi,

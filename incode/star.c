@@ -41,8 +41,8 @@ static void take_faces(struct incode_triangulator *t, uint32_t limit)
     star->faces = 0;
     for (uint32_t i = 0; i < n; i++)
         push_face(star, &(struct incode_star_face){pairs[i][0], pairs[i][1],
-                                                   INCODE_GATHER_NONE,
-                                                   INCODE_GATHER_NONE});
+                                                   INCODE_LOCAL_NONE,
+                                                   INCODE_LOCAL_NONE});
 }
 
 static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c)
@@ -111,7 +111,7 @@ static bool is_kept(const struct incode_triangulator *t, const uint32_t f[4],
 
 /* Emits the tetrahedron f of positive orientation if it is the region's own,
  * and toggles its faces; `through`: the face (f[0], f[1], f[2]) was open and is
- * taken out already.  index: of f among the gathered. */
+ * taken out already.  index: of f among the local points. */
 static void star_build(struct incode_triangulator *t, const uint32_t f[4],
                        const double *const p[4], const uint16_t index[4],
                        bool through)
@@ -138,21 +138,21 @@ static void star_build(struct incode_triangulator *t, const uint32_t f[4],
     }
 }
 
-/* Hands the star's own tetrahedra to the port. */
+/* Hands the star's own tetrahedra out. */
 static void star_emit(struct incode_triangulator *t)
 {
     struct incode_star *star = &t->star;
     if (star->kept > 0)
-        t->ports.emit(t->ports.context, star->v,
-                      (const uint32_t(*)[3])star->apexes, star->kept);
+        t->outside.emit(t->outside.context, star->v,
+                        (const uint32_t(*)[3])star->apexes, star->kept);
     star->kept = 0;
 }
 
-/* ---- gathering ---- */
+/* ---- local points ---- */
 
-enum { NEAR_WANTED = 96, GATHER_TRIES = 64 };
+enum { NEAR_WANTED = 96, COPY_TRIES = 64 };
 
-/* Half-width of the box to gather: the extent of the leaf, times what has
+/* Half-width of the box of local points: the extent of the leaf, times what has
  * lately given the wanted number of points around a vertex. */
 static double first_radius(const struct incode_triangulator *t,
                            const double lo[3], const double hi[3])
@@ -181,11 +181,11 @@ static void learn_spread(struct incode_triangulator *t, uint32_t points)
 }
 
 /* Brings the points around the leaf of a vertex to hand. */
-static enum incode_outcome gather_leaf(struct incode_triangulator *t,
-                                       struct incode_task *task,
-                                       const struct incode_frame *f)
+static enum incode_outcome copy_around_leaf(struct incode_triangulator *t,
+                                            struct incode_task *task,
+                                            const struct incode_frame *f)
 {
-    struct incode_gather *g = &t->gather;
+    struct incode_local_points *local = &t->local;
     uint32_t leaf = task->v % INCODE_BRICK_POINTS / INCODE_LEAF_POINTS;
     double lo[3], hi[3];
     for (int d = 0; d < 3; d++) {
@@ -194,13 +194,13 @@ static enum incode_outcome gather_leaf(struct incode_triangulator *t,
     }
     double radius = first_radius(t, lo, hi);
     for (int tries = 0;; tries++) {
-        enum incode_gathered r =
-            incode_gather_around(g, &t->walker, &t->vicinity,
-                                 task->v / INCODE_LEAF_POINTS, lo, hi, radius);
-        task->page = g->query.missing;
-        if (r == INCODE_GATHER_WAIT)
+        enum incode_local_outcome r =
+            incode_local_around(local, &t->walker, &t->neighbours,
+                                task->v / INCODE_LEAF_POINTS, lo, hi, radius);
+        task->page = local->query.missing;
+        if (r == INCODE_LOCAL_WAIT)
             return INCODE_WAIT;
-        if (r == INCODE_GATHER_READY || tries == GATHER_TRIES)
+        if (r == INCODE_LOCAL_READY || tries == COPY_TRIES)
             return INCODE_OK;
         radius *= 0.75;
         t->spread *= 0.9;
@@ -208,8 +208,8 @@ static enum incode_outcome gather_leaf(struct incode_triangulator *t,
 }
 
 enum {
-    VICINITY_WANTED = 64, /* bricks, at least */
-    VICINITY_TRIES = 12
+    NEIGHBOURS_WANTED = 64, /* bricks, at least */
+    NEIGHBOURS_TRIES = 12
 };
 
 /* Lists the bricks around that of a vertex: more of them where there are few,
@@ -218,27 +218,28 @@ static enum incode_outcome list_bricks(struct incode_triangulator *t,
                                        struct incode_task *task,
                                        const struct incode_frame *f)
 {
-    struct incode_vicinity *v = &t->vicinity;
+    struct incode_neighbours *v = &t->neighbours;
     uint32_t brick = task->v / INCODE_BRICK_POINTS;
     double lo[3], hi[3], extent = 0;
     bool full = false;
     incode_frame_box(f, lo, hi);
     for (int d = 0; d < 3; d++)
         extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
-    for (int tries = 0; tries < VICINITY_TRIES; tries++) {
-        double radius = extent * t->reach, wide_lo[3], wide_hi[3];
+    for (int tries = 0; tries < NEIGHBOURS_TRIES; tries++) {
+        double radius = extent * t->reach, around_lo[3], around_hi[3];
         bool all = true;
         for (int d = 0; d < 3; d++) {
-            wide_lo[d] = lo[d] - radius;
-            wide_hi[d] = hi[d] + radius;
-            all = all && wide_lo[d] <= t->setup.lo[d] &&
-                  wide_hi[d] >= t->setup.hi[d];
+            around_lo[d] = lo[d] - radius;
+            around_hi[d] = hi[d] + radius;
+            all = all && around_lo[d] <= t->setup.lo[d] &&
+                  around_hi[d] >= t->setup.hi[d];
         }
-        enum incode_listed r = incode_vicinity_make(
-            v, &t->walker, brick, wide_lo, wide_hi, &task->page);
+        enum incode_listed r = incode_neighbours_make(
+            v, &t->walker, brick, around_lo, around_hi, &task->page);
         if (r == INCODE_LIST_WAIT)
             return INCODE_WAIT;
-        if (r == INCODE_LISTED && (full || all || v->count >= VICINITY_WANTED))
+        if (r == INCODE_LISTED &&
+            (full || all || v->count >= NEIGHBOURS_WANTED))
             break;
         full = full || r == INCODE_LIST_FULL;
         t->reach *= full ? 0.75 : 1.25;
@@ -255,47 +256,47 @@ static enum incode_outcome list_bricks(struct incode_triangulator *t,
     return INCODE_OK;
 }
 
-static enum incode_outcome star_gather(struct incode_triangulator *t,
+static enum incode_outcome star_points(struct incode_triangulator *t,
                                        struct incode_task *task)
 {
-    struct incode_gather *g = &t->gather;
+    struct incode_local_points *local = &t->local;
     uint32_t v = task->v, slot = v % INCODE_BRICK_POINTS;
     const struct incode_frame *f =
         incode_pager_get(&t->pager, v / INCODE_BRICK_POINTS);
     task->page = v / INCODE_BRICK_POINTS;
     if (f == NULL)
         return INCODE_WAIT;
-    if (t->vicinity.centre != v / INCODE_BRICK_POINTS &&
+    if (t->neighbours.centre != v / INCODE_BRICK_POINTS &&
         list_bricks(t, task, f) == INCODE_WAIT)
         return INCODE_WAIT;
-    if (g->leaf != v / INCODE_LEAF_POINTS &&
-        gather_leaf(t, task, f) == INCODE_WAIT)
+    if (local->leaf != v / INCODE_LEAF_POINTS &&
+        copy_around_leaf(t, task, f) == INCODE_WAIT)
         return INCODE_WAIT;
     const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
                          f->page.brick.z[slot]};
-    bool again = g->vertex == v; /* after a wait: nothing new to learn */
-    incode_gather_centre(g, v, p, g->radius, t->setup.lo, t->setup.hi);
+    bool again = local->vertex == v; /* after a wait: nothing new to learn */
+    incode_local_centre(local, v, p, local->radius, t->setup.lo, t->setup.hi);
     if (!again)
-        learn_spread(t, g->near);
+        learn_spread(t, local->near);
     return INCODE_OK;
 }
 
 /* ---- the star ---- */
 
-/* Index of vertex `id` among the gathered, fetched and appended if it is far;
- * INCODE_AGAIN: the room for far vertices is used up. */
+/* Index of vertex `id` among the local points, fetched and appended if it is
+ * far; INCODE_AGAIN: the room for far vertices is used up. */
 static enum incode_outcome resolve(struct incode_triangulator *t, uint32_t id,
                                    uint16_t *index, uint32_t *page)
 {
-    if (*index != INCODE_GATHER_NONE)
+    if (*index != INCODE_LOCAL_NONE)
         return INCODE_OK;
-    uint32_t i = incode_gather_find(&t->gather, id);
-    if (i == INCODE_GATHER_NONE) {
+    uint32_t i = incode_local_find(&t->local, id);
+    if (i == INCODE_LOCAL_NONE) {
         double p[3];
         if (!incode_fetch_point(t, id, p, page))
             return INCODE_WAIT;
-        i = incode_gather_append(&t->gather, id, p);
-        if (i == INCODE_GATHER_NONE)
+        i = incode_local_append(&t->local, id, p);
+        if (i == INCODE_LOCAL_NONE)
             return INCODE_AGAIN;
     }
     *index = (uint16_t)i;
@@ -305,15 +306,16 @@ static enum incode_outcome resolve(struct incode_triangulator *t, uint32_t id,
 static void build_at(struct incode_triangulator *t, uint16_t ib, uint16_t ic,
                      uint16_t ia)
 {
-    const struct incode_gather *g = &t->gather;
-    const uint16_t index[4] = {INCODE_GATHER_NONE, ib, ic, ia};
-    const uint32_t f[4] = {g->vertex, g->id[ib], g->id[ic], g->id[ia]};
+    const struct incode_local_points *local = &t->local;
+    const uint16_t index[4] = {INCODE_LOCAL_NONE, ib, ic, ia};
+    const uint32_t f[4] = {local->vertex, local->id[ib], local->id[ic],
+                           local->id[ia]};
     double p[4][3];
     for (int d = 0; d < 3; d++) {
-        p[0][d] = g->p0[d];
-        p[1][d] = g->p[d][ib];
-        p[2][d] = g->p[d][ic];
-        p[3][d] = g->p[d][ia];
+        p[0][d] = local->p0[d];
+        p[1][d] = local->p[d][ib];
+        p[2][d] = local->p[d][ic];
+        p[3][d] = local->p[d][ia];
     }
     const double *const q[4] = {p[0], p[1], p[2], p[3]};
     star_build(t, f, q, index, true);
@@ -341,7 +343,7 @@ static enum incode_outcome pursue(struct incode_triangulator *t,
         build_at(t, face->ib, face->ic, (uint16_t)apex);
         return INCODE_OK;
     }
-    t->stats.wide_searches++;
+    t->stats.tree_searches++;
     task->kind = INCODE_TASK_SEARCH;
     return INCODE_AGAIN;
 }
@@ -352,21 +354,21 @@ static enum incode_outcome use_found(struct incode_triangulator *t,
 {
     const struct incode_query *q = &task->search.query;
     struct incode_star *star = &t->star;
-    uint16_t index[3] = {INCODE_GATHER_NONE, INCODE_GATHER_NONE,
-                         INCODE_GATHER_NONE};
+    uint16_t index[3] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE,
+                         INCODE_LOCAL_NONE};
     if (q->best != INCODE_NONE) {
-        uint32_t i = incode_gather_find(&t->gather, q->best);
-        if (i == INCODE_GATHER_NONE)
-            i = incode_gather_append(&t->gather, q->best, q->best_p);
+        uint32_t i = incode_local_find(&t->local, q->best);
+        if (i == INCODE_LOCAL_NONE)
+            i = incode_local_append(&t->local, q->best, q->best_p);
         index[2] = (uint16_t)i;
         enum incode_outcome r = resolve(t, q->b, &index[0], &task->page);
         if (r == INCODE_OK)
             r = resolve(t, q->c, &index[1], &task->page);
-        if (r != INCODE_OK || i == INCODE_GATHER_NONE)
+        if (r != INCODE_OK || i == INCODE_LOCAL_NONE)
             return r != INCODE_OK ? r : INCODE_AGAIN;
     }
-    task->kind = INCODE_TASK_GATHER;
-    if (q->question == INCODE_QUERY_SUPPORT)
+    task->kind = INCODE_TASK_STAR;
+    if (q->question == INCODE_QUERY_HALF_SPACE)
         return INCODE_OK; /* the face is tried again with it */
     incode_search_learn(t, q);
     bool open = remove_face(star, q->b, q->c);
@@ -410,8 +412,8 @@ static enum incode_outcome advance(struct incode_triangulator *t,
 void incode_star_take(struct incode_triangulator *t, const uint32_t f[4],
                       const double *const p[4], bool through)
 {
-    static const uint16_t far[4] = {INCODE_GATHER_NONE, INCODE_GATHER_NONE,
-                                    INCODE_GATHER_NONE, INCODE_GATHER_NONE};
+    static const uint16_t far[4] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE,
+                                    INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
     struct incode_star *star = &t->star;
     star->v = f[0];
     star->faces = star->built = star->kept = 0;
@@ -434,7 +436,7 @@ enum incode_outcome incode_star_close(struct incode_triangulator *t,
         task->kind = INCODE_TASK_IDLE;
         return INCODE_OK;
     }
-    enum incode_outcome r = star_gather(t, task);
+    enum incode_outcome r = star_points(t, task);
     while (r == INCODE_OK && star->faces > 0) {
         if (star->built >= t->built_max) {
             r = INCODE_AGAIN;

@@ -21,23 +21,23 @@ enum {
     INCODE_SPILL_FACES = 1024,
     INCODE_SPILL_BUILT = 128, /* tetrahedra a step while faces are spilled */
     INCODE_HULL_PLANES = 8,
-    INCODE_SUPPORTS = 8,
+    INCODE_HALF_SPACES = 8,
     INCODE_HUBS = 32,
     INCODE_PATIENCE = 8 /* retries before a task runs alone */
 };
 
-/* A search beyond the gathered points: box after box, then the sphere. */
+/* A search beyond the local points: box after box, then the sphere. */
 struct incode_search {
     struct incode_query query;
     double radius;
     bool final;
-    bool flat;       /* the face is of the hull's side up to rounding */
+    bool degenerate; /* the face is of the hull's side up to rounding */
     uint64_t looked; /* candidates so far */
 };
 
 enum incode_task_kind {
     INCODE_TASK_IDLE,
-    INCODE_TASK_GATHER, /* waits for the points around its vertex */
+    INCODE_TASK_STAR,   /* waits for the points around its vertex */
     INCODE_TASK_SEARCH, /* waits within the search of an apex */
     INCODE_TASK_FOUND,  /* the search is over, the face not yet built */
     INCODE_TASK_SEED
@@ -70,7 +70,7 @@ struct incode_task {
 
 struct incode_star_face {
     uint32_t b, c;
-    uint16_t ib, ic; /* among the gathered, or INCODE_GATHER_NONE */
+    uint16_t ib, ic; /* among the local points, or INCODE_LOCAL_NONE */
 };
 
 struct incode_star {
@@ -90,7 +90,7 @@ struct incode_hull_plane {
 
 struct incode_triangulator {
     struct incode_setup setup;
-    struct incode_ports ports;
+    struct incode_outside outside;
     struct incode_job job;
     struct incode_tree tree;
     struct incode_pager pager;
@@ -121,18 +121,19 @@ struct incode_triangulator {
 
     uint32_t room_faces, room_bricks; /* kept free before a star */
     uint32_t built_max;
-    double spread;  /* gather radius in units of the leaf's extent */
-    double reach;   /* of the vicinity, in units of the brick's extent */
+    double
+        spread;   /* radius of the local points in units of the leaf's extent */
+    double reach; /* of the neighbours, in units of the brick's extent */
     uint32_t sweep; /* index `naive`: the brick last looked at */
     struct incode_task tasks[INCODE_TASKS];
     struct incode_hull_plane planes[INCODE_HULL_PLANES];
     uint32_t plane_count, plane_next;
-    struct incode_support supports[INCODE_SUPPORTS];
-    uint32_t support_count, support_next;
-    struct incode_empties empties;
+    struct incode_half_space half_spaces[INCODE_HALF_SPACES];
+    uint32_t half_space_count, half_space_next;
+    struct incode_empty_spheres empty;
     struct incode_star star;
-    struct incode_vicinity vicinity;
-    struct incode_gather gather;
+    struct incode_neighbours neighbours;
+    struct incode_local_points local;
 };
 
 enum incode_outcome {
@@ -188,7 +189,7 @@ void incode_front_reached(struct incode_triangulator *t, uint32_t v);
 /* Makes room for one star, spilling what comes last; false: the caller waits
  * (INCODE_AGAIN) or, with t->fault set, is broken. */
 bool incode_front_room(struct incode_triangulator *t);
-/* Sends what waits in the spill buffer; false: no room at the port. */
+/* Sends what waits in the spill buffer; false: it has no room. */
 bool incode_front_flush(struct incode_triangulator *t);
 /* Where a vertex has too many open faces, makes it a hub and moves some of them
  * to its neighbours' lists, so that the front at it stays as short as the work
@@ -216,7 +217,7 @@ enum incode_near {
     INCODE_NEAR_HULL,  /* no point lies beyond the face */
     INCODE_NEAR_SEARCH /* only the whole set can tell: *s is begun */
 };
-/* MakeTetra among the gathered points for the face (vertex, b, c); b, c and
+/* MakeTetra among the local points for the face (vertex, b, c); b, c and
  * *apex are indices among them. */
 enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
                                   uint32_t c, uint32_t *apex,

@@ -26,14 +26,14 @@ static size_t round_up(size_t bytes)
 static uint32_t copies_of(size_t bytes)
 {
     size_t copies = bytes >> 15;
-    return copies < COPIES_MIN               ? COPIES_MIN
-           : copies > INCODE_VICINITY_COPIES ? INCODE_VICINITY_COPIES
-                                             : (uint32_t)copies;
+    return copies < COPIES_MIN                 ? COPIES_MIN
+           : copies > INCODE_NEIGHBOURS_COPIES ? INCODE_NEIGHBOURS_COPIES
+                                               : (uint32_t)copies;
 }
 
 static size_t control_bytes(size_t bytes)
 {
-    struct incode_vicinity *v = NULL;
+    struct incode_neighbours *v = NULL;
     return round_up(sizeof(struct incode_triangulator)) +
            copies_of(bytes) * sizeof *v->point;
 }
@@ -45,7 +45,7 @@ static bool fill_map(struct incode_map *map, size_t bytes)
 {
     memset(map, 0, sizeof *map);
     map->control = control_bytes(bytes);
-    map->gather = sizeof(struct incode_gather);
+    map->local_points = sizeof(struct incode_local_points);
     map->tasks = sizeof(struct incode_task) * INCODE_TASKS;
     if (bytes < map->control)
         return false;
@@ -88,7 +88,7 @@ size_t incode_arena_min(const struct incode_setup *setup)
 struct incode_triangulator *
 incode_triangulator_init(void *arena, size_t bytes,
                          const struct incode_setup *setup,
-                         const struct incode_ports *ports, const char **why)
+                         const struct incode_outside *outside, const char **why)
 {
     struct incode_map map;
     if (!fill_map(&map, bytes)) {
@@ -102,7 +102,7 @@ incode_triangulator_init(void *arena, size_t bytes,
     struct incode_triangulator *t = arena;
     memset(t, 0, sizeof *t);
     t->setup = *setup;
-    t->ports = *ports;
+    t->outside = *outside;
     t->map = map;
     uint8_t *memory = (uint8_t *)arena + map.control;
     incode_afl_init(&t->afl, memory, (uint32_t)map.afl_faces,
@@ -110,8 +110,8 @@ incode_triangulator_init(void *arena, size_t bytes,
     memory += round_up(map.afl + map.bricks);
     incode_pager_init(&t->pager, memory, (uint32_t)map.frame_count,
                       setup->bricks);
-    t->pager.request = ports->request;
-    t->pager.context = ports->context;
+    t->pager.request = outside->request;
+    t->pager.context = outside->context;
     t->pager.shuffle = setup->shuffle_seed;
     uint32_t cells = setup->index == INCODE_GRID
                          ? setup->cells[0] * setup->cells[1] * setup->cells[2]
@@ -119,11 +119,11 @@ incode_triangulator_init(void *arena, size_t bytes,
     incode_tree_init(&t->tree, setup->bricks, cells);
     t->walker = (struct incode_walker){&t->pager, &t->tree, &t->stats.tally,
                                        &t->stats.candidates};
-    t->gather.pages_max = (uint32_t)map.frame_count / 2;
-    incode_gather_reset(&t->gather);
-    t->vicinity.centre = INCODE_NONE;
-    t->vicinity.point = (void *)((uint8_t *)arena + round_up(sizeof *t));
-    t->vicinity.room = copies_of(bytes);
+    t->local.pages_max = (uint32_t)map.frame_count / 2;
+    incode_local_reset(&t->local);
+    t->neighbours.centre = INCODE_NONE;
+    t->neighbours.point = (void *)((uint8_t *)arena + round_up(sizeof *t));
+    t->neighbours.room = copies_of(bytes);
     t->spread = 1.6;
     t->reach = 2;
     t->window = 4;
@@ -209,9 +209,9 @@ static enum incode_step run(struct incode_triangulator *t,
     bool fresh = task->retries == 0;
     t->built_max = t->spill_from < t->setup.bricks ? INCODE_SPILL_BUILT
                                                    : INCODE_STAR_BUILT;
-    size_t port_room = t->ports.emit_room(t->ports.context);
-    if (t->built_max > port_room)
-        t->built_max = (uint32_t)port_room;
+    size_t room = t->outside.emit_room(t->outside.context);
+    if (t->built_max > room)
+        t->built_max = (uint32_t)room;
     enum incode_outcome r;
     if (seed || task->kind == INCODE_TASK_SEED)
         r = incode_seed_run(t, task);
@@ -286,7 +286,7 @@ static enum incode_step run_new(struct incode_triangulator *t, uint32_t v,
     task->v = v;
     task->retries = 0;
     task->born = 0;
-    task->kind = INCODE_TASK_GATHER;
+    task->kind = INCODE_TASK_STAR;
     return run(t, task, seed);
 }
 
@@ -311,7 +311,7 @@ static void fetch_spilled(struct incode_triangulator *t)
     if (t->unspill_pending || !incode_front_flush(t))
         return;
     uint32_t brick = (t->job.first + t->spill_from) % t->setup.bricks;
-    if (!t->ports.unspill(t->ports.context, brick))
+    if (!t->outside.unspill(t->outside.context, brick))
         return;
     t->unspill_brick = brick;
     t->unspill_pending = true;
@@ -386,7 +386,7 @@ static enum incode_step pass_brick(struct incode_triangulator *t)
 {
     uint32_t brick = t->job.first + t->current;
     if (!incode_front_has_hub(t, brick)) {
-        t->ports.commit(t->ports.context, brick);
+        t->outside.commit(t->outside.context, brick);
         incode_afl_drop(&t->afl, brick);
     }
     t->current++;
@@ -473,7 +473,7 @@ static enum incode_step finish(struct incode_triangulator *t)
     while (t->hub_count > 0) {
         uint32_t brick = t->hubs[--t->hub_count] / INCODE_BRICK_POINTS;
         if (incode_own_brick(t, brick) && !incode_front_has_hub(t, brick))
-            t->ports.commit(t->ports.context, brick);
+            t->outside.commit(t->outside.context, brick);
     }
     for (uint32_t i = 0; i < t->afl.touched_max; i++)
         if (incode_touched_used(&t->afl.touched[i]))
@@ -525,7 +525,7 @@ static enum incode_step step(struct incode_triangulator *t)
         drop_spilled_tasks(t);
         return t->spill_cursor != INCODE_NONE ? INCODE_WORKED : INCODE_WAITING;
     }
-    if (t->ports.emit_room(t->ports.context) < EMIT_ROOM_MIN)
+    if (t->outside.emit_room(t->outside.context) < EMIT_ROOM_MIN)
         return INCODE_WAITING;
     if (incode_front_drain(t))
         return INCODE_WORKED;

@@ -8,7 +8,7 @@
  * `naive` and `grid` it builds at most one tetrahedron, and looks at no more
  * than 256 pages of points or about 4,096 rows of cells and points.
  *
- *     incode_triangulator_init(&t, arena, bytes, &setup, &ports, &error);
+ *     incode_triangulator_init(&t, arena, bytes, &setup, &outside, &error);
  *     incode_triangulator_start(&t, &job);
  *     while (incode_triangulator_step(&t) != INCODE_FINISHED) deliver pages;
  */
@@ -55,7 +55,7 @@ struct incode_face {
 };
 
 /* How the triangulator reaches the world.  All calls return at once. */
-struct incode_ports {
+struct incode_outside {
     void *context;
     /* Asks for a page; the frame is reserved.  False: no credit now, the
      * triangulator asks again later. */
@@ -79,13 +79,13 @@ struct incode_ports {
 /* The memory map: bytes of each table, summing to at most the arena. */
 struct incode_map {
     size_t control, frames, frame_count, afl, afl_faces, bricks, brick_entries,
-        gather, tasks, total;
+        local_points, tasks, total;
 };
 
 struct incode_statistics {
     uint64_t tetrahedra_built, tetrahedra_kept, make_tetra_calls, hull_facets;
     uint64_t candidates; /* points whose distance was evaluated */
-    uint64_t wide_searches, seeds, vertices, vertices_waited;
+    uint64_t tree_searches, seeds, vertices, vertices_waited;
     uint64_t page_requests, page_faults, page_evictions;
     uint64_t afl_max, afl_spilled;
     uint64_t memory_high_water; /* bytes of the arena ever in use */
@@ -103,10 +103,9 @@ size_t incode_arena_min(const struct incode_setup *setup);
 
 /* Divides the arena (aligned to 64 bytes).  Returns the triangulator inside
  * it, or NULL with *why set to a static string. */
-struct incode_triangulator *
-incode_triangulator_init(void *arena, size_t bytes,
-                         const struct incode_setup *setup,
-                         const struct incode_ports *ports, const char **why);
+struct incode_triangulator *incode_triangulator_init(
+    void *arena, size_t bytes, const struct incode_setup *setup,
+    const struct incode_outside *outside, const char **why);
 
 /* Begins a job; the one before must be finished or is abandoned.  Resident
  * pages stay. */

@@ -230,7 +230,7 @@ static void fill_map(const struct node *n, struct node_map *map)
     map->afl_faces = (uint32_t)t->afl_faces;
     map->bricks = (uint32_t)t->bricks;
     map->brick_entries = (uint32_t)t->brick_entries;
-    map->gather = (uint32_t)t->gather;
+    map->gather = (uint32_t)t->local_points;
     map->tasks = (uint32_t)t->tasks;
 }
 

@@ -101,10 +101,10 @@ static int work(struct reference *r)
 static int triangulate(struct reference *r, void *arena, size_t bytes,
                        const struct incode_setup *setup)
 {
-    const struct incode_ports ports = {r,      request, emit_room, emit,
-                                       commit, spill,   unspill};
+    const struct incode_outside outside = {r,      request, emit_room, emit,
+                                           commit, spill,   unspill};
     const char *why = NULL;
-    r->t = incode_triangulator_init(arena, bytes, setup, &ports, &why);
+    r->t = incode_triangulator_init(arena, bytes, setup, &outside, &why);
     if (r->t == NULL) {
         return host_fail(r->error, HOST_BROKEN,
                          "the triangulator alone: %s; please report this", why);

@@ -80,7 +80,7 @@ bool incode_front_flush(struct incode_triangulator *t)
 {
     if (t->spill_count == 0)
         return true;
-    if (!t->ports.spill(t->ports.context, t->spill, t->spill_count))
+    if (!t->outside.spill(t->outside.context, t->spill, t->spill_count))
         return false;
     t->spill_count = 0;
     return true;
@@ -187,8 +187,8 @@ static uint32_t spill_position(const struct incode_triangulator *t)
     return nearest + 1 + (farthest - nearest) / 2;
 }
 
-/* Moves a brick's faces and marks out, as far as the port has room; true: all
- * of them. */
+/* Moves a brick's faces and marks out, as far as there is room for them; true:
+ * all of them. */
 static bool evict_brick(struct incode_triangulator *t,
                         const struct incode_touched *entry)
 {

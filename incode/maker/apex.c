@@ -6,10 +6,11 @@
 #include "close_candidates.h"
 #include "simd.h"
 
-/* MakeTetra: the apex of a face.  Among the gathered points, single precision
+/* MakeTetra: the apex of a face.  Among the local points, single precision
  * proposes and the sphere's rigorous bound leaves the few that the predicates
  * must compare; the answer stands when the closed cap of the sphere lies in the
- * gathered box.  Otherwise the tree is searched, near boxes first. */
+ * box of the local points.  Otherwise the tree is searched, near boxes first.
+ */
 
 bool incode_fetch_point(struct incode_triangulator *t, uint32_t v, double p[3],
                         uint32_t *page)
@@ -56,13 +57,13 @@ void incode_hull_remember(struct incode_triangulator *t,
         t->plane_count++;
 }
 
-/* Remembers a certified hull facet, if some gathered point is below it. */
+/* Remembers a certified hull facet, if some local point is below it. */
 static void remember_plane(struct incode_triangulator *t,
                            const struct incode_query *q)
 {
-    const struct incode_gather *g = &t->gather;
-    for (uint32_t i = 0; i < g->count; i++) {
-        double p[3] = {g->p[0][i], g->p[1][i], g->p[2][i]};
+    const struct incode_local_points *local = &t->local;
+    for (uint32_t i = 0; i < local->count; i++) {
+        double p[3] = {local->p[0][i], local->p[1][i], local->p[2][i]};
         if (incode_orient3d(&t->stats.tally, q->pv, q->pb, q->pc, p) < 0) {
             incode_hull_remember(t, q, p);
             return;
@@ -84,7 +85,7 @@ void incode_search_box(struct incode_triangulator *t, struct incode_search *s)
         all = all && q->lo[d] <= t->setup.lo[d] && q->hi[d] >= t->setup.hi[d];
     }
     q->boxed = !all;
-    q->timid = !s->flat;
+    q->strictly_beyond = !s->degenerate;
     q->cursor = 0;
 }
 
@@ -92,7 +93,7 @@ void incode_search_last(struct incode_search *s)
 {
     struct incode_query *q = &s->query;
     s->final = true;
-    q->done = q->timid = false;
+    q->done = q->strictly_beyond = false;
     q->cursor = 0;
     incode_query_shrink(q);
 }
@@ -114,7 +115,7 @@ void incode_search_begin(struct incode_triangulator *t, struct incode_search *s,
     incode_query_face(q);
     /* A radius that vanished among denormals could not grow again. */
     s->radius = radius > DBL_MIN ? radius : DBL_MIN;
-    s->final = s->flat = false;
+    s->final = s->degenerate = false;
     s->looked = 0;
     incode_search_box(t, s);
 }
@@ -137,7 +138,7 @@ void incode_search_learn(struct incode_triangulator *t,
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
     if (q->best != INCODE_NONE && q->shrinking &&
         q->looked >= INCODE_QUERY_CROWD)
-        incode_empties_add(&t->empties, p, q->scale);
+        incode_empty_spheres_add(&t->empty, p, q->scale);
 }
 
 enum incode_outcome incode_search_run(struct incode_triangulator *t,
@@ -151,11 +152,11 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
         s->looked += t->stats.candidates - before;
         if (r == INCODE_WALK_WAIT)
             return INCODE_WAIT;
-        if (q->question == INCODE_QUERY_SUPPORT) {
-            t->supports[t->support_next] = q->support;
-            t->support_next = (t->support_next + 1) % INCODE_SUPPORTS;
-            if (t->support_count < INCODE_SUPPORTS)
-                t->support_count++;
+        if (q->question == INCODE_QUERY_HALF_SPACE) {
+            t->half_spaces[t->half_space_next] = q->half_space;
+            t->half_space_next = (t->half_space_next + 1) % INCODE_HALF_SPACES;
+            if (t->half_space_count < INCODE_HALF_SPACES)
+                t->half_space_count++;
             return INCODE_OK;
         }
         if (s->final) {
@@ -171,12 +172,12 @@ enum incode_outcome incode_search_run(struct incode_triangulator *t,
         q->done = true;
         memcpy(q->done_lo, q->lo, sizeof q->lo);
         memcpy(q->done_hi, q->hi, sizeof q->hi);
-        s->radius *= s->flat ? 2 : 4;
+        s->radius *= s->degenerate ? 2 : 4;
         incode_search_box(t, s);
     }
 }
 
-/* ---- among the gathered points ---- */
+/* ---- among the local points ---- */
 
 /* A regular face's circumcentre is right to 1e-9 of its distance: the sine of
  * its angle at v is at least 1/100. */
@@ -266,24 +267,25 @@ bool incode_sphere_fits(const double wall[8], const struct incode_sphere *s)
     return incode_cap_fits(wall, &pencil, t * unit);
 }
 
-static void copy_point(double p[3], const struct incode_gather *g, uint32_t i)
+static void copy_point(double p[3], const struct incode_local_points *local,
+                       uint32_t i)
 {
-    p[0] = g->p[0][i];
-    p[1] = g->p[1][i];
-    p[2] = g->p[2][i];
+    p[0] = local->p[0][i];
+    p[1] = local->p[1][i];
+    p[2] = local->p[2][i];
 }
 
 /* Takes i as the best if it is strictly beyond the face and inside the best's
  * sphere. */
 static void consider(struct incode_make *n, uint32_t i)
 {
-    struct incode_gather *g = &n->t->gather;
+    struct incode_local_points *local = &n->t->local;
     struct incode_tally *tally = &n->t->stats.tally;
-    if (i == n->b || i == n->c || i == n->best || i == g->self)
+    if (i == n->b || i == n->c || i == n->best || i == local->self)
         return;
     double p[3], r[3];
-    incode_gather_relative(g, i, r);
-    bool any = n->best != INCODE_GATHER_NONE, inside = !any;
+    incode_local_relative(local, i, r);
+    bool any = n->best != INCODE_LOCAL_NONE, inside = !any;
     if (any) {
         double value = incode_sphere_value(&n->sphere, r);
         double error = incode_sphere_error(&n->sphere, r);
@@ -295,7 +297,7 @@ static void consider(struct incode_make *n, uint32_t i)
     double error = incode_plane_error(&n->sphere, r);
     if (level < -error)
         return;
-    copy_point(p, g, i);
+    copy_point(p, local, i);
     if (!(level > error) && incode_orient3d(tally, n->pv, n->pb, n->pc, p) <= 0)
         return;
     if (!inside &&
@@ -304,19 +306,19 @@ static void consider(struct incode_make *n, uint32_t i)
     n->best = i;
     memcpy(n->store[3], p, sizeof p);
     incode_sphere_apex(&n->sphere, n->rb, n->rc, r);
-    if (incode_sphere_is_blurred(&n->sphere))
-        incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, p, g->scale);
+    if (incode_sphere_is_ill_conditioned(&n->sphere))
+        incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, p, local->scale);
 }
 
 void incode_make_sphere(struct incode_make *n)
 {
     double r[3];
-    copy_point(n->store[3], &n->t->gather, n->best);
-    incode_gather_relative(&n->t->gather, n->best, r);
+    copy_point(n->store[3], &n->t->local, n->best);
+    incode_local_relative(&n->t->local, n->best, r);
     incode_sphere_apex(&n->sphere, n->rb, n->rc, r);
-    if (incode_sphere_is_blurred(&n->sphere))
+    if (incode_sphere_is_ill_conditioned(&n->sphere))
         incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, n->store[3],
-                             n->t->gather.scale);
+                             n->t->local.scale);
     n->bare = false;
 }
 
@@ -325,47 +327,47 @@ void incode_make_sphere(struct incode_make *n)
 static bool rank_first(struct incode_make *n, const uint16_t *first,
                        uint32_t count)
 {
-    const struct incode_gather *g = &n->t->gather;
-    struct incode_finals finals;
-    uint16_t index[INCODE_FINALISTS];
-    if (!incode_finals_may_tell(n->rb, n->rc))
+    const struct incode_local_points *local = &n->t->local;
+    struct incode_close_candidates close;
+    uint16_t index[INCODE_CLOSE_MAX];
+    if (!incode_close_may_tell(n->rb, n->rc))
         return false;
-    finals.count = 0;
+    close.count = 0;
     for (uint32_t i = 0; i <= count; i++) {
         double p[3];
         if (i < count) {
-            if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
+            if (first[i] == n->b || first[i] == n->c || first[i] == local->self)
                 continue;
-            copy_point(p, g, first[i]);
-            index[finals.count] = first[i];
-            (void)incode_finals_add(&finals, p);
-            if (finals.count < INCODE_FINALISTS)
+            copy_point(p, local, first[i]);
+            index[close.count] = first[i];
+            (void)incode_close_add(&close, p);
+            if (close.count < INCODE_CLOSE_MAX)
                 continue;
         }
-        uint32_t k = incode_finals_first(&finals, n->pv, n->pb, n->pc, g->scale,
-                                         &n->t->stats.tally);
-        if (k == INCODE_FINALS_NONE)
+        uint32_t k = incode_close_first(&close, n->pv, n->pb, n->pc,
+                                        local->scale, &n->t->stats.tally);
+        if (k == INCODE_CLOSE_NONE)
             return false;
         index[0] = index[k];
-        copy_point(p, g, index[0]);
-        finals.count = 0;
-        (void)incode_finals_add(&finals, p);
+        copy_point(p, local, index[0]);
+        close.count = 0;
+        (void)incode_close_add(&close, p);
     }
     n->best = index[0];
     return true;
 }
 
 /* The best of the first in the pencil, at *t of it; false: it does not stand
- * against the other points at hand yet. */
+ * against the other local points yet. */
 static bool contest_first(struct incode_make *n, double *t)
 {
-    const struct incode_gather *g = &n->t->gather;
+    const struct incode_local_points *local = &n->t->local;
     uint16_t first[INCODE_NEAR_ALL];
     double most;
-    uint32_t only = INCODE_GATHER_NONE, others = 0;
-    uint32_t count = incode_gather_first(g, &n->pencil, &most, first);
+    uint32_t only = INCODE_LOCAL_NONE, others = 0;
+    uint32_t count = incode_local_first(local, &n->pencil, &most, first);
     for (uint32_t i = 0; i < count; i++) {
-        if (first[i] == n->b || first[i] == n->c || first[i] == g->self)
+        if (first[i] == n->b || first[i] == n->c || first[i] == local->self)
             continue;
         only = first[i];
         others++;
@@ -376,9 +378,9 @@ static bool contest_first(struct incode_make *n, double *t)
         n->best = only;
     for (uint32_t i = 0; i < count && !n->bare; i++)
         consider(n, first[i]);
-    if (n->best != INCODE_GATHER_NONE) {
+    if (n->best != INCODE_LOCAL_NONE) {
         double r[3];
-        incode_gather_relative(g, n->best, r);
+        incode_local_relative(local, n->best, r);
         if (incode_pencil_place(&n->pencil, r, t) &&
             incode_pencil_later(&n->pencil, *t) < most)
             return true;
@@ -387,70 +389,70 @@ static bool contest_first(struct incode_make *n, double *t)
         incode_make_sphere(n);
     } else if (n->bare) {
         n->bare = false;
-        n->best = INCODE_GATHER_NONE;
+        n->best = INCODE_LOCAL_NONE;
         for (uint32_t i = 0; i < count; i++)
             consider(n, first[i]);
     }
     return false;
 }
 
-/* The best of all points at hand, by the predicates where bounds do not tell.
+/* The best of all local points, by the predicates where bounds do not tell.
  * Of an irregular face's candidates none has been looked at. */
 static void contest(struct incode_make *n)
 {
-    const struct incode_gather *g = &n->t->gather;
+    const struct incode_local_points *local = &n->t->local;
     uint16_t inside[INCODE_NEAR_ALL];
-    for (uint32_t i = 0; i < g->near && !n->regular; i++)
-        consider(n, g->at[i]);
-    if (n->best == INCODE_GATHER_NONE)
+    for (uint32_t i = 0; i < local->near && !n->regular; i++)
+        consider(n, local->at[i]);
+    if (n->best == INCODE_LOCAL_NONE)
         return;
-    uint32_t count = incode_gather_inside(g, &n->sphere, inside);
+    uint32_t count = incode_local_inside(local, &n->sphere, inside);
     for (uint32_t i = 0; i < count; i++)
         consider(n, inside[i]);
 }
 
 static enum incode_near contest_all(struct incode_make *n)
 {
-    const struct incode_gather *g = &n->t->gather;
+    const struct incode_local_points *local = &n->t->local;
     bool fits;
     double t;
-    n->t->stats.candidates += g->near;
+    n->t->stats.candidates += local->near;
     if (n->regular && contest_first(n, &t)) {
-        fits = incode_cap_fits(g->wall, &n->pencil, t);
+        fits = incode_cap_fits(local->wall, &n->pencil, t);
         return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
     }
     contest(n);
-    if (n->best == INCODE_GATHER_NONE)
+    if (n->best == INCODE_LOCAL_NONE)
         return incode_hull_known(n->t, n->pv, n->pb, n->pc)
                    ? INCODE_NEAR_HULL
                    : INCODE_NEAR_SEARCH;
-    fits = incode_sphere_fits(g->wall, &n->sphere);
+    fits = incode_sphere_fits(local->wall, &n->sphere);
     return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
 }
 
 void incode_search_from(struct incode_make *n, struct incode_search *s)
 {
-    const struct incode_gather *g = &n->t->gather;
+    const struct incode_local_points *local = &n->t->local;
     struct incode_query *q = &s->query;
     memset(q, 0, sizeof *q);
     q->question = INCODE_QUERY_APEX;
-    q->v = g->vertex;
-    q->b = g->id[n->b];
-    q->c = g->id[n->c];
+    q->v = local->vertex;
+    q->b = local->id[n->b];
+    q->c = local->id[n->c];
     memcpy(q->pv, n->pv, sizeof q->pv);
     memcpy(q->pb, n->pb, sizeof q->pb);
     memcpy(q->pc, n->pc, sizeof q->pc);
-    q->scale = g->scale;
+    q->scale = local->scale;
     memcpy(q->rb, n->rb, sizeof q->rb);
     memcpy(q->rc, n->rc, sizeof q->rc);
     q->best = INCODE_NONE;
-    q->empties = &n->t->empties;
-    s->radius = g->radius > DBL_MIN ? g->radius : DBL_MIN;
-    s->looked = g->near;
+    q->empty = &n->t->empty;
+    s->radius = local->radius > DBL_MIN ? local->radius : DBL_MIN;
+    s->looked = local->near;
     s->final = false;
-    s->flat = n->flat.known;
-    q->flat = n->flat;
-    if (n->best == INCODE_GATHER_NONE) {
+    s->degenerate = n->degenerate.known;
+    q->degenerate = n->degenerate;
+    if (n->best == INCODE_LOCAL_NONE) {
         q->sphere = n->sphere;
         s->radius *= 2;
         incode_search_box(n->t, s);
@@ -459,106 +461,108 @@ void incode_search_from(struct incode_make *n, struct incode_search *s)
     if (n->bare)
         incode_make_sphere(n);
     q->sphere = n->sphere;
-    incode_query_start(q, g->id[n->best], n->store[3]);
+    incode_query_start(q, local->id[n->best], n->store[3]);
     incode_search_last(s);
     q->done = true;
-    memcpy(q->done_lo, g->lo, sizeof g->lo);
-    memcpy(q->done_hi, g->hi, sizeof g->hi);
+    memcpy(q->done_lo, local->lo, sizeof local->lo);
+    memcpy(q->done_hi, local->hi, sizeof local->hi);
 }
 
-/* ---- faces among points flat up to rounding ---- */
+/* ---- faces among points coplanar up to rounding ---- */
 
-enum { FLAT_POINTS = 3, FLAT_ASKED = 12 };
+enum { COPLANAR_POINTS = 3, COPLANAR_ASKED = 12 };
 
-/* Whether no sphere tells where the apex is, and points at hand are in doubt
+/* Whether no sphere tells where the apex is, and local points are in doubt
  * about the face or the face itself is thin. */
 static bool is_doubtful(const struct incode_make *n)
 {
-    const struct incode_gather *g = &n->t->gather;
+    const struct incode_local_points *local = &n->t->local;
     const struct incode_sphere *s = &n->sphere;
     uint32_t count = 0;
-    if (n->best != INCODE_GATHER_NONE)
-        return !n->bare && incode_sphere_is_vast(s);
+    if (n->best != INCODE_LOCAL_NONE)
+        return !n->bare && incode_sphere_is_near_degenerate(s);
     if (!n->regular)
         return true;
-    for (uint32_t i = 0; i < g->near && count < FLAT_POINTS; i++) {
-        uint32_t at = g->at[i];
+    for (uint32_t i = 0; i < local->near && count < COPLANAR_POINTS; i++) {
+        uint32_t at = local->at[i];
         double r[3];
-        incode_gather_relative(g, at, r);
+        incode_local_relative(local, at, r);
         double level = __builtin_fabs(incode_dot(s->n, r));
-        count += at != g->self && at != n->b && at != n->c &&
+        count += at != local->self && at != n->b && at != n->c &&
                  level < 1e3 * incode_plane_error(s, r);
     }
-    return count == FLAT_POINTS;
+    return count == COPLANAR_POINTS;
 }
 
-/* What is known of a regular face's direction: no support; one far above, as
+/* What is known of a regular face's direction: no half-space; one far above, as
  * within the set; or one that the face lies in.  A thin face has no direction,
  * and is taken for one of the hull's side. */
-enum lie { UNSUPPORTED, DEEP, FLAT };
+enum lie { UNKNOWN, INTERIOR, COPLANAR };
 
 static enum lie lie_of(const struct incode_make *n)
 {
     const struct incode_triangulator *t = n->t;
     const struct incode_sphere *sphere = &n->sphere;
-    enum lie lie = n->regular ? UNSUPPORTED : FLAT;
-    for (uint32_t i = 0; i < t->support_count && lie != FLAT; i++) {
-        const struct incode_support *s = &t->supports[i];
-        if (!incode_support_faces(s, sphere->n))
+    enum lie lie = n->regular ? UNKNOWN : COPLANAR;
+    for (uint32_t i = 0; i < t->half_space_count && lie != COPLANAR; i++) {
+        const struct incode_half_space *s = &t->half_spaces[i];
+        if (!incode_half_space_faces(s, sphere->n))
             continue;
-        double most = s->most[0] - incode_support_height(s, n->pv).hi;
-        double size = incode_max_norm(s->n) * s->scale / t->gather.scale;
-        lie = most < 1e-6 * size * (sphere->lb + sphere->lc) ? FLAT : DEEP;
+        double most = s->most[0] - incode_half_space_height(s, n->pv).hi;
+        double size = incode_max_norm(s->n) * s->scale / t->local.scale;
+        lie = most < 1e-6 * size * (sphere->lb + sphere->lc) ? COPLANAR
+                                                             : INTERIOR;
     }
     return lie;
 }
 
-/* Lets some points at hand say how far the apex may be: where one's sphere is
+/* Lets some local points say how far the apex may be: where one's sphere is
  * too ill-conditioned to tell, another's may do.  True: the best at hand is
  * it. */
 static bool reach_fits(struct incode_make *n)
 {
-    const struct incode_gather *g = &n->t->gather;
+    const struct incode_local_points *local = &n->t->local;
     uint32_t asked = 0;
     bool fits = false;
-    if (n->best == INCODE_GATHER_NONE)
+    if (n->best == INCODE_LOCAL_NONE)
         return false;
-    for (uint32_t i = 0; i <= g->near && asked < FLAT_ASKED && !fits; i++) {
-        uint32_t at = i == 0 ? n->best : g->at[i - 1];
+    for (uint32_t i = 0; i <= local->near && asked < COPLANAR_ASKED && !fits;
+         i++) {
+        uint32_t at = i == 0 ? n->best : local->at[i - 1];
         double p[3];
-        copy_point(p, g, at);
-        if (at == g->self || at == n->b || at == n->c ||
+        copy_point(p, local, at);
+        if (at == local->self || at == n->b || at == n->c ||
             incode_orient3d(&n->t->stats.tally, n->pv, n->pb, n->pc, p) <= 0)
             continue;
         const double *const q[4] = {n->pv, n->pb, n->pc, p};
-        incode_flat_lessen(&n->flat, q, g->scale);
-        const struct incode_ball *ball = &n->flat.ball;
+        incode_near_degenerate_lessen(&n->degenerate, q, local->scale);
+        const struct incode_ball *ball = &n->degenerate.ball;
         double radius = ball->radius * (1 + 1e-9);
         asked++;
         fits = true;
         for (int d = 0; d < 3; d++)
-            fits = fits && ball->centre[d] + radius < g->rhi[d] &&
-                   ball->centre[d] - radius > g->rlo[d];
+            fits = fits && ball->centre[d] + radius < local->rhi[d] &&
+                   ball->centre[d] - radius > local->rlo[d];
     }
     return fits;
 }
 
-/* Whether the points at hand decide on an apex. */
-static bool contest_flat(struct incode_make *n)
+/* Whether the local points decide on an apex. */
+static bool contest_near_degenerate(struct incode_make *n)
 {
     const struct incode_triangulator *t = n->t;
-    const struct incode_gather *g = &t->gather;
-    n->flat.known = true;
-    n->flat.ball.radius = __builtin_inf();
-    n->flat.spread = 0;
-    n->flat.regular = n->regular;
+    const struct incode_local_points *local = &t->local;
+    n->degenerate.known = true;
+    n->degenerate.ball.radius = __builtin_inf();
+    n->degenerate.spread = 0;
+    n->degenerate.regular = n->regular;
     if (n->regular)
-        memcpy(n->flat.c0, n->pencil.c0, sizeof n->flat.c0);
-    n->flat.supports = t->supports;
-    n->flat.count = t->support_count;
-    if (n->best == INCODE_GATHER_NONE && n->regular)
-        for (uint32_t i = 0; i < g->near; i++)
-            consider(n, g->at[i]);
+        memcpy(n->degenerate.c0, n->pencil.c0, sizeof n->degenerate.c0);
+    n->degenerate.half_spaces = t->half_spaces;
+    n->degenerate.count = t->half_space_count;
+    if (n->best == INCODE_LOCAL_NONE && n->regular)
+        for (uint32_t i = 0; i < local->near; i++)
+            consider(n, local->at[i]);
     return reach_fits(n);
 }
 
@@ -566,50 +570,51 @@ enum incode_near incode_apex_near(struct incode_triangulator *t, uint32_t b,
                                   uint32_t c, uint32_t *apex,
                                   struct incode_search *s)
 {
-    struct incode_gather *g = &t->gather;
+    struct incode_local_points *local = &t->local;
     struct incode_make n;
     n.t = t;
     n.b = b;
     n.c = c;
-    n.best = INCODE_GATHER_NONE;
+    n.best = INCODE_LOCAL_NONE;
     n.bare = false;
     n.sphere = (struct incode_sphere){.has_apex = false};
-    memcpy(n.store[0], g->p0, sizeof g->p0);
-    copy_point(n.store[1], g, b);
-    copy_point(n.store[2], g, c);
+    memcpy(n.store[0], local->p0, sizeof local->p0);
+    copy_point(n.store[1], local, b);
+    copy_point(n.store[2], local, c);
     n.pv = n.store[0];
     n.pb = n.store[1];
     n.pc = n.store[2];
-    incode_gather_relative(g, b, n.rb);
-    incode_gather_relative(g, c, n.rc);
+    incode_local_relative(local, b, n.rb);
+    incode_local_relative(local, c, n.rc);
     incode_sphere_plane(&n.sphere, n.rb, n.rc);
-    if (incode_plane_is_blurred(&n.sphere))
-        incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, g->scale);
+    if (incode_plane_is_ill_conditioned(&n.sphere))
+        incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, local->scale);
     set_pencil(&n, &n.sphere);
-    n.flat.known = false;
-    n.flat.spread = 0;
+    n.degenerate.known = false;
+    n.degenerate.spread = 0;
     enum incode_near r = contest_all(&n);
     bool doubtful = r == INCODE_NEAR_SEARCH && is_doubtful(&n);
-    enum lie lie = doubtful ? lie_of(&n) : DEEP;
-    bool vast = doubtful && n.best != INCODE_GATHER_NONE;
-    if ((vast || lie == FLAT) && contest_flat(&n))
+    enum lie lie = doubtful ? lie_of(&n) : INTERIOR;
+    bool degenerate = doubtful && n.best != INCODE_LOCAL_NONE;
+    if ((degenerate || lie == COPLANAR) && contest_near_degenerate(&n))
         r = INCODE_NEAR_FOUND;
     *apex = n.best;
     if (r != INCODE_NEAR_SEARCH) {
-        incode_count_candidates(t, g->near);
+        incode_count_candidates(t, local->near);
         return r;
     }
-    bool lost = lie == UNSUPPORTED && vast && n.flat.ball.radius > 1e300;
+    bool lost =
+        lie == UNKNOWN && degenerate && n.degenerate.ball.radius > 1e300;
     if (lost || !incode_apex_around(&n, s)) {
-        if (lie == UNSUPPORTED)
-            incode_query_support(&s->query, n.pv, n.sphere.n, g->scale);
+        if (lie == UNKNOWN)
+            incode_query_half_space(&s->query, n.pv, n.sphere.n, local->scale);
         return INCODE_NEAR_SEARCH;
     }
     incode_search_learn(t, &s->query);
-    *apex = incode_gather_find(g, s->query.best);
-    if (*apex == INCODE_GATHER_NONE)
-        *apex = incode_gather_append(g, s->query.best, s->query.best_p);
-    if (*apex == INCODE_GATHER_NONE) { /* no room: found again by itself */
+    *apex = incode_local_find(local, s->query.best);
+    if (*apex == INCODE_LOCAL_NONE)
+        *apex = incode_local_append(local, s->query.best, s->query.best_p);
+    if (*apex == INCODE_LOCAL_NONE) { /* no room: found again by itself */
         incode_search_from(&n, s);
         return INCODE_NEAR_SEARCH;
     }

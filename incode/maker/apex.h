@@ -1,10 +1,10 @@
-/* A MakeTetra under way, shared by apex.c (among the points at hand) and
+/* A MakeTetra under way, shared by apex.c (among the local points) and
  * around.c (among the bricks around).
  *
  * Memory: the struct.  Work: constant a call.
  *
- *     make.best = apex among the points at hand, so far;
- *     if (incode_cap_fits(g->wall, &make.pencil, t)) it stands;
+ *     make.best = apex among the local points, so far;
+ *     if (incode_cap_fits(local->wall, &make.pencil, t)) it stands;
  */
 #ifndef INCODE_APEX_H
 #define INCODE_APEX_H
@@ -15,18 +15,18 @@ struct incode_make {
     struct incode_triangulator *t;
     const double *pv, *pb, *pc;
     double store[4][3];  /* those, and the best */
-    uint32_t b, c;       /* indices among the points at hand */
-    uint32_t best;       /* likewise, or INCODE_GATHER_NONE */
+    uint32_t b, c;       /* indices among the local points */
+    uint32_t best;       /* likewise, or INCODE_LOCAL_NONE */
     bool bare;           /* the best's sphere and place in store are not set */
     double rb[3], rc[3]; /* b and c relative to v */
     struct incode_sphere sphere;
     bool regular; /* the face is neither thin nor out of the range of floats */
     struct incode_pencil pencil; /* of a regular face */
-    struct incode_flat flat;
+    struct incode_near_degenerate degenerate;
 };
 
 /* Whether the closed cap, beyond the face, of the sphere at t of the pencil
- * lies strictly within a box: walls as in struct incode_gather.  Where an
+ * lies strictly within a box: walls as in struct incode_local_points.  Where an
  * extreme point of the sphere is on the known side, the rim of the face's
  * circle is the extreme.  Everything is widened by 1e-6 of the sphere's size.
  */
@@ -38,7 +38,7 @@ bool incode_sphere_fits(const double walls[8], const struct incode_sphere *s);
 /* Sets the sphere of a bare best. */
 void incode_make_sphere(struct incode_make *make);
 
-/* Begins the search beyond the points at hand, with the best so far. */
+/* Begins the search beyond the local points, with the best so far. */
 void incode_search_from(struct incode_make *make, struct incode_search *s);
 /* The last look: every point that the best so far does not clearly beat, or
  * every point if there is none. */

@@ -4,7 +4,7 @@
 #include "apex.h"
 #include "simd.h"
 
-/* MakeTetra among the bricks around, where the points at hand do not suffice.
+/* MakeTetra among the bricks around, where the local points do not suffice.
  * For a regular face, points are ordered along its pencil of spheres: one pass
  * keeps all that lie in the ball of the first so far, and the predicates
  * compare only what is still in the last ball. */
@@ -18,7 +18,7 @@ static double gap(double wall, double p)
 }
 
 /* The box of the list as walls around the vertex. */
-static void set_walls(double wall[8], const struct incode_vicinity *list,
+static void set_walls(double wall[8], const struct incode_neighbours *list,
                       const double pv[3], double scale)
 {
     for (int d = 0; d < 3; d++) {
@@ -38,9 +38,10 @@ static enum incode_walk find_first(struct incode_triangulator *t,
     while (r == INCODE_WALK_DONE && q->best == INCODE_NONE && !q->round) {
         s->radius *= 2;
         incode_search_box(t, s);
-        if (!q->boxed || !incode_vicinity_holds(&t->vicinity, q->lo, q->hi))
+        if (!q->boxed || !incode_neighbours_holds(&t->neighbours, q->lo, q->hi))
             return INCODE_WALK_STOP;
-        r = incode_vicinity_visit(&t->vicinity, &t->walker, q, visit, context);
+        r = incode_neighbours_visit(&t->neighbours, &t->walker, q, visit,
+                                    context);
         if (r != INCODE_WALK_DONE)
             break;
         q->done = true;
@@ -55,7 +56,7 @@ static enum incode_walk find_first(struct incode_triangulator *t,
 static bool search_spheres(struct incode_make *n, struct incode_search *s)
 {
     struct incode_triangulator *t = n->t;
-    const struct incode_vicinity *list = &t->vicinity;
+    const struct incode_neighbours *list = &t->neighbours;
     struct incode_query *q = &s->query;
     alignas(64) double wall[8];
     enum incode_walk r = INCODE_WALK_DONE;
@@ -64,11 +65,11 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
         if (r == INCODE_WALK_DONE)
             incode_search_last(s);
     }
-    bool whole = q->boxed && incode_vicinity_holds(list, q->lo, q->hi);
+    bool whole = q->boxed && incode_neighbours_holds(list, q->lo, q->hi);
     /* Without a ball of its own, a sphere does not fit. */
     if (r != INCODE_WALK_DONE || (!whole && (!q->round || q->lens)) ||
-        incode_vicinity_visit(list, &t->walker, q, incode_visit_points, NULL) !=
-            INCODE_WALK_DONE)
+        incode_neighbours_visit(list, &t->walker, q, incode_visit_points,
+                                NULL) != INCODE_WALK_DONE)
         return false;
     if (whole)
         return true;
@@ -265,10 +266,10 @@ static uint64_t others(const struct incode_query *q,
 /* Looks at some bricks of the list, and draws the query's ball in, which this
  * one holds.  False: one is missing, or too much lies in the ball. */
 static bool look_at(struct incode_make *n, struct incode_query *q,
-                    const struct incode_vicinity_ball *ball,
+                    const struct incode_neighbours_ball *ball,
                     const uint32_t *index, uint32_t count, struct hits *hits)
 {
-    struct incode_vicinity *list = &n->t->vicinity;
+    struct incode_neighbours *list = &n->t->neighbours;
     struct incode_pager *pager = &n->t->pager;
     uint32_t brick[BATCH], met = 0;
     uint64_t in[BATCH];
@@ -279,9 +280,9 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
             const struct incode_frame *f = incode_pager_get(pager, brick[met]);
             if (f == NULL)
                 return false;
-            incode_vicinity_copy(list, index[i], f);
+            incode_neighbours_copy(list, index[i], f);
         }
-        in[met] = incode_vicinity_points(list, index[i], ball);
+        in[met] = incode_neighbours_points(list, index[i], ball);
         met += in[met] != 0;
     }
     for (uint32_t i = 0; i < met; i++) {
@@ -299,10 +300,10 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
 static bool look_around(struct incode_make *n, struct incode_query *q,
                         struct hits *hits)
 {
-    const struct incode_vicinity *list = &n->t->vicinity;
-    uint32_t index[INCODE_VICINITY_BRICKS + INCODE_VICINITY_PADDING];
-    struct incode_vicinity_ball ball;
-    uint32_t count = incode_vicinity_in_ball(list, q, &ball, index);
+    const struct incode_neighbours *list = &n->t->neighbours;
+    uint32_t index[INCODE_NEIGHBOURS_BRICKS + INCODE_NEIGHBOURS_PADDING];
+    struct incode_neighbours_ball ball;
+    uint32_t count = incode_neighbours_in_ball(list, q, &ball, index);
     hits->count = hits->placed = 0;
     while (count > BATCH) {
         double square = q->square;
@@ -319,12 +320,12 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
             break;
         }
         hits->count = hits->placed = 0;
-        count = incode_vicinity_in_ball(list, q, &ball, index);
+        count = incode_neighbours_in_ball(list, q, &ball, index);
     }
     for (uint32_t i = 0; i < count; i += BATCH) {
         uint32_t left = count - i;
         if (i > 0)
-            incode_vicinity_set_ball(list, q, &ball);
+            incode_neighbours_set_ball(list, q, &ball);
         if (!look_at(n, q, &ball, index + i, left < BATCH ? left : BATCH, hits))
             return false;
     }
@@ -358,16 +359,16 @@ static bool settle(struct incode_make *n, struct incode_query *q, double t,
 
 static void set_query(struct incode_make *n, struct incode_query *q)
 {
-    const struct incode_gather *g = &n->t->gather;
+    const struct incode_local_points *local = &n->t->local;
     memcpy(q->pv, n->pv, sizeof q->pv);
     q->question = INCODE_QUERY_APEX;
-    q->v = g->vertex;
-    q->b = g->id[n->b];
-    q->c = g->id[n->c];
-    q->scale = g->scale;
+    q->v = local->vertex;
+    q->b = local->id[n->b];
+    q->c = local->id[n->c];
+    q->scale = local->scale;
     q->best = INCODE_NONE;
-    q->boxed = q->round = q->timid = q->done = q->shrinking = false;
-    q->ceiling.set = false;
+    q->boxed = q->round = q->strictly_beyond = q->done = q->shrinking = false;
+    q->radical.set = false;
     q->pages_max = 0;
     memcpy(q->sphere.n, n->sphere.n, sizeof q->sphere.n);
     memcpy(q->sphere.pn, n->sphere.pn, sizeof q->sphere.pn);
@@ -383,8 +384,8 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     alignas(64) double wall[8];
     double at = __builtin_inf();
     set_query(n, q);
-    if (n->best == INCODE_GATHER_NONE) {
-        double radius = t->gather.radius;
+    if (n->best == INCODE_LOCAL_NONE) {
+        double radius = t->local.radius;
         s->radius = radius > DBL_MIN ? radius : DBL_MIN;
         if (find_first(t, s, visit_first, &n->pencil) != INCODE_WALK_DONE)
             return false;
@@ -392,16 +393,16 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     } else {
         double r[3];
         for (int d = 0; d < 3; d++)
-            q->best_p[d] = t->gather.p[d][n->best];
-        q->best = t->gather.id[n->best];
+            q->best_p[d] = t->local.p[d][n->best];
+        q->best = t->local.id[n->best];
         incode_query_relative(r, q, q->best_p);
         if (!incode_pencil_place(&n->pencil, r, &at))
-            return false; /* too flat */
+            return false; /* too near the face's plane */
         draw_in(q, &n->pencil, at);
     }
     if (!look_around(n, q, &hits) || !settle(n, q, at, &hits))
         return false;
-    set_walls(wall, &t->vicinity, q->pv, q->scale);
+    set_walls(wall, &t->neighbours, q->pv, q->scale);
     return incode_cap_fits(wall, &n->pencil,
                            incode_pencil_later(&n->pencil, q->t));
 }
@@ -411,13 +412,13 @@ bool incode_apex_around(struct incode_make *n, struct incode_search *s)
     struct incode_triangulator *t = n->t;
     uint64_t before = t->stats.candidates;
     bool found = false;
-    if (t->vicinity.count > 0 && n->regular && !n->flat.known)
+    if (t->neighbours.count > 0 && n->regular && !n->degenerate.known)
         found = search_pencil(n, s);
     if (!found) {
         incode_search_from(n, s);
-        if (t->vicinity.count > 0)
+        if (t->neighbours.count > 0)
             found = search_spheres(n, s);
     }
-    s->looked = t->gather.near + t->stats.candidates - before;
+    s->looked = t->local.near + t->stats.candidates - before;
     return found;
 }

@@ -17,9 +17,9 @@
 #define FINE 1e-27
 #define TINY 1e-250
 
-bool incode_finals_add(struct incode_finals *f, const double p[3])
+bool incode_close_add(struct incode_close_candidates *f, const double p[3])
 {
-    if (f->count == INCODE_FINALISTS)
+    if (f->count == INCODE_CLOSE_MAX)
         return false;
     for (int d = 0; d < 3; d++)
         f->p[d][f->count] = p[d];
@@ -34,7 +34,7 @@ struct face {
     double denominator;  /* over |r| */
 };
 
-bool incode_finals_may_tell(const double b[3], const double c[3])
+bool incode_close_may_tell(const double b[3], const double c[3])
 {
     bool exact = true;
     for (int k = 0; k < 3; k++) {
@@ -69,21 +69,21 @@ static void set_face(struct face *f, const double v[3], const double pb[3],
 /* Places of candidates in the pencil: hi + lo, and its error, infinite for one
  * in doubt about the face; hi is infinite for one that is not beyond it. */
 struct places {
-    alignas(64) double hi[INCODE_FINALISTS];
-    alignas(64) double lo[INCODE_FINALISTS];
-    alignas(64) double error[INCODE_FINALISTS];
+    alignas(64) double hi[INCODE_CLOSE_MAX];
+    alignas(64) double lo[INCODE_CLOSE_MAX];
+    alignas(64) double error[INCODE_CLOSE_MAX];
 };
 
 /* Those of a vector of candidates; which are in doubt, one bit each. */
 INCODE_INLINE uint32_t place(struct places *out, uint32_t i,
                              const struct face *f,
-                             const struct incode_finals *finals,
+                             const struct incode_close_candidates *close,
                              const double v[3], double scale)
 {
     struct incode_lanes r[3], n[3], m[3];
     incode_vd size = incode_vd_all(0), tiny = incode_vd_all(TINY);
     for (int d = 0; d < 3; d++) {
-        r[d] = incode_lanes_difference(incode_vd_load(finals->p[d] + i), v[d],
+        r[d] = incode_lanes_difference(incode_vd_load(close->p[d] + i), v[d],
                                        scale);
         n[d] = incode_lanes_all(f->n.d[d]);
         m[d] = incode_lanes_all(f->m.d[d]);
@@ -108,7 +108,7 @@ INCODE_INLINE uint32_t place(struct places *out, uint32_t i,
               infinite = incode_vd_all(__builtin_inf());
     incode_vl none =
         (above.hi < -level) |
-        (incode_vd_all(i) + incode_vd_count() >= incode_vd_all(finals->count));
+        (incode_vd_all(i) + incode_vd_count() >= incode_vd_all(close->count));
     error = incode_vd_select(above.hi > level + level, error, infinite);
     *(incode_vd *)(out->hi + i) = incode_vd_select(none, infinite, hi);
     *(incode_vd *)(out->lo + i) = incode_vd_select(none, zero, lo);
@@ -117,7 +117,7 @@ INCODE_INLINE uint32_t place(struct places *out, uint32_t i,
     return incode_vd_mask(error > incode_vd_all(DBL_MAX));
 }
 
-static bool is_beyond(const struct incode_finals *f, uint32_t i,
+static bool is_beyond(const struct incode_close_candidates *f, uint32_t i,
                       const double v[3], const double b[3], const double c[3],
                       struct incode_tally *tally)
 {
@@ -129,7 +129,7 @@ static bool is_beyond(const struct incode_finals *f, uint32_t i,
 static uint32_t first_of(const struct places *at, uint32_t count)
 {
     incode_vd infinite = incode_vd_all(__builtin_inf()), least = infinite;
-    alignas(64) double gap[INCODE_FINALISTS];
+    alignas(64) double gap[INCODE_CLOSE_MAX];
     uint32_t best = 0, near = 0;
     for (uint32_t i = 0; i < count; i += INCODE_VD_LANES)
         least = incode_vd_min(incode_vd_load(at->hi + i), least);
@@ -145,7 +145,7 @@ static uint32_t first_of(const struct places *at, uint32_t count)
     for (uint32_t i = 0; i < count; i += INCODE_VD_LANES)
         best |= incode_vd_mask(incode_vd_load(gap + i) == first) << i;
     if (best == 0)
-        return INCODE_FINALS_NONE;
+        return INCODE_CLOSE_NONE;
     best = (uint32_t)__builtin_ctz(best);
     incode_vd error = incode_vd_all(at->error[best]);
     for (uint32_t i = 0; i < count; i += INCODE_VD_LANES) {
@@ -153,18 +153,19 @@ static uint32_t first_of(const struct places *at, uint32_t count)
         incode_vl far = incode_vd_load(gap + i) - first > sum + sum;
         near |= (~incode_vd_mask(far) & INCODE_VD_ALL) << i;
     }
-    return (near & (near - 1)) == 0 ? best : INCODE_FINALS_NONE;
+    return (near & (near - 1)) == 0 ? best : INCODE_CLOSE_NONE;
 }
 
-uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
-                             const double b[3], const double c[3], double scale,
-                             struct incode_tally *tally)
+uint32_t incode_close_first(struct incode_close_candidates *f,
+                            const double v[3], const double b[3],
+                            const double c[3], double scale,
+                            struct incode_tally *tally)
 {
     struct face face;
     struct places at;
     uint32_t doubt = 0;
     if (f->count == 0)
-        return INCODE_FINALS_NONE;
+        return INCODE_CLOSE_NONE;
     set_face(&face, v, b, c, scale);
     for (uint32_t i = f->count; i % INCODE_VD_LANES != 0; i++)
         for (int d = 0; d < 3; d++)
@@ -174,7 +175,7 @@ uint32_t incode_finals_first(struct incode_finals *f, const double v[3],
     for (; doubt != 0; doubt &= doubt - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(doubt);
         if (is_beyond(f, i, v, b, c, tally))
-            return INCODE_FINALS_NONE;
+            return INCODE_CLOSE_NONE;
         at.hi[i] = __builtin_inf();
         at.lo[i] = at.error[i] = 0;
     }

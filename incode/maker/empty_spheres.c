@@ -19,20 +19,20 @@ static struct incode_dd ratio(struct incode_dd a, struct incode_dd b)
 static bool circum_of(struct incode_circum *c, const double *const p[4],
                       double scale)
 {
-    struct incode_flat flat;
-    flat.known = flat.regular = false;
-    flat.count = 0;
-    incode_flat_sphere(&flat, p, scale);
-    struct incode_dd det = flat.sphere.det;
+    struct incode_near_degenerate degenerate;
+    degenerate.known = degenerate.regular = false;
+    degenerate.count = 0;
+    incode_near_degenerate_sphere(&degenerate, p, scale);
+    struct incode_dd det = degenerate.sphere.det;
     /* The spread bounds the errors of det and of m. */
-    if (!(det.hi > 1e9 * flat.spread) || !(det.hi > INCODE_SPHERE_LEAST))
+    if (!(det.hi > 1e9 * degenerate.spread) || !(det.hi > INCODE_SPHERE_LEAST))
         return false;
     memcpy(c->p, p[0], sizeof c->p);
     c->scale = scale;
     for (int k = 0; k < 3; k++)
-        c->twice[k] = ratio(flat.sphere.m[k], det);
+        c->twice[k] = ratio(degenerate.sphere.m[k], det);
     double size = incode_dd_max_norm(c->twice);
-    c->error = 2 * flat.spread * (1 + size) / det.hi + FINE * size;
+    c->error = 2 * degenerate.spread * (1 + size) / det.hi + FINE * size;
     double longest = 0, r[3];
     for (int i = 1; i < 4; i++) {
         for (int k = 0; k < 3; k++)
@@ -55,8 +55,8 @@ static bool is_same(const struct incode_circum *a,
     return incode_max_norm(gap) < 1e-3 * size;
 }
 
-void incode_empties_add(struct incode_empties *e, const double *const p[4],
-                        double scale)
+void incode_empty_spheres_add(struct incode_empty_spheres *e,
+                              const double *const p[4], double scale)
 {
     struct incode_circum c;
     if (!circum_of(&c, p, scale))
@@ -69,15 +69,16 @@ void incode_empties_add(struct incode_empties *e, const double *const p[4],
         return;
     }
     e->sphere[e->next] = c;
-    e->next = (e->next + 1) % INCODE_EMPTIES;
-    if (e->count < INCODE_EMPTIES)
+    e->next = (e->next + 1) % INCODE_EMPTY_SPHERES;
+    if (e->count < INCODE_EMPTY_SPHERES)
         e->count++;
 }
 
 /* With d = v - p of the empty sphere, M and N twice the centres: the power of r
  * less that in the empty sphere is (N - M - 2 d) . r - (|d|^2 - N . d). */
-static bool ceiling_of(struct incode_ceiling *c, const struct incode_circum *b,
-                       const struct incode_circum *empty)
+static bool bound_of(struct incode_radical_bound *c,
+                     const struct incode_circum *b,
+                     const struct incode_circum *empty)
 {
     struct incode_dd_vector d = incode_dd_relative(b->p, empty->p, b->scale);
     struct incode_dd there[3], negative[3];
@@ -105,10 +106,10 @@ static bool ceiling_of(struct incode_ceiling *c, const struct incode_circum *b,
     return c->set;
 }
 
-void incode_ceiling_set(struct incode_ceiling *c,
-                        const struct incode_empties *e,
-                        const double *const p[4], double scale,
-                        const double n[3])
+void incode_radical_bound_set(struct incode_radical_bound *c,
+                              const struct incode_empty_spheres *e,
+                              const double *const p[4], double scale,
+                              const double n[3])
 {
     struct incode_circum best;
     double most = 0;
@@ -116,8 +117,8 @@ void incode_ceiling_set(struct incode_ceiling *c,
     if (e->count == 0 || !circum_of(&best, p, scale))
         return;
     for (uint32_t i = 0; i < e->count; i++) {
-        struct incode_ceiling here;
-        if (!ceiling_of(&here, &best, &e->sphere[i]))
+        struct incode_radical_bound here;
+        if (!bound_of(&here, &best, &e->sphere[i]))
             continue;
         double steep = incode_dot(here.g, n) / (here.level + 1e-200);
         if (steep > most) {

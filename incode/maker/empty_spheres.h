@@ -6,21 +6,21 @@
  * (Aurenhammer, SIAM J. Comput. 16, 1987).  Near the face, it leaves a sliver
  * of the set.
  *
- * Memory: struct incode_empties, about 1 KB.  Work: constant.
+ * Memory: struct incode_empty_spheres, about 1 KB.  Work: constant.
  *
- *     incode_empties_add(&empties, p, scale);      of a tetrahedron p
- *     incode_ceiling_set(&ceiling, &empties, p, scale, n);
+ *     incode_empty_spheres_add(&empty, p, scale);      of a tetrahedron p
+ *     incode_radical_bound_set(&bound, &empty, p, scale, n);
  *     if (g . r > level + slack (|x| + |y| + |z|)) outside;
  */
-#ifndef INCODE_EMPTY_H
-#define INCODE_EMPTY_H
+#ifndef INCODE_EMPTY_SPHERES_H
+#define INCODE_EMPTY_SPHERES_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "sphere.h"
 
-enum { INCODE_EMPTIES = 8 };
+enum { INCODE_EMPTY_SPHERES = 8 };
 
 /* The sphere of four points. */
 struct incode_circum {
@@ -30,29 +30,29 @@ struct incode_circum {
     double thickness;          /* of the tetrahedron */
 };
 
-struct incode_empties {
-    struct incode_circum sphere[INCODE_EMPTIES];
+struct incode_empty_spheres {
+    struct incode_circum sphere[INCODE_EMPTY_SPHERES];
     uint32_t count, next;
 };
 
 /* Adds the sphere of a Delaunay tetrahedron; of several that are nearly the
  * same, that of the thickest is kept.  scale: a power of two by which it is of
  * size 1 about. */
-void incode_empties_add(struct incode_empties *e, const double *const p[4],
-                        double scale);
+void incode_empty_spheres_add(struct incode_empty_spheres *e,
+                              const double *const p[4], double scale);
 
 /* g . r > level + slack (|x| + |y| + |z|): r = (x, y, z), relative and scaled,
  * is outside. */
-struct incode_ceiling {
+struct incode_radical_bound {
     bool set;
     double g[3], level, slack;
 };
 
 /* What is known to lie outside the sphere of four points, the first of which r
  * is relative to; n: the direction in which it matters. */
-void incode_ceiling_set(struct incode_ceiling *c,
-                        const struct incode_empties *e,
-                        const double *const p[4], double scale,
-                        const double n[3]);
+void incode_radical_bound_set(struct incode_radical_bound *c,
+                              const struct incode_empty_spheres *e,
+                              const double *const p[4], double scale,
+                              const double n[3]);
 
 #endif

@@ -14,8 +14,8 @@ static double length_of(const double a[3])
     return __builtin_sqrt(incode_dot(a, a));
 }
 
-struct incode_dd incode_support_height(const struct incode_support *s,
-                                       const double x[3])
+struct incode_dd incode_half_space_height(const struct incode_half_space *s,
+                                          const double x[3])
 {
     struct incode_dd_vector r = incode_dd_relative(x, s->p, s->scale), n;
     for (int k = 0; k < 3; k++)
@@ -33,41 +33,44 @@ static double sine(const double a[3], const double b[3])
     return incode_dot(a, b) > 0 && lengths > 0 ? length_of(c) / lengths : 2;
 }
 
-bool incode_support_faces(const struct incode_support *support,
-                          const double n[3])
+bool incode_half_space_faces(const struct incode_half_space *half_space,
+                             const double n[3])
 {
-    return sine(support->n, n) * SLOPES < 1;
+    return sine(half_space->n, n) * SLOPES < 1;
 }
 
-/* How far above v, in the support's direction, a point can be; not a number if
- * that overflows. */
-static double depth_of(const struct incode_support *support, const double pv[3],
-                       double scale)
+/* How far above v, in the half-space's direction, a point can be; not a number
+ * if that overflows. */
+static double depth_of(const struct incode_half_space *half_space,
+                       const double pv[3], double scale)
 {
-    struct incode_dd height = incode_support_height(support, pv);
-    struct incode_dd top = {support->most[0], support->most[1]};
-    double ratio = scale / support->scale, far = 0;
+    struct incode_dd height = incode_half_space_height(half_space, pv);
+    struct incode_dd top = {half_space->most[0], half_space->most[1]};
+    double ratio = scale / half_space->scale, far = 0;
     for (int k = 0; k < 3; k++)
-        far += __builtin_fabs((pv[k] - support->p[k]) * support->scale);
+        far += __builtin_fabs((pv[k] - half_space->p[k]) * half_space->scale);
     double depth = incode_dd_minus(top, height).hi * ratio /
-                       length_of(support->n) * (1 + SPARE) +
+                       length_of(half_space->n) * (1 + SPARE) +
                    FINE * far * ratio;
     return depth < 0 ? 0 : depth;
 }
 
-/* Of a vast sphere through v with its centre outside the support: a point x
- * inside, h above v in the support's direction and y along it, has
+/* Of an ill-conditioned or very large sphere through v with its centre outside
+ * the half-space: a point x inside, h above v in the half-space's direction and
+ * y along it, has
+ *
  *     h^2 + y^2 <= 2 (h, y) . centre,  h <= depth,
+ *
  * so y lies in a disc around the centre's foot, and |h| is next to nothing. */
-static struct incode_ball ball_under(const struct incode_support *support,
+static struct incode_ball ball_under(const struct incode_half_space *half_space,
                                      const struct incode_fine *sphere,
                                      const double pv[3], double scale)
 {
     struct incode_ball ball = {{0, 0, 0}, __builtin_inf()};
     double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
-    if (!incode_support_faces(support, m))
+    if (!incode_half_space_faces(half_space, m))
         return ball;
-    const double *n = support->n;
+    const double *n = half_space->n;
     const struct incode_dd direction[3] = {{n[0], 0}, {n[1], 0}, {n[2], 0}};
     struct incode_dd_vector tilt =
         incode_dd_vector_product(sphere->m, direction);
@@ -77,7 +80,7 @@ static struct incode_ball ball_under(const struct incode_support *support,
     for (int k = 0; k < 3; k++)
         ball.centre[k] = foot[k] * half / incode_dot(n, n);
     double radius = length_of(m) * half * (1 + SPARE);
-    double depth = depth_of(support, pv, scale);
+    double depth = depth_of(half_space, pv, scale);
     double off = length_of(ball.centre), doubt = off * SPARE;
     doubt += radius * FINE * 1e9;
     off += doubt;
@@ -87,11 +90,11 @@ static struct incode_ball ball_under(const struct incode_support *support,
     return ball;
 }
 
-void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
-                        double scale)
+void incode_near_degenerate_sphere(struct incode_near_degenerate *degenerate,
+                                   const double *const p[4], double scale)
 {
     double lengths = 1, longest = 1, r[3];
-    incode_sphere_fine(&flat->sphere, p[0], p[1], p[2], p[3], scale);
+    incode_sphere_fine(&degenerate->sphere, p[0], p[1], p[2], p[3], scale);
     for (int i = 1; i < 4; i++) {
         for (int k = 0; k < 3; k++)
             r[k] = (p[i][k] - p[0][k]) * scale;
@@ -99,13 +102,13 @@ void incode_flat_sphere(struct incode_flat *flat, const double *const p[4],
         lengths *= length;
         longest = length > longest ? length : longest;
     }
-    flat->lengths = lengths;
-    flat->spread =
+    degenerate->lengths = lengths;
+    degenerate->spread =
         lengths > VANISHED ? FINE * 1e2 * lengths * longest : __builtin_inf();
 }
 
 /* The least ball that is known to hold what comes before p[3]. */
-static struct incode_ball ball_of(struct incode_flat *flat,
+static struct incode_ball ball_of(struct incode_near_degenerate *degenerate,
                                   const double *const p[4], double scale)
 {
     double r[3];
@@ -113,53 +116,56 @@ static struct incode_ball ball_of(struct incode_flat *flat,
     for (int k = 0; k < 3; k++)
         r[k] = (p[3][k] - p[0][k]) * scale;
     double far = length_of(r);
-    flat->spread = 0;
+    degenerate->spread = 0;
     /* What comes before a place of zero or less in the pencil lies in the ball
      * over the face's circle. */
-    if (flat->regular && far > VANISHED) {
-        double circle = length_of(flat->c0) * (1 + 1e-8);
-        double above = far * far - 2 * incode_dot(flat->c0, r) +
+    if (degenerate->regular && far > VANISHED) {
+        double circle = length_of(degenerate->c0) * (1 + 1e-8);
+        double above = far * far - 2 * incode_dot(degenerate->c0, r) +
                        1e-8 * far * (far + 2 * circle);
         if (above <= 0) {
-            memcpy(ball.centre, flat->c0, sizeof ball.centre);
+            memcpy(ball.centre, degenerate->c0, sizeof ball.centre);
             ball.radius = circle * (1 + 1e-8);
             return ball;
         }
     }
-    const struct incode_fine *sphere = &flat->sphere;
-    incode_flat_sphere(flat, p, scale);
+    const struct incode_fine *sphere = &degenerate->sphere;
+    incode_near_degenerate_sphere(degenerate, p, scale);
     /* What is left of det and m after cancellation must be right to SPARE. */
-    double far_off = FINE * 1e9 * flat->lengths;
+    double far_off = FINE * 1e9 * degenerate->lengths;
     double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
     if (!(sphere->det.hi > far_off) ||
         !(sphere->det.hi > INCODE_SPHERE_LEAST) ||
         !(incode_max_norm(m) > far_off * far))
         return ball;
-    for (uint32_t i = 0; i < flat->count; i++) {
+    for (uint32_t i = 0; i < degenerate->count; i++) {
         struct incode_ball here =
-            ball_under(&flat->supports[i], sphere, p[0], scale);
+            ball_under(&degenerate->half_spaces[i], sphere, p[0], scale);
         ball = here.radius < ball.radius ? here : ball;
     }
     return ball;
 }
 
-void incode_flat_lessen(struct incode_flat *flat, const double *const p[4],
-                        double scale)
+void incode_near_degenerate_lessen(struct incode_near_degenerate *degenerate,
+                                   const double *const p[4], double scale)
 {
-    struct incode_ball ball = ball_of(flat, p, scale);
-    flat->ball = ball.radius < flat->ball.radius ? ball : flat->ball;
+    struct incode_ball ball = ball_of(degenerate, p, scale);
+    degenerate->ball =
+        ball.radius < degenerate->ball.radius ? ball : degenerate->ball;
 }
 
-bool incode_flat_outside(const struct incode_flat *flat, const double pv[3],
-                         const double p[3], double scale)
+bool incode_near_degenerate_outside(
+    const struct incode_near_degenerate *degenerate, const double pv[3],
+    const double p[3], double scale)
 {
-    if (flat->spread == 0)
+    if (degenerate->spread == 0)
         return false;
     struct incode_dd_vector r = incode_dd_relative(p, pv, scale);
     struct incode_dd square = incode_dd_dot(r.d, r.d);
     struct incode_dd value =
-        incode_dd_minus(incode_dd_dot(flat->sphere.m, r.d),
-                        incode_dd_times(flat->sphere.det, square));
+        incode_dd_minus(incode_dd_dot(degenerate->sphere.m, r.d),
+                        incode_dd_times(degenerate->sphere.det, square));
     double far = __builtin_sqrt(square.hi);
-    return value.hi < -flat->spread * (far + square.hi) - INCODE_SPHERE_TINY;
+    return value.hi <
+           -degenerate->spread * (far + square.hi) - INCODE_SPHERE_TINY;
 }

@@ -3,18 +3,18 @@
  * for every tetrahedron that is built there.  Far vertices are appended as they
  * are met.
  *
- * Memory: struct incode_gather, about 35 KB.  Work: one walk a leaf, one pass a
- * vertex; a scan looks at every point around the vertex, a vector at a time in
- * single precision, and leaves what its error bound cannot tell to the exact
- * predicates.
+ * Memory: struct incode_local_points, about 35 KB.  Work: one walk a leaf, one
+ * pass a vertex; a scan looks at every point around the vertex, a vector at a
+ * time in single precision, and leaves what its error bound cannot tell to the
+ * exact predicates.
  *
- *     incode_gather_around(&g, &walker, &vicinity, leaf, lo, hi, radius);
- *     incode_gather_centre(&g, v, p, radius, domain_lo, domain_hi);
- *     count = incode_gather_first(&g, &pencil, &t, out);   first by distance
- *     count = incode_gather_inside(&g, &sphere, out);
+ *     incode_local_around(&local, &walker, &neighbours, leaf, lo, hi, radius);
+ *     incode_local_centre(&local, v, p, radius, domain_lo, domain_hi);
+ *     count = incode_local_first(&local, &pencil, &t, out);   first by distance
+ *     count = incode_local_inside(&local, &sphere, out);
  */
-#ifndef INCODE_GATHER_H
-#define INCODE_GATHER_H
+#ifndef INCODE_LOCAL_POINTS_H
+#define INCODE_LOCAL_POINTS_H
 
 #include <stdalign.h>
 #include <stdint.h>
@@ -27,10 +27,10 @@ enum {
     INCODE_AROUND_ALL = INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA + 16,
     INCODE_NEAR_POINTS = 192, /* around a vertex */
     INCODE_NEAR_ALL = INCODE_NEAR_POINTS + INCODE_AROUND_EXTRA + 32,
-    INCODE_GATHER_NONE = 0xffff
+    INCODE_LOCAL_NONE = 0xffff
 };
 
-struct incode_gather {
+struct incode_local_points {
     /* Around the vertex: relative to p0 and scaled; w = |p|^2; e: of this the
      * error of n . p is at most max|n|; at: the point's index below. */
     alignas(64) float x[INCODE_NEAR_ALL];
@@ -62,42 +62,44 @@ struct incode_gather {
     struct incode_query query;
 };
 
-enum incode_gathered {
-    INCODE_GATHER_READY,
-    INCODE_GATHER_WAIT,   /* for page query.missing */
-    INCODE_GATHER_CROWDED /* too many points or pages: try a smaller box */
+enum incode_local_outcome {
+    INCODE_LOCAL_READY,
+    INCODE_LOCAL_WAIT,   /* for page query.missing */
+    INCODE_LOCAL_CROWDED /* too many points or pages: try a smaller box */
 };
 
 /* Forgets what is around the last leaf. */
-void incode_gather_reset(struct incode_gather *g);
+void incode_local_reset(struct incode_local_points *local);
 
 /* Copies every point of the box lo..hi widened by radius on all sides. */
-enum incode_gathered
-incode_gather_around(struct incode_gather *g, struct incode_walker *walker,
-                     const struct incode_vicinity *vicinity, uint32_t leaf,
-                     const double lo[3], const double hi[3], double radius);
+enum incode_local_outcome
+incode_local_around(struct incode_local_points *local,
+                    struct incode_walker *walker,
+                    const struct incode_neighbours *neighbours, uint32_t leaf,
+                    const double lo[3], const double hi[3], double radius);
 
 /* Selects the points of the box of half-width radius, at most that of the
  * leaf's box, around the vertex at p; a crowded box is made smaller.  domain:
  * tight box of all points. */
-void incode_gather_centre(struct incode_gather *g, uint32_t vertex,
-                          const double p[3], double radius,
-                          const double domain_lo[3], const double domain_hi[3]);
+void incode_local_centre(struct incode_local_points *local, uint32_t vertex,
+                         const double p[3], double radius,
+                         const double domain_lo[3], const double domain_hi[3]);
 
-/* Index of a vertex among the points at hand, or INCODE_GATHER_NONE.  It counts
+/* Index of a vertex among the local points, or INCODE_LOCAL_NONE.  It counts
  * as one around the vertex from now on: it is likely an apex again. */
-uint32_t incode_gather_find(struct incode_gather *g, uint32_t id);
+uint32_t incode_local_find(struct incode_local_points *local, uint32_t id);
 
-/* Appends a far vertex; INCODE_GATHER_NONE: full. */
-uint32_t incode_gather_append(struct incode_gather *g, uint32_t id,
-                              const double p[3]);
+/* Appends a far vertex; INCODE_LOCAL_NONE: full. */
+uint32_t incode_local_append(struct incode_local_points *local, uint32_t id,
+                             const double p[3]);
 
 /* Relative coordinates of point i, in double precision. */
-static inline void incode_gather_relative(const struct incode_gather *g,
-                                          uint32_t i, double r[3])
+static inline void
+incode_local_relative(const struct incode_local_points *local, uint32_t i,
+                      double r[3])
 {
     for (int d = 0; d < 3; d++)
-        r[d] = (g->p[d][i] - g->p0[d]) * g->scale;
+        r[d] = (local->p[d][i] - local->p0[d]) * local->scale;
 }
 
 /* Points around the vertex that may lie beyond the face and no later in the
@@ -105,14 +107,14 @@ static inline void incode_gather_relative(const struct incode_gather *g,
  * out lies in the closed sphere of that t beyond the face.  The face's own
  * vertices are among them as a rule.  Returns how many, 0 where none is
  * certain to be beyond the face. */
-uint32_t incode_gather_first(const struct incode_gather *g,
-                             const struct incode_pencil *pencil, double *t,
-                             uint16_t out[INCODE_NEAR_ALL]);
+uint32_t incode_local_first(const struct incode_local_points *local,
+                            const struct incode_pencil *pencil, double *t,
+                            uint16_t out[INCODE_NEAR_ALL]);
 
 /* The points around the vertex that are not certainly outside the sphere;
  * returns how many. */
-uint32_t incode_gather_inside(const struct incode_gather *g,
-                              const struct incode_sphere *s,
-                              uint16_t out[INCODE_NEAR_ALL]);
+uint32_t incode_local_inside(const struct incode_local_points *local,
+                             const struct incode_sphere *s,
+                             uint16_t out[INCODE_NEAR_ALL]);
 
 #endif

@@ -35,7 +35,7 @@ void incode_query_face(struct incode_query *q)
     incode_query_relative(q->rb, q, q->pb);
     incode_query_relative(q->rc, q, q->pc);
     incode_sphere_plane(&q->sphere, q->rb, q->rc);
-    if (incode_plane_is_blurred(&q->sphere))
+    if (incode_plane_is_ill_conditioned(&q->sphere))
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, NULL, q->scale);
 }
 
@@ -65,13 +65,13 @@ static bool set_ball(struct incode_query *q, const double centre[3],
 }
 
 /* Where the sphere says nothing, the points' half-space may. */
-static void bound_flat(struct incode_query *q)
+static void bound_near_degenerate(struct incode_query *q)
 {
     if (q->best == INCODE_NONE)
         return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
-    incode_flat_lessen(&q->flat, p, q->scale);
-    const struct incode_ball *ball = &q->flat.ball;
+    incode_near_degenerate_lessen(&q->degenerate, p, q->scale);
+    const struct incode_ball *ball = &q->degenerate.ball;
     q->lens = q->large = ball->radius < 1e300 &&
                          set_ball(q, ball->centre, ball->radius * (1 + 1e-9));
 }
@@ -86,8 +86,8 @@ static void bound_sphere(struct incode_query *q)
 {
     const struct incode_sphere *s = &q->sphere;
     q->boxed = q->round = q->lens = false;
-    if (q->flat.known && incode_sphere_is_vast(s)) {
-        bound_flat(q);
+    if (q->degenerate.known && incode_sphere_is_near_degenerate(s)) {
+        bound_near_degenerate(q);
         return;
     }
     if (!s->has_apex || !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
@@ -107,33 +107,34 @@ void incode_query_shrink(struct incode_query *q)
 }
 
 /* Where many points are to be looked at. */
-static void raise_ceiling(struct incode_query *q)
+static void set_radical_bound(struct incode_query *q)
 {
     if (q->best == INCODE_NONE)
         return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
-    if (q->empties != NULL)
-        incode_ceiling_set(&q->ceiling, q->empties, p, q->scale, q->sphere.n);
+    if (q->empty != NULL)
+        incode_radical_bound_set(&q->radical, q->empty, p, q->scale,
+                                 q->sphere.n);
 }
 
 void incode_query_look(struct incode_query *q)
 {
     if (++q->looked == INCODE_QUERY_CROWD)
-        raise_ceiling(q);
+        set_radical_bound(q);
 }
 
 void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
 {
     q->best = id;
-    q->flat.spread = 0;
-    q->ceiling.set = false;
+    q->degenerate.spread = 0;
+    q->radical.set = false;
     memcpy(q->best_p, p, sizeof q->best_p);
     for (int d = 0; d < 3; d++)
         q->peak[d] = 0.5 * q->sphere.m[d] / q->sphere.det; /* either may be 0 */
     if (q->shrinking)
         bound_sphere(q);
     if (q->looked >= INCODE_QUERY_CROWD)
-        raise_ceiling(q);
+        set_radical_bound(q);
 }
 
 enum { CONTESTS = 8 }; /* by the predicates, before twice the precision */
@@ -144,14 +145,14 @@ static bool is_outside(struct incode_query *q, const double p[3])
 {
     if (q->contests < CONTESTS) {
         q->contests++;
-        if (!q->flat.known || (q->round && !q->lens))
+        if (!q->degenerate.known || (q->round && !q->lens))
             return false;
     }
-    if (q->flat.spread == 0) {
+    if (q->degenerate.spread == 0) {
         const double *const f[4] = {q->pv, q->pb, q->pc, q->best_p};
-        incode_flat_sphere(&q->flat, f, q->scale);
+        incode_near_degenerate_sphere(&q->degenerate, f, q->scale);
     }
-    return incode_flat_outside(&q->flat, q->pv, p, q->scale);
+    return incode_near_degenerate_outside(&q->degenerate, q->pv, p, q->scale);
 }
 
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
@@ -167,7 +168,7 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     double r[3];
     incode_query_relative(r, q, p);
     incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
-    if (incode_sphere_is_blurred(&q->sphere))
+    if (incode_sphere_is_ill_conditioned(&q->sphere))
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, p, q->scale);
     incode_query_start(q, id, p);
 }
@@ -276,11 +277,12 @@ INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
     return ~(square > incode_vd_all(q->limit));
 }
 
-/* Not certainly above the ceiling. */
-INCODE_INLINE incode_vl below_ceiling(const struct incode_query *q,
-                                      const struct boxes *boxes, unsigned i)
+/* Not certainly beyond the radical plane. */
+INCODE_INLINE incode_vl below_radical_plane(const struct incode_query *q,
+                                            const struct boxes *boxes,
+                                            unsigned i)
 {
-    const struct incode_ceiling *c = &q->ceiling;
+    const struct incode_radical_bound *c = &q->radical;
     incode_vd least = incode_vd_all(0), far = least;
     for (int d = 0; d < 3; d++) {
         incode_vd v = incode_vd_all(q->pv[d]), g = incode_vd_all(c->g[d]);
@@ -293,11 +295,11 @@ INCODE_INLINE incode_vl below_ceiling(const struct incode_query *q,
     return ~(least - far * incode_vd_all(c->slack) > incode_vd_all(c->level));
 }
 
-/* May reach higher than the support so far. */
+/* May reach higher than the half-space so far. */
 INCODE_INLINE incode_vl may_rise(const struct incode_query *q,
                                  const struct boxes *boxes, unsigned i)
 {
-    const struct incode_support *s = &q->support;
+    const struct incode_half_space *s = &q->half_space;
     incode_vd top = incode_vd_all(INCODE_SPHERE_TINY), error = top;
     for (int d = 0; d < 3; d++) {
         incode_vd p = incode_vd_all(s->p[d]), scale = incode_vd_all(s->scale);
@@ -331,9 +333,9 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
                 in &= meets_ball(q, boxes, i);
             if (!q->round || q->large)
                 in &= may_hold_apex(q, boxes, i);
-            if (q->ceiling.set)
-                in &= below_ceiling(q, boxes, i);
-        } else if (q->question == INCODE_QUERY_SUPPORT)
+            if (q->radical.set)
+                in &= below_radical_plane(q, boxes, i);
+        } else if (q->question == INCODE_QUERY_HALF_SPACE)
             in &= may_rise(q, boxes, i);
         else if (q->question != INCODE_QUERY_BOX)
             in &= may_be_near(q, boxes, i);

@@ -24,21 +24,22 @@ enum incode_question {
     INCODE_QUERY_BOX,     /* leaves that meet a box */
     INCODE_QUERY_APEX,    /* the apex of a face: first in Delaunay distance */
     INCODE_QUERY_NEAREST, /* the nearest neighbour of v */
-    INCODE_QUERY_SUPPORT, /* the half-space of a normal that holds all points */
-    INCODE_QUERY_CIRCLE   /* the smallest circle through v and b: a start for
-                             the search of a first face, approximate */
+    INCODE_QUERY_HALF_SPACE, /* the half-space of a normal that holds all points
+                              */
+    INCODE_QUERY_CIRCLE      /* the smallest circle through v and b: a start for
+                                the search of a first face, approximate */
 };
 
 enum incode_walk { INCODE_WALK_DONE, INCODE_WALK_WAIT, INCODE_WALK_STOP };
 
 struct incode_query {
     enum incode_question question;
-    bool boxed;          /* only what meets [lo, hi] */
-    bool timid;          /* APEX: only points clearly beyond the face */
+    bool boxed;           /* only what meets [lo, hi] */
+    bool strictly_beyond; /* APEX: only points clearly beyond the face */
     bool ahead;          /* BOX: asks for missing bricks and passes them over */
     bool shrinking;      /* APEX: the box is that of the best's sphere */
     bool round;          /* APEX: what matters lies in the ball below */
-    bool lens;           /* round: it is less than the sphere (support.h) */
+    bool lens;           /* round: it is less than the sphere (half_space.h) */
     bool large;          /* round, and the sphere itself tells of boxes, too */
     bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
     bool done;           /* not what lies within [done_lo, done_hi] */
@@ -48,11 +49,13 @@ struct incode_query {
     double pv[3], pb[3], pc[3];  /* absolute coordinates */
     double scale;                /* relative = (p - pv) * scale */
     double rb[3], rc[3];         /* b and c, relative */
-    struct incode_sphere sphere; /* SUPPORT: its plane's normal alone */
-    struct incode_flat flat; /* APEX: bounds the box of a best without a ball */
-    const struct incode_empties *empties; /* APEX, or NULL */
-    struct incode_ceiling ceiling;        /* by these, of the best */
-    struct incode_support support; /* SUPPORT: what holds all points so far */
+    struct incode_sphere sphere; /* HALF_SPACE: its plane's normal alone */
+    struct incode_near_degenerate
+        degenerate; /* APEX: bounds the box of a best without a ball */
+    const struct incode_empty_spheres *empty; /* APEX, or NULL */
+    struct incode_radical_bound radical;      /* by these, of the best */
+    struct incode_half_space
+        half_space;     /* HALF_SPACE: what holds all points so far */
     double peak[3];     /* centre of the sphere, where its value peaks */
     double centre[3];   /* of the ball */
     double square;      /* of its radius, widened */
@@ -101,9 +104,9 @@ enum incode_walk incode_walk_brick(struct incode_walker *walker,
                                    struct incode_query *q, uint32_t brick,
                                    incode_visit *visit, void *context);
 
-/* Sets the direction of a SUPPORT query: that of a face at pv. */
-void incode_query_support(struct incode_query *q, const double pv[3],
-                          const double n[3], double scale);
+/* Sets the direction of a HALF_SPACE query: that of a face at pv. */
+void incode_query_half_space(struct incode_query *q, const double pv[3],
+                             const double n[3], double scale);
 
 /* Sets the face (v, b, c) of an APEX query: plane and scale. */
 void incode_query_face(struct incode_query *q);
@@ -117,7 +120,7 @@ void incode_query_shrink(struct incode_query *q);
 
 enum { INCODE_QUERY_CROWD = 64 }; /* so many leaves are many */
 
-/* Counts a leaf; where they are many, a ceiling may rule out others. */
+/* Counts a leaf; where they are many, a radical plane may rule out others. */
 void incode_query_look(struct incode_query *q);
 
 /* A candidate for the apex: takes it if it is strictly on the unknown side and

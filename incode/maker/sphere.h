@@ -101,20 +101,23 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
 /* Cancellation has left so little of n, of m or of det that their error bounds
  * would leave nearly every point in doubt (points on a line or plane up to
  * rounding). */
-static inline bool incode_plane_is_blurred(const struct incode_sphere *s)
+static inline bool
+incode_plane_is_ill_conditioned(const struct incode_sphere *s)
 {
     return s->pn[0] > 1024 * incode_max_norm(s->n);
 }
 
-static inline bool incode_sphere_is_blurred(const struct incode_sphere *s)
+static inline bool
+incode_sphere_is_ill_conditioned(const struct incode_sphere *s)
 {
     double det = __builtin_fabs(s->det), m = incode_max_norm(s->m);
     return s->pdet > 1024 * det || s->pm[0] > 1024 * m;
 }
 
 /* So ill-conditioned, or so much larger than its face, that it tells nothing of
- * where points lie that are flat up to rounding. */
-static inline bool incode_sphere_is_vast(const struct incode_sphere *s)
+ * where points lie that are coplanar up to rounding. */
+static inline bool
+incode_sphere_is_near_degenerate(const struct incode_sphere *s)
 {
     double size = s->lb > s->lc ? s->lb : s->lc;
     return !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||

@@ -50,7 +50,8 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     incode_vd eps = incode_vd_all(INCODE_SPHERE_EPS);
     incode_vd tiny = incode_vd_all(INCODE_SPHERE_TINY);
     incode_vd margin = plane_error * eps + tiny;
-    incode_vl out = q->timid ? ~(plane > margin) : plane + margin < zero;
+    incode_vl out =
+        q->strictly_beyond ? ~(plane > margin) : plane + margin < zero;
     *depth = zero;
     if (s->has_apex) {
         value -= incode_vd_all(s->det) * square;
@@ -62,17 +63,17 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
     return ~incode_vd_mask(out) & INCODE_VD_ALL;
 }
 
-/* Points that are certainly above the ceiling. */
-INCODE_INLINE uint32_t above_lanes(const struct incode_query *q,
-                                   const struct lane_points *p)
+/* Points that are certainly beyond the radical plane. */
+INCODE_INLINE uint32_t above_radical_lanes(const struct incode_query *q,
+                                           const struct lane_points *p)
 {
     incode_vd value = incode_vd_all(0), far = value;
     for (int d = 0; d < 3; d++) {
-        value += incode_vd_all(q->ceiling.g[d]) * p->r[d];
+        value += incode_vd_all(q->radical.g[d]) * p->r[d];
         far += incode_vd_abs(p->r[d]);
     }
-    return incode_vd_mask(value - far * incode_vd_all(q->ceiling.slack) >
-                          incode_vd_all(q->ceiling.level));
+    return incode_vd_mask(value - far * incode_vd_all(q->radical.slack) >
+                          incode_vd_all(q->radical.level));
 }
 
 /* Points that lie in the ball and not certainly on the known side of the plane:
@@ -93,7 +94,7 @@ INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
     return INCODE_VD_ALL & ~incode_vd_mask(far | below);
 }
 
-/* incode_flat_outside for some points, one bit each. */
+/* incode_near_degenerate_outside for some points, one bit each. */
 INCODE_INLINE uint32_t outside_lanes(const struct incode_query *q,
                                      const struct incode_frame *frame,
                                      unsigned slot)
@@ -106,14 +107,14 @@ INCODE_INLINE uint32_t outside_lanes(const struct incode_query *q,
     for (int d = 0; d < 3; d++) {
         struct incode_lanes r = incode_lanes_difference(incode_vd_load(axis[d]),
                                                         q->pv[d], q->scale);
-        struct incode_lanes m = incode_lanes_all(q->flat.sphere.m[d]);
+        struct incode_lanes m = incode_lanes_all(q->degenerate.sphere.m[d]);
         square = incode_lanes_plus(square, incode_lanes_times(r, r));
         value = incode_lanes_plus(value, incode_lanes_times(m, r));
     }
-    struct incode_lanes det = incode_lanes_all(q->flat.sphere.det);
+    struct incode_lanes det = incode_lanes_all(q->degenerate.sphere.det);
     value = incode_lanes_minus(value, incode_lanes_times(det, square));
     /* 1 + |r|^2 is more than |r|. */
-    incode_vd slack = incode_vd_all(q->flat.spread) *
+    incode_vd slack = incode_vd_all(q->degenerate.spread) *
                           (incode_vd_all(1) + square.hi + square.hi) +
                       incode_vd_all(INCODE_SPHERE_TINY);
     return incode_vd_mask(value.hi < -slack);
@@ -181,20 +182,20 @@ static void consider_circle(struct incode_query *q, uint32_t id,
     memcpy(q->best_p, p, sizeof q->best_p);
 }
 
-void incode_query_support(struct incode_query *q, const double pv[3],
-                          const double n[3], double scale)
+void incode_query_half_space(struct incode_query *q, const double pv[3],
+                             const double n[3], double scale)
 {
     memset(q, 0, sizeof *q);
-    q->question = INCODE_QUERY_SUPPORT;
+    q->question = INCODE_QUERY_HALF_SPACE;
     q->v = q->b = q->c = q->best = INCODE_NONE;
-    q->support.scale = scale;
-    memcpy(q->support.n, n, sizeof q->support.n);
-    memcpy(q->support.p, pv, sizeof q->support.p);
+    q->half_space.scale = scale;
+    memcpy(q->half_space.n, n, sizeof q->half_space.n);
+    memcpy(q->half_space.p, pv, sizeof q->half_space.p);
 }
 
 static void consider_height(struct incode_query *q, const double p[3])
 {
-    struct incode_support *s = &q->support;
+    struct incode_half_space *s = &q->half_space;
     struct incode_dd top = {s->most[0], s->most[1]};
     double r[3], error = 0;
     for (int d = 0; d < 3; d++) {
@@ -203,8 +204,8 @@ static void consider_height(struct incode_query *q, const double p[3])
     }
     if (incode_dot(r, s->n) + error * INCODE_SPHERE_EPS < q->limit)
         return;
-    struct incode_dd height = incode_support_height(s, p);
-    /* What overflows may be anywhere: such a support tells nothing. */
+    struct incode_dd height = incode_half_space_height(s, p);
+    /* What overflows may be anywhere: such a half-space tells nothing. */
     if (!(error < 1e300))
         height = (struct incode_dd){__builtin_inf(), 0};
     if (incode_dd_minus(height, top).hi > 0 || !(height.hi < 1e300)) {
@@ -245,11 +246,11 @@ static uint32_t apex_leaf(const struct incode_query *q,
         if (here != 0)
             here &= apex_lanes(q, &points,
                                (incode_vd *)(chosen->depth + first + i));
-        if (here != 0 && q->ceiling.set)
-            here &= ~above_lanes(q, &points);
+        if (here != 0 && q->radical.set)
+            here &= ~above_radical_lanes(q, &points);
         in |= here << i;
     }
-    if ((in & (in - 1)) == 0 || q->flat.spread == 0)
+    if ((in & (in - 1)) == 0 || q->degenerate.spread == 0)
         return in;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES)
         in &= ~(outside_lanes(q, frame, first + i) << i);
@@ -326,7 +327,7 @@ bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
             incode_query_consider(q, walker->tally, id, p);
             if (q->best == id)
                 choose_again(q, frame, &chosen);
-        } else if (q->question == INCODE_QUERY_SUPPORT)
+        } else if (q->question == INCODE_QUERY_HALF_SPACE)
             consider_height(q, p);
         else if (q->question == INCODE_QUERY_NEAREST)
             consider_near(q, id, p);

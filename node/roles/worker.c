@@ -172,7 +172,7 @@ int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
                       struct node_counted *counted,
                       const struct node_setup_message *setup, const char **why)
 {
-    const struct incode_ports ports = {
+    const struct incode_outside outside = {
         worker,      port_request, port_emit_room, port_emit,
         port_commit, port_spill,   port_unspill};
     uint32_t results =
@@ -193,7 +193,7 @@ int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
     node_outbox_init(&worker->spills, memory + NODE_OUTBOX_BYTES(results),
                      spills);
     worker->triangulator = incode_triangulator_init(
-        memory + boxes, bytes - boxes, &setup->setup, &ports, why);
+        memory + boxes, bytes - boxes, &setup->setup, &outside, why);
     return worker->triangulator == NULL ? -1 : 0;
 }
 

@@ -1,6 +1,6 @@
 /* A triangulator alone in a process: pages come straight from the host's order,
  * spilled faces wait in an array, tetrahedra gather in a list.  By chance its
- * ports refuse, pages come late and in any order, and what the interface
+ * outside refuses, pages come late and in any order, and what the interface
  * promises is checked on the way.
  *
  * Memory: the arena, the set, its tetrahedra.  Work: that of the triangulator.
@@ -69,7 +69,7 @@ static inline bool solo_refuses(struct solo *s)
     return s->chance != 0 && solo_draw(s, 4) == 0;
 }
 
-/* ---- ports ---- */
+/* ---- outside ---- */
 
 static inline bool solo_request(void *context, uint32_t page)
 {
@@ -281,12 +281,12 @@ static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
     assert_non_null(s->arena);
     assert_non_null(s->committed);
     memset(s->arena, 0xa5, s->memory + SOLO_GUARD);
-    const struct incode_ports ports = {
+    const struct incode_outside outside = {
         s,           solo_request, solo_emit_room, solo_emit,
         solo_commit, solo_spill,   solo_unspill};
     const char *why = "";
-    s->t =
-        incode_triangulator_init(s->arena, s->memory, &s->setup, &ports, &why);
+    s->t = incode_triangulator_init(s->arena, s->memory, &s->setup, &outside,
+                                    &why);
     if (s->t == NULL)
         fail_msg("%s", why);
 }

@@ -224,13 +224,13 @@ static void mixed_scales(void **unused)
         for (unsigned c = 0; c < clusters; c++) {
             int size =
                 (int)(round % 3 == 0 ? -530 * draw(&seed) : -60 * draw(&seed));
-            bool flat = draw(&seed) < 0.5;
+            bool coplanar = draw(&seed) < 0.5;
             for (int i = 0; i < 30; i++) {
                 double p[3];
                 for (int d = 0; d < 3; d++) {
                     p[d] = ldexp(draw(&seed), size);
                 }
-                p[2] = flat ? p[0] + p[1] : p[2];
+                p[2] = coplanar ? p[0] + p[1] : p[2];
                 (void)host_points_append(&points, p, 1, &error);
             }
         }
@@ -352,8 +352,9 @@ static struct solo taken_by(const char *kind, uint64_t n)
     return s;
 }
 
-/* Sides that are flat up to rounding, where every point is in doubt about every
- * face: hardly more than the facets of the hull may have to look at all. */
+/* Sides that are coplanar up to rounding, where every point is in doubt about
+ * every face: hardly more than the facets of the hull may have to look at all.
+ */
 static void rough_sides(void **unused)
 {
     (void)unused;
@@ -514,20 +515,20 @@ static void too_little_memory(void **unused)
 {
     (void)unused;
     struct incode_setup setup = {.bricks = 10, .index = INCODE_KD};
-    struct incode_ports ports = {0};
+    struct incode_outside outside = {0};
     size_t least = incode_arena_min(&setup);
     assert_in_range(least, 1, 512 << 10);
     void *arena = aligned_alloc(64, (least + 63) / 64 * 64);
     assert_non_null(arena);
     const char *why = NULL;
     assert_null(
-        incode_triangulator_init(arena, least - 1024, &setup, &ports, &why));
+        incode_triangulator_init(arena, least - 1024, &setup, &outside, &why));
     assert_non_null(why);
     assert_non_null(
-        incode_triangulator_init(arena, least, &setup, &ports, &why));
+        incode_triangulator_init(arena, least, &setup, &outside, &why));
     setup.bricks = 0;
     why = NULL;
-    assert_null(incode_triangulator_init(arena, least, &setup, &ports, &why));
+    assert_null(incode_triangulator_init(arena, least, &setup, &outside, &why));
     assert_non_null(why);
     free(arena);
 }

@@ -72,10 +72,10 @@ static bool in_ball(const struct incode_ball *ball, const double v[3],
     return sqrt(square) <= ball->radius;
 }
 
-static struct incode_support support_of(const double *const f[4],
-                                        double (*p)[3], size_t n, double scale)
+static struct incode_half_space
+half_space_of(const double *const f[4], double (*p)[3], size_t n, double scale)
 {
-    struct incode_support s = {.scale = scale};
+    struct incode_half_space s = {.scale = scale};
     double b[3], c[3];
     for (int d = 0; d < 3; d++) {
         s.p[d] = f[0][d];
@@ -85,7 +85,7 @@ static struct incode_support support_of(const double *const f[4],
     incode_cross(s.n, b, c);
     for (size_t i = 0; i < n; i++) {
         struct incode_dd top = {s.most[0], s.most[1]};
-        struct incode_dd height = incode_support_height(&s, p[i]);
+        struct incode_dd height = incode_half_space_height(&s, p[i]);
         if (incode_dd_minus(height, top).hi > 0) {
             s.most[0] = height.hi;
             s.most[1] = height.lo;
@@ -108,15 +108,15 @@ static void ball_on_a_rough_plane(void **unused)
         if (!draw_face(f, p, n, 3 * SIDE, &tally)) {
             continue;
         }
-        struct incode_support support =
-            support_of((const double **)f, p, n, scale);
-        struct incode_flat flat = {.known = true,
-                                   .ball.radius = INFINITY,
-                                   .supports = &support,
-                                   .count = 1};
-        incode_flat_lessen(&flat, f, scale);
-        balls += flat.ball.radius < INFINITY;
-        small += flat.ball.radius < 12;
+        struct incode_half_space half_space =
+            half_space_of((const double **)f, p, n, scale);
+        struct incode_near_degenerate degenerate = {.known = true,
+                                                    .ball.radius = INFINITY,
+                                                    .half_spaces = &half_space,
+                                                    .count = 1};
+        incode_near_degenerate_lessen(&degenerate, f, scale);
+        balls += degenerate.ball.radius < INFINITY;
+        small += degenerate.ball.radius < 12;
         for (size_t i = 0; i < n; i++) {
             if (p[i] == f[0] || p[i] == f[1] || p[i] == f[2] || p[i] == f[3]) {
                 continue;
@@ -125,10 +125,11 @@ static void ball_on_a_rough_plane(void **unused)
                 incode_orient3d(&tally, f[0], f[1], f[2], p[i]) > 0 &&
                 incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p[i]) > 0;
             if (first) {
-                assert_true(in_ball(&flat.ball, f[0], p[i], scale));
-                firsts += flat.ball.radius < INFINITY;
+                assert_true(in_ball(&degenerate.ball, f[0], p[i], scale));
+                firsts += degenerate.ball.radius < INFINITY;
             }
-            if (incode_flat_outside(&flat, f[0], p[i], scale)) {
+            if (incode_near_degenerate_outside(&degenerate, f[0], p[i],
+                                               scale)) {
                 outside++;
                 assert_true(
                     incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p[i]) < 0);
@@ -162,7 +163,7 @@ static void spheres_of_rough_squares(void **unused)
         incode_sphere_plane(&s, r[1], r[2]);
         incode_sphere_apex(&s, r[1], r[2], r[3]);
         vanished += s.det == 0;
-        assert_true(incode_sphere_is_blurred(&s));
+        assert_true(incode_sphere_is_ill_conditioned(&s));
         incode_sphere_refine(&s, f[0], f[1], f[2], f[3], scale);
         assert_true(s.det > 0);
         for (size_t i = 0; i < n; i += 1 + below(7)) {
@@ -239,18 +240,18 @@ static void places_in_a_pencil(void **unused)
     assert_true(compared > 10000);
 }
 
-/* The first of the gathered points, in float: none that is left out may come
+/* The first of the local points, in float: none that is left out may come
  * before the bound. */
-static void first_of_the_gathered(void **unused)
+static void first_of_the_local_points(void **unused)
 {
-    static struct incode_gather g;
+    static struct incode_local_points g;
     static const double lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1};
     uint16_t out[INCODE_NEAR_ALL];
     size_t found = 0;
     (void)unused;
     for (int k = 0; k < 2000; k++) {
         double far = ldexp(1, (int)below(40));
-        incode_gather_reset(&g);
+        incode_local_reset(&g);
         g.around = 300;
         for (uint32_t i = 0; i < g.around; i++) {
             g.id[i] = i;
@@ -264,17 +265,17 @@ static void first_of_the_gathered(void **unused)
         }
         g.per_unit = 0;
         double p[3] = {g.p[0][7], g.p[1][7], g.p[2][7]};
-        incode_gather_centre(&g, 7, p, 0.35, lo, hi);
+        incode_local_centre(&g, 7, p, 0.35, lo, hi);
         assert_true(g.near > 4 && g.self == 7);
         struct incode_pencil pencil;
         double b[3], c[3], t;
-        incode_gather_relative(&g, g.at[below(g.near)], b);
-        incode_gather_relative(&g, g.at[below(g.near)], c);
+        incode_local_relative(&g, g.at[below(g.near)], b);
+        incode_local_relative(&g, g.at[below(g.near)], c);
         if (!set_pencil(&pencil, b, c, 1e-2)) {
             continue;
         }
         pencil.size = fmax(incode_max_norm(b), incode_max_norm(c));
-        uint32_t count = incode_gather_first(&g, &pencil, &t, out);
+        uint32_t count = incode_local_first(&g, &pencil, &t, out);
         found += count > 0;
         for (uint32_t i = 0; i < g.near && count > 0; i++) {
             double r[3], place;
@@ -282,7 +283,7 @@ static void first_of_the_gathered(void **unused)
             for (uint32_t m = 0; m < count; m++) {
                 listed = listed || out[m] == g.at[i];
             }
-            incode_gather_relative(&g, g.at[i], r);
+            incode_local_relative(&g, g.at[i], r);
             if (!listed && incode_pencil_place(&pencil, r, &place)) {
                 assert_true(incode_pencil_later(&pencil, place) > t);
             }
@@ -308,7 +309,7 @@ static const double *first_of(const double *const f[3], const double *const *p,
 
 /* A random face of a cubic lattice that is turned and rounded, and the other
  * corners of its cell: all on one sphere but for the rounding. */
-static void finals_of_a_rough_lattice(void **unused)
+static void close_candidates_of_a_rough_lattice(void **unused)
 {
     static const double turn[3][3] = {
         {20, 20, -10}, {-4, 22, 20}, {22, -4, 20}};
@@ -335,14 +336,14 @@ static void finals_of_a_rough_lattice(void **unused)
                 corner[i][d] = ldexp(exact ? sum : sum / 30, power);
             }
         }
-        struct incode_finals finals = {.count = 0};
+        struct incode_close_candidates close = {.count = 0};
         size_t n = 1 + below(5);
         for (size_t i = 0; i < n; i++) {
-            assert_true(incode_finals_add(&finals, q[3 + i]));
+            assert_true(incode_close_add(&close, q[3 + i]));
         }
-        uint32_t first = incode_finals_first(
-            &finals, q[0], q[1], q[2], ldexp(1, -power - exact * 5), &tally);
-        if (first == INCODE_FINALS_NONE) {
+        uint32_t first = incode_close_first(
+            &close, q[0], q[1], q[2], ldexp(1, -power - exact * 5), &tally);
+        if (first == INCODE_CLOSE_NONE) {
             continue;
         }
         certain++;
@@ -374,8 +375,9 @@ static void draw_empty(const double *t[4], double (*p)[3], size_t n,
     t[3] = first_of(t, others, count, tally);
 }
 
-/* Points on a sphere up to rounding: what a ceiling rules out is outside. */
-static void ceilings_on_a_rough_sphere(void **unused)
+/* Points on a sphere up to rounding: what a radical plane rules out is outside.
+ */
+static void radical_bounds_on_a_rough_sphere(void **unused)
 {
     enum { POINTS = 24 };
     static double p[POINTS][3];
@@ -383,7 +385,7 @@ static void ceilings_on_a_rough_sphere(void **unused)
     size_t set = 0, out = 0;
     (void)unused;
     for (int k = 0; k < 300; k++) {
-        struct incode_empties empties = {.count = 0};
+        struct incode_empty_spheres empty = {.count = 0};
         double size = ldexp(1, (int)below(40) - 20), scale = 1 / size;
         double at = k % 3 == 0 ? 0 : size * ldexp(1, (int)below(6));
         for (size_t i = 0; i < POINTS; i++) {
@@ -399,20 +401,20 @@ static void ceilings_on_a_rough_sphere(void **unused)
         const double *t[4], *f[4];
         for (int i = 0; i < 3; i++) {
             draw_empty(t, p, POINTS, &tally);
-            incode_empties_add(&empties, t, scale);
+            incode_empty_spheres_add(&empty, t, scale);
         }
         for (int m = 0; m < 20; m++) {
             if (!draw_face(f, p, POINTS, POINTS - 1, &tally)) {
                 continue;
             }
-            struct incode_ceiling c;
+            struct incode_radical_bound c;
             double b[3], d[3], n[3], r[3];
             for (int i = 0; i < 3; i++) {
                 b[i] = (f[1][i] - f[0][i]) * scale;
                 d[i] = (f[2][i] - f[0][i]) * scale;
             }
             incode_cross(n, b, d);
-            incode_ceiling_set(&c, &empties, f, scale, n);
+            incode_radical_bound_set(&c, &empty, f, scale, n);
             set += c.set;
             for (size_t i = 0; i < POINTS && c.set; i++) {
                 double far = 0;
@@ -431,9 +433,9 @@ static void ceilings_on_a_rough_sphere(void **unused)
     assert_true(set > 500 && out > 2000);
 }
 
-/* A sphere of vastly larger scale: what a ceiling by it rules out is outside,
- * and where the products leave the range of doubles there is none. */
-static void ceilings_across_scales(void **unused)
+/* A sphere of much larger scale: what a radical plane by it rules out is
+ * outside, and where the products leave the range of doubles there is none. */
+static void radical_bounds_across_scales(void **unused)
 {
     struct incode_tally tally = {0};
     size_t set = 0, out = 0;
@@ -446,18 +448,18 @@ static void ceilings_across_scales(void **unused)
             {0, 0, 0}, {0, small, 0}, {small, 0, 0}, {0, 0, small}};
         const double *const t[4] = {large[0], large[1], large[2], large[3]};
         const double *const f[4] = {face[0], face[2], face[1], face[3]};
-        struct incode_empties empties = {.count = 0};
-        struct incode_ceiling c;
+        struct incode_empty_spheres empty = {.count = 0};
+        struct incode_radical_bound c;
         const double n[3] = {1, 1, 1};
         if (incode_orient3d(&tally, t[0], t[1], t[2], t[3]) > 0) {
-            incode_empties_add(&empties, t, 1 / big);
+            incode_empty_spheres_add(&empty, t, 1 / big);
         } else {
             const double *const u[4] = {t[0], t[2], t[1], t[3]};
-            incode_empties_add(&empties, u, 1 / big);
+            incode_empty_spheres_add(&empty, u, 1 / big);
         }
-        assert_int_equal(empties.count, 1);
+        assert_int_equal(empty.count, 1);
         assert_true(incode_orient3d(&tally, f[0], f[1], f[2], f[3]) > 0);
-        incode_ceiling_set(&c, &empties, f, 1 / small, n);
+        incode_radical_bound_set(&c, &empty, f, 1 / small, n);
         set += c.set;
         for (int i = 0; i < 64 && c.set; i++) {
             int place[3] = {i % 4, i / 4 % 4, i / 16};
@@ -479,13 +481,15 @@ static void a_difference_that_vanishes(void **unused)
     (void)unused;
     const double v[3] = {0, 0, 0}, b[3] = {0x1p60, 0, 0}, c[3] = {0, 0x1p60, 0};
     const double near[3] = {0, 0, 0x1p-1060}, within[3] = {0x1p58, 0x1p58, 1};
-    struct incode_flat flat = {
+    struct incode_near_degenerate degenerate = {
         .known = true, .regular = true, .c0 = {0.5, 0.5, 0}};
-    flat.ball.radius = INFINITY;
-    incode_flat_lessen(&flat, (const double *[]){v, b, c, near}, 0x1p-60);
-    assert_true(isinf(flat.ball.radius));
-    incode_flat_lessen(&flat, (const double *[]){v, b, c, within}, 0x1p-60);
-    assert_true(flat.ball.radius < 0.8);
+    degenerate.ball.radius = INFINITY;
+    incode_near_degenerate_lessen(&degenerate,
+                                  (const double *[]){v, b, c, near}, 0x1p-60);
+    assert_true(isinf(degenerate.ball.radius));
+    incode_near_degenerate_lessen(&degenerate,
+                                  (const double *[]){v, b, c, within}, 0x1p-60);
+    assert_true(degenerate.ball.radius < 0.8);
 }
 
 /* A face so small beside its units that products vanish: the sphere's centre is
@@ -520,13 +524,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ball_on_a_rough_plane),
         cmocka_unit_test(spheres_of_rough_squares),
-        cmocka_unit_test(finals_of_a_rough_lattice),
-        cmocka_unit_test(ceilings_on_a_rough_sphere),
-        cmocka_unit_test(ceilings_across_scales),
+        cmocka_unit_test(close_candidates_of_a_rough_lattice),
+        cmocka_unit_test(radical_bounds_on_a_rough_sphere),
+        cmocka_unit_test(radical_bounds_across_scales),
         cmocka_unit_test(a_difference_that_vanishes),
         cmocka_unit_test(a_sphere_that_vanishes),
         cmocka_unit_test(places_in_a_pencil),
-        cmocka_unit_test(first_of_the_gathered),
+        cmocka_unit_test(first_of_the_local_points),
     };
     state = 88172645463325252u;
     return cmocka_run_group_tests(tests, NULL, NULL);
