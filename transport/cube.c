@@ -23,38 +23,38 @@ static unsigned nodes(const struct cube *cube)
 }
 
 /* Whether each of the host's wires is used: not on a tree, which has its root
- * at the gate. */
-static bool many_doors(const struct cube *cube)
+ * at the gateway. */
+static bool many_host_ports(const struct cube *cube)
 {
     return cube->config.host_wires > 1 && !cube->routes.tree;
 }
 
-/* The node by which a node and the host reach each other.  Between the two
- * e-cube's dimensions are above those in which doors differ. */
-static unsigned door_of(const struct cube *cube, unsigned node)
+/* The node by whose host port a node and the host reach each other.  Between
+ * the two e-cube's dimensions are above those in which these nodes differ. */
+static unsigned host_port_of(const struct cube *cube, unsigned node)
 {
-    return many_doors(cube) ? node & (cube->config.host_wires - 1u)
-                            : cube->wiring.gate;
+    return many_host_ports(cube) ? node & (cube->config.host_wires - 1u)
+                                 : cube->wiring.gateway;
 }
 
-/* The host's link to a door. */
-static unsigned link_of_door(const struct cube *cube, unsigned door)
+/* The host's link to the host port of a node. */
+static unsigned link_of_host_port(const struct cube *cube, unsigned node)
 {
     if (cube->config.host_wires > 1) {
-        return door;
+        return node;
     }
-    return cube->count > 1 && door == cube->config.spare_node ? 1 : 0;
+    return cube->count > 1 && node == cube->config.spare_node ? 1 : 0;
 }
 
-/* The host is behind a door's last link; 0: there is no way. */
+/* A host port is a node's last; 0: there is no way. */
 static uint32_t way_to(const struct cube *cube, unsigned dest)
 {
     unsigned self = cube->config.self;
     if (is_host(cube)) {
-        return (uint32_t)1 << link_of_door(cube, door_of(cube, dest));
+        return (uint32_t)1 << link_of_host_port(cube, host_port_of(cube, dest));
     }
     if (dest == CUBE_HOST) {
-        dest = door_of(cube, self);
+        dest = host_port_of(cube, self);
         if (self == dest) {
             return cube->count > cube->config.dimension
                        ? (uint32_t)1 << cube->config.dimension
@@ -71,15 +71,17 @@ static uint32_t way_to(const struct cube *cube, unsigned dest)
 static uint32_t ways_to_all(const struct cube *cube, unsigned source)
 {
     unsigned self = cube->config.self;
-    unsigned root = source == CUBE_HOST ? door_of(cube, self) : source;
-    uint32_t doors = many_doors(cube) ? cube->config.host_wires - 1u : 0;
+    unsigned root = source == CUBE_HOST ? host_port_of(cube, self) : source;
+    uint32_t between = many_host_ports(cube) ? cube->config.host_wires - 1u : 0;
     if (is_host(cube)) {
-        return doors != 0 ? ((uint32_t)1 << cube->count) - 1
-                          : (uint32_t)1 << link_of_door(cube, door_of(cube, 0));
+        return between != 0
+                   ? ((uint32_t)1 << cube->count) - 1
+                   : (uint32_t)1
+                         << link_of_host_port(cube, host_port_of(cube, 0));
     }
     uint32_t ways = routes_to_all(&cube->routes, self, root);
     if (source == CUBE_HOST) {
-        ways &= ~doors; /* what differs in these dimensions has its own door */
+        ways &= ~between; /* what differs in these has a host port of its own */
     }
     return self == source ? ways : ways | (uint32_t)1 << LOCAL;
 }
@@ -156,8 +158,9 @@ static bool sound(const struct cube_config *config)
                 (wires < 2 || config->spare_node == 0);
     return even && config->dimension <= CUBE_DIMENSION_MAX &&
            (config->self == CUBE_HOST
-                ? config->gate == 0 || config->gate == config->spare_node ||
-                      config->gate < wires
+                ? config->gateway == 0 ||
+                      config->gateway == config->spare_node ||
+                      config->gateway < wires
                 : config->self < 1u << config->dimension) &&
            config->spare_node < 1u << config->dimension;
 }
@@ -228,7 +231,8 @@ static unsigned field16(const uint8_t *bytes)
 }
 
 /* Whether a message of another generation is to be dropped.  If not, the
- * neighbour knows of a generation that it has told us in a note: that comes. */
+ * neighbour knows of a generation that it has told us in a state datagram: that
+ * comes. */
 static bool outdated(const struct cube *cube, unsigned stamp)
 {
     return cube->wiring.generation != 0 && (int16_t)(stamp - cube->stamp) < 0;

@@ -7,9 +7,10 @@
  *
  * Generations make every loss survivable: the host begins a new one
  * (cube_renew) when something was lost, and all messages of the old one are
- * dropped wherever they are.  The generation, the gate (the node by which the
- * host speaks) and the dead links are gossiped from link to link; a node that
- * starts is told by its neighbours, and neither sends nor reads before.
+ * dropped wherever they are.  The generation, the host gateway (the node by
+ * which the host speaks) and the dead links are gossiped from link to link; a
+ * node that starts is told by its neighbours, and neither sends nor reads
+ * before.
  *
  * Memory: one arena of cube_arena_bytes(): a send and a receive window for each
  * link, nothing shared between links (Dally and Seitz, 1987: e-cube routing is
@@ -59,7 +60,7 @@ struct cube_wrong {
 struct cube_wiring {
     uint32_t generation; /* 1 at the start; 0: not told yet */
     uint32_t host_epoch; /* of the host that began it */
-    uint16_t gate;       /* the node by which the host speaks */
+    uint16_t gateway;    /* the node by which the host speaks */
     uint16_t settled;    /* dead[0 .. settled) were so when it began: routes
                             avoid them; the others were found since */
     uint16_t dead_count, wrong_count;
@@ -85,7 +86,7 @@ struct cube_config {
      * the same low bits. */
     uint8_t host_wires; /* 2 .. CUBE_HOST_WIRES_MAX; 0: to node 0 */
     bool host_wire;     /* node's; node 0 has one always */
-    uint16_t gate;      /* host's: of the first generation */
+    uint16_t gateway;   /* host's: of the first generation */
     uint32_t dead_us;   /* a link that was up, and then was down or silent for
                            so long, is dead; 0: never */
     /* Zero means the default. */
@@ -161,9 +162,9 @@ const struct cube_statistics *cube_statistics(const struct cube *cube);
  * never sends in a generation what it decided in another. */
 const struct cube_wiring *cube_wiring(const struct cube *cube);
 
-/* At the host: begins a generation with next's gate and dead links, and drops
- * all messages of the old one here and, as it spreads, everywhere.  Its number
- * is next's, or one more than the present where that is higher. */
+/* At the host: begins a generation with next's gateway and dead links, and
+ * drops all messages of the old one here and, as it spreads, everywhere.  Its
+ * number is next's, or one more than the present where that is higher. */
 void cube_renew(struct cube *cube, const struct cube_wiring *next);
 
 /* Whether a node can be reached, by what was dead when the generation began. */

@@ -10,7 +10,7 @@
 
 #include "routes.h"
 
-enum { CUBE_GOSSIP_US = 50000 }; /* between notes that are not answered */
+enum { CUBE_GOSSIP_US = 50000 }; /* between datagrams that are not answered */
 
 /* The oldest message of a link, while it is under way. */
 struct cube_arrival {
@@ -42,8 +42,8 @@ struct cube {
     uint32_t kept_back; /* links whose last slot is left to this node once */
     uint16_t stamp;     /* of messages: the generation's low bits */
     bool again;         /* a message waits only for that turn to pass */
-    uint8_t note[WIRING_BYTES_MAX]; /* the wiring, as it is told */
-    size_t note_size;
+    uint8_t datagram[WIRING_BYTES_MAX]; /* the wiring, as it is told */
+    size_t datagram_size;
     uint64_t now_us;    /* of the last poll */
     uint64_t looked_us; /* when links were looked at last */
 };

@@ -1,6 +1,6 @@
 /* How what is known of the wiring spreads: each end of a link tells the other
- * in a note, when the link comes up and when something new was learnt, again
- * and again until the other has said the same. */
+ * in a state datagram, when the link comes up and when something new was
+ * learnt, again and again until the other has said the same. */
 #include "check.h"
 #include "cube_internal.h"
 
@@ -15,14 +15,14 @@ static bool is_host(const struct cube *cube)
 
 static void tell(struct cube *cube, unsigned d, uint64_t now_us, bool ask)
 {
-    link_note(cube->links[d], cube->note, cube->note_size, ask);
+    link_put_datagram(cube->links[d], cube->datagram, cube->datagram_size, ask);
     cube->neighbours[d].told_us = now_us;
 }
 
 /* After a change: nobody has heard of it yet. */
 static void spread(struct cube *cube)
 {
-    cube->note_size = wiring_pack(&cube->wiring, cube->note);
+    cube->datagram_size = wiring_pack(&cube->wiring, cube->datagram);
     for (unsigned d = 0; d < cube->count; d++) {
         cube->neighbours[d].agreed = false;
         tell(cube, d, cube->now_us, true);
@@ -41,7 +41,7 @@ void cube_gossip_start(struct cube *cube)
     if (is_host(cube)) {
         cube->wiring.generation = 1;
         cube->wiring.host_epoch = cube->config.epoch;
-        cube->wiring.gate = cube->config.gate;
+        cube->wiring.gateway = cube->config.gateway;
     }
     cube->stamp = (uint16_t)cube->wiring.generation;
     routes_find(&cube->routes, &cube->wiring);
@@ -51,8 +51,9 @@ void cube_gossip_start(struct cube *cube)
 void cube_renew(struct cube *cube, const struct cube_wiring *next)
 {
     uint32_t present = cube->wiring.generation;
-    LINK_ASSERT(is_host(cube) && next->dead_count <= CUBE_DEAD_MAX &&
-                (next->gate == 0 || next->gate == cube->config.spare_node));
+    LINK_ASSERT(
+        is_host(cube) && next->dead_count <= CUBE_DEAD_MAX &&
+        (next->gateway == 0 || next->gateway == cube->config.spare_node));
     cube->wiring = *next;
     if (next->generation <= present) {
         cube->wiring.generation = present + 1;
@@ -94,12 +95,12 @@ static void hear(struct cube *cube, const struct cube_wiring *theirs)
     }
 }
 
-static void take_note(struct cube *cube, unsigned d,
-                      const struct link_message *note, bool ask,
-                      uint64_t now_us)
+static void take_datagram(struct cube *cube, unsigned d,
+                          const struct link_message *datagram, bool ask,
+                          uint64_t now_us)
 {
     struct cube_wiring theirs;
-    if (!wiring_unpack(&theirs, note->data, note->size,
+    if (!wiring_unpack(&theirs, datagram->data, datagram->size,
                        cube->config.dimension)) {
         cube->statistics.misrouted++;
         return;
@@ -202,7 +203,7 @@ static bool lags(const struct cube *cube, unsigned d)
 
 void cube_gossip(struct cube *cube, uint64_t now_us)
 {
-    struct link_message note;
+    struct link_message datagram;
     bool ask;
     cube->now_us = now_us;
     look(cube, now_us);
@@ -214,8 +215,8 @@ void cube_gossip(struct cube *cube, uint64_t now_us)
             n->agreed = false;
             n->told_us = now_us - CUBE_GOSSIP_US;
         }
-        if (link_take_note(cube->links[d], &note, &ask)) {
-            take_note(cube, d, &note, ask, now_us);
+        if (link_take_datagram(cube->links[d], &datagram, &ask)) {
+            take_datagram(cube, d, &datagram, ask, now_us);
         }
     }
     for (unsigned d = 0; d < cube->count; d++) {

@@ -282,24 +282,26 @@ unsigned link_forget_unsent(struct link *link)
     return count;
 }
 
-void link_note(struct link *link, const void *note, size_t size, bool ask)
+void link_put_datagram(struct link *link, const void *bytes, size_t size,
+                       bool ask)
 {
-    LINK_ASSERT(size >= 1 && size <= LINK_NOTE_MAX);
-    link->notes.out = note;
-    link->notes.out_size = (uint16_t)size;
-    link->notes.asks = ask;
-    link->notes.due = true;
+    LINK_ASSERT(size >= 1 && size <= LINK_DATAGRAM_MAX);
+    link->datagrams.out = bytes;
+    link->datagrams.out_size = (uint16_t)size;
+    link->datagrams.asks = ask;
+    link->datagrams.due = true;
 }
 
-bool link_take_note(struct link *link, struct link_message *note, bool *ask)
+bool link_take_datagram(struct link *link, struct link_message *datagram,
+                        bool *ask)
 {
-    struct link_notes *n = &link->notes;
+    struct link_datagrams *n = &link->datagrams;
     if (!n->heard) {
         return false;
     }
     n->heard = false;
-    note->data = n->in;
-    note->size = n->in_size;
+    datagram->data = n->in;
+    datagram->size = n->in_size;
     *ask = n->asked;
     return true;
 }
@@ -382,7 +384,7 @@ uint64_t link_next_due_us(const struct link *link, uint64_t now_us)
                              : c->hello_us;
     }
     if (link_may_send(link) || link_ack_due(link) || link_hello_due(link) ||
-        link->notes.due) {
+        link->datagrams.due) {
         return 0;
     }
     due = until(link->sent_us, c->keep_alive_us, now_us);

@@ -26,7 +26,7 @@ enum {
     LINK_FRAME_PAYLOAD_MIN = 32, /* bytes */
     LINK_FRAME_PAYLOAD_MAX = 1616,
     LINK_MESSAGE_MAX = 1616,
-    LINK_NOTE_MAX = 96, /* bytes */
+    LINK_DATAGRAM_MAX = 96, /* bytes */
     LINK_PIPE_CLOSED = -1,
     LINK_AGAIN = -1
 };
@@ -83,7 +83,7 @@ struct link_statistics {
     uint64_t acks_sent;   /* frames that carry nothing else */
     uint64_t probes_sent; /* asked for credits that may have been lost */
     uint64_t hellos_sent;
-    uint64_t notes_sent;
+    uint64_t datagrams_sent;
     uint64_t bad_header;       /* frames with a false header check */
     uint64_t bad_crc;          /* with a false CRC-32 */
     uint64_t bad_code;         /* with a false length or COBS code */
@@ -166,16 +166,18 @@ void link_release(struct link *link);
 /* Drops the messages of which nothing was sent yet; returns how many. */
 unsigned link_forget_unsent(struct link *link);
 
-/* Beside the messages, and ahead of those not sent yet, go notes: 1 ..
- * LINK_NOTE_MAX bytes that may be lost and say what is so, not what happened,
- * so that the newest stands for all before it.  link_note has one sent soon,
- * if the link is up; `note` stays where it is, and may change until it goes.
- * With `ask` the peer is told that an answer is wanted. */
-void link_note(struct link *link, const void *note, size_t size, bool ask);
+/* Beside the messages, and ahead of those not sent yet, go state datagrams: 1
+ * .. LINK_DATAGRAM_MAX bytes that may be lost and say what is so, not what
+ * happened, so that the newest stands for all before it.  link_put_datagram has
+ * one sent soon, if the link is up; `bytes` stay where they are, and may change
+ * until they go.  With `ask` the peer is told that an answer is wanted. */
+void link_put_datagram(struct link *link, const void *bytes, size_t size,
+                       bool ask);
 
-/* The newest note that came since the last call, valid until link_poll;
+/* The newest datagram that came since the last call, valid until link_poll;
  * false: none. */
-bool link_take_note(struct link *link, struct link_message *note, bool *ask);
+bool link_take_datagram(struct link *link, struct link_message *datagram,
+                        bool *ask);
 
 /* Says farewell once all is acknowledged; after deadline_us, or when the peer
  * says farewell too, the state is LINK_CLOSED. */

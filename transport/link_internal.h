@@ -19,7 +19,7 @@ enum {
     LINK_CANDIDATE_HELLOS = 20 /* then an unconfirmed peer is forgotten */
 };
 
-enum link_kind { LINK_HELLO = 1, LINK_DATA, LINK_ACK, LINK_BYE, LINK_NOTE };
+enum link_kind { LINK_HELLO = 1, LINK_DATA, LINK_ACK, LINK_BYE, LINK_STATE };
 
 /* LINK_MORE: the message goes on in the next frame.  LINK_ASK: please answer
  * at once. */
@@ -93,11 +93,11 @@ struct link_bytes_out {
     size_t begin, end;
 };
 
-struct link_notes {
+struct link_datagrams {
     const uint8_t *out; /* the caller's */
     uint16_t out_size, in_size;
     bool due, asks, heard, asked;
-    uint8_t in[LINK_NOTE_MAX];
+    uint8_t in[LINK_DATAGRAM_MAX];
 };
 
 struct link {
@@ -109,7 +109,7 @@ struct link {
     struct link_receiver receive;
     struct link_bytes_in in;
     struct link_bytes_out out;
-    struct link_notes notes;
+    struct link_datagrams datagrams;
     size_t buffer_bytes; /* of in and out, each */
     uint16_t fragments_max;
     uint16_t peer_window;
@@ -127,9 +127,9 @@ struct link {
 /* Of one encoded frame, of any kind. */
 static inline size_t link_frame_bytes(const struct link_config *config)
 {
-    return FRAME_ENCODED(config->frame_payload > LINK_NOTE_MAX
+    return FRAME_ENCODED(config->frame_payload > LINK_DATAGRAM_MAX
                              ? config->frame_payload
-                             : LINK_NOTE_MAX);
+                             : LINK_DATAGRAM_MAX);
 }
 
 /* session.c */

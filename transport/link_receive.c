@@ -145,10 +145,10 @@ static void on_bye(struct link *link, const struct frame_header *header)
     link->up = false;
 }
 
-static void on_note(struct link *link, const struct frame_header *header,
-                    const uint8_t *bytes)
+static void on_datagram(struct link *link, const struct frame_header *header,
+                        const uint8_t *bytes)
 {
-    struct link_notes *n = &link->notes;
+    struct link_datagrams *n = &link->datagrams;
     memcpy(n->in, bytes, header->size);
     n->in_size = header->size;
     n->asked = (header->flags & LINK_ASK) != 0;
@@ -160,13 +160,14 @@ static enum frame_result take_control(struct link *link,
                                       struct frame_reader *reader,
                                       const struct frame_header *header)
 {
-    uint8_t bytes[LINK_NOTE_MAX];
+    uint8_t bytes[LINK_DATAGRAM_MAX];
     uint64_t sack = 0;
     unsigned size = header->size;
     bool fits = header->kind == LINK_HELLO ? size == LINK_HELLO_SIZE
                 : header->kind == LINK_ACK ? size == 0 || size == LINK_SACK_SIZE
-                : header->kind == LINK_NOTE ? size >= 1 && size <= LINK_NOTE_MAX
-                                            : size == 0;
+                : header->kind == LINK_STATE
+                    ? size >= 1 && size <= LINK_DATAGRAM_MAX
+                    : size == 0;
     if (!fits) {
         return FRAME_BAD_CODE;
     }
@@ -179,9 +180,9 @@ static enum frame_result take_control(struct link *link,
         link_on_hello(link, header, bytes);
         return FRAME_GOOD;
     }
-    if (header->kind == LINK_NOTE) {
+    if (header->kind == LINK_STATE) {
         link_on_acknowledge(link, header, 0);
-        on_note(link, header, bytes);
+        on_datagram(link, header, bytes);
         return FRAME_GOOD;
     }
     for (unsigned i = 0; i < size; i++) {
@@ -217,7 +218,7 @@ static enum frame_result take_frame(struct link *link, const uint8_t *in,
         return link->up ? take_data(link, &reader, &header) : FRAME_GOOD;
     }
     if (header.kind == LINK_ACK || header.kind == LINK_BYE ||
-        header.kind == LINK_NOTE) {
+        header.kind == LINK_STATE) {
         return take_control(link, &reader, &header);
     }
     return FRAME_BAD_CODE;

@@ -108,8 +108,8 @@ static void free_first(struct link *link, struct news *news)
     s->first++;
 }
 
-static void note_sack(struct link *link, uint16_t ack, uint64_t sack,
-                      struct news *news)
+static void mark_acknowledged(struct link *link, uint16_t ack, uint64_t sack,
+                              struct news *news)
 {
     struct link_sender *s = &link->send;
     LINK_ASSERT(ack == s->first);
@@ -137,7 +137,7 @@ void link_on_acknowledge(struct link *link, const struct frame_header *header,
         again |= s->slots[s->head].again;
         free_first(link, &news);
     }
-    note_sack(link, header->acknowledge, sack, &news);
+    mark_acknowledged(link, header->acknowledge, sack, &news);
     if (news.ordered && (sack != 0 || again || s->arrived > 0)) {
         mark_lost(link, news.order);
     }
@@ -309,13 +309,13 @@ static void stage_hello(struct link *link)
     }
 }
 
-static void stage_note(struct link *link)
+static void stage_datagram(struct link *link)
 {
-    struct link_notes *n = &link->notes;
-    stage(link, LINK_NOTE, n->asks ? LINK_ASK : 0, link->send.next, n->out,
+    struct link_datagrams *n = &link->datagrams;
+    stage(link, LINK_STATE, n->asks ? LINK_ASK : 0, link->send.next, n->out,
           n->out_size);
     n->due = false;
-    link->statistics.notes_sent++;
+    link->statistics.datagrams_sent++;
 }
 
 static void stage_bye(struct link *link, unsigned flags)
@@ -436,8 +436,8 @@ static bool stage_one(struct link *link)
     if (!link->up) {
         return false;
     }
-    if (link->notes.due) {
-        stage_note(link);
+    if (link->datagrams.due) {
+        stage_datagram(link);
     } else if (link->receive.ack_now && link->receive.early > 0) {
         stage_ack(link, 0);
     } else if (link->send.lost > 0) {

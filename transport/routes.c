@@ -57,7 +57,7 @@ static unsigned place_of(const struct routes *routes, unsigned node)
 
 static unsigned usual_parent(const struct routes *routes, unsigned node)
 {
-    unsigned relative = node ^ routes->wiring.gate;
+    unsigned relative = node ^ routes->wiring.gateway;
     return relative == 0 ? ROUTES_NONE : node ^ (relative & -relative);
 }
 
@@ -83,7 +83,7 @@ static void set_parent(struct routes *routes, unsigned node, unsigned parent)
     at->parent = (uint16_t)parent;
 }
 
-/* The end of the way up: the gate, or a node that hangs free. */
+/* The end of the way up: the gateway, or a node that hangs free. */
 static unsigned root_of(const struct routes *routes, unsigned node)
 {
     unsigned parent = parent_of(routes, node);
@@ -142,8 +142,8 @@ static void tie(struct routes *routes, unsigned node, unsigned parent)
 /* Ties the subtree that hangs free at `root`, where that is possible. */
 static bool try_to_tie(struct routes *routes, unsigned root)
 {
-    unsigned gate = routes->wiring.gate;
-    unsigned nodes = 1u << lowest_bit(root ^ gate);
+    unsigned gateway = routes->wiring.gateway;
+    unsigned nodes = 1u << lowest_bit(root ^ gateway);
     if (node_is_dead(routes, root)) {
         return false;
     }
@@ -155,7 +155,7 @@ static bool try_to_tie(struct routes *routes, unsigned root)
         for (unsigned d = 0; d < routes->dimension; d++) {
             unsigned other = node ^ 1u << d;
             if (!link_is_dead(routes, node, d) &&
-                root_of(routes, other) == gate) {
+                root_of(routes, other) == gateway) {
                 tie(routes, node, other);
                 return true;
             }
@@ -174,7 +174,7 @@ static void tie_all(struct routes *routes)
         while (place < routes->altered_count) {
             const struct routes_altered *a = &routes->altered[place];
             unsigned node = a->node;
-            if (a->parent == ROUTES_NONE && node != routes->wiring.gate) {
+            if (a->parent == ROUTES_NONE && node != routes->wiring.gateway) {
                 more |= try_to_tie(routes, node);
             }
             place = place_of(routes, node + 1);
@@ -200,7 +200,7 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring)
             set_free(routes, node, link);
             continue;
         }
-        if (node != w->gate) {
+        if (node != w->gateway) {
             set_parent(routes, node, ROUTES_NONE);
         }
         for (unsigned d = 0; d < routes->dimension; d++) {
@@ -214,7 +214,7 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring)
 
 bool routes_reach(const struct routes *routes, unsigned node)
 {
-    return !routes->tree || root_of(routes, node) == routes->wiring.gate;
+    return !routes->tree || root_of(routes, node) == routes->wiring.gateway;
 }
 
 unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest)

@@ -1,9 +1,10 @@
 /* Which way a message goes.  While nothing is dead: e-cube, the lowest
  * differing dimension first, and binomial trees.  Else: along one spanning tree
- * of what is left of the cube, rooted at the gate, the same for all messages.
+ * of what is left of the cube, rooted at the gateway, the same for all
+ * messages.
  *
  * The tree.  A node's parent is the node without its lowest bit, counted from
- * the gate.  Where that link is dead, a subtree hangs free; the first of its
+ * the gateway.  Where that link is dead, a subtree hangs free; the first of its
  * nodes that has a live link into the tree is tied to it, and the parents
  * between that node and the subtree's root turn round.  Only such parents are
  * remembered.  All nodes come to the same tree, as it follows from the wiring.
@@ -55,12 +56,12 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring);
 unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest);
 
 /* The links, as bits, on which `self` passes on a message to all nodes that
- * `root` has sent (the gate where the host has).  On the tree these are all its
- * links: the message does not go back where it came from. */
+ * `root` has sent (the gateway where the host has).  On the tree these are all
+ * its links: the message does not go back where it came from. */
 uint32_t routes_to_all(const struct routes *routes, unsigned self,
                        unsigned root);
 
-/* Whether a node can be reached from the gate. */
+/* Whether a node can be reached from the gateway. */
 bool routes_reach(const struct routes *routes, unsigned node);
 
 #endif

@@ -126,7 +126,7 @@ static bool still_in_use(const struct link *link, uint32_t epoch, bool to_us)
     return link->peer.refusal == LINK_IN_USE && (!to_us || reborn);
 }
 
-static void note_peer(struct link *link, const uint8_t *hello)
+static void describe_peer(struct link *link, const uint8_t *hello)
 {
     struct link_peer *peer = &link->peer;
     bool to_us = get32(hello + 12) == link->config.epoch;
@@ -234,7 +234,7 @@ void link_on_hello(struct link *link, const struct frame_header *header,
     if (epoch == link->peer_epoch) {
         link->kept_us = link->now_us;
     }
-    note_peer(link, hello);
+    describe_peer(link, hello);
     if (link_refuses(link)) {
         link->up = false;
         return;

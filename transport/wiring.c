@@ -3,7 +3,8 @@
 #include <assert.h>
 #include <string.h>
 
-static_assert(WIRING_BYTES_MAX <= (int)LINK_NOTE_MAX, "the wiring fits a note");
+static_assert(WIRING_BYTES_MAX <= (int)LINK_DATAGRAM_MAX,
+              "the wiring fits a datagram");
 
 /* --- bytes --------------------------------------------------------------- */
 
@@ -28,7 +29,7 @@ size_t wiring_pack(const struct cube_wiring *wiring, uint8_t *bytes)
     uint8_t *at = bytes;
     put(&at, wiring->generation, 4);
     put(&at, wiring->host_epoch, 4);
-    put(&at, wiring->gate, 2);
+    put(&at, wiring->gateway, 2);
     put(&at, wiring->settled, 1);
     put(&at, wiring->dead_count, 1);
     put(&at, wiring->wrong_count, 1);
@@ -176,7 +177,7 @@ bool wiring_merge(struct cube_wiring *mine, const struct cube_wiring *theirs,
 static bool sound(const struct cube_wiring *wiring, unsigned dimension)
 {
     unsigned nodes = 1u << dimension;
-    bool right = wiring->gate < nodes;
+    bool right = wiring->gateway < nodes;
     for (unsigned i = 0; i < wiring->dead_count; i++) {
         const struct cube_dead *d = &wiring->dead[i];
         bool link = d->dimension < dimension;
@@ -217,7 +218,7 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
     }
     wiring->generation = get(&at, 4);
     wiring->host_epoch = get(&at, 4);
-    wiring->gate = (uint16_t)get(&at, 2);
+    wiring->gateway = (uint16_t)get(&at, 2);
     wiring->settled = (uint16_t)get(&at, 1);
     wiring->dead_count = (uint16_t)get(&at, 1);
     wiring->wrong_count = (uint16_t)get(&at, 1);
@@ -246,11 +247,11 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
 
 /* --- a new generation ---------------------------------------------------- */
 
-/* The gate lives while its host's wire does. */
+/* The gateway lives while its host's wire does. */
 static bool all_links_dead(const struct cube_wiring *wiring, unsigned node,
                            unsigned dimension)
 {
-    bool all = dimension > 0 && node != wiring->gate;
+    bool all = dimension > 0 && node != wiring->gateway;
     for (unsigned d = 0; d < dimension; d++) {
         all &= wiring_is_dead(wiring, wiring->dead_count, node, d, dimension);
     }

@@ -1,6 +1,6 @@
 /* What the ends of a cube agree on (struct cube_wiring): how it is merged, so
- * that all come to the same whatever the order and number of notes, and how it
- * looks as bytes.  PROTOCOL.md has the layout.
+ * that all come to the same whatever the order and number of datagrams, and how
+ * it looks as bytes.  PROTOCOL.md has the layout.
  *
  * Memory: the caller's.  Work: at most CUBE_DEAD_MAX^2 comparisons a call.
  *

@@ -23,8 +23,8 @@ enum {
 
 static unsigned wire_of(const struct host_service *s)
 {
-    uint16_t gate = cube_wiring(s->cube)->gate;
-    return gate != 0 && gate == s->machine->spare_node ? 1 : 0;
+    uint16_t gateway = cube_wiring(s->cube)->gateway;
+    return gateway != 0 && gateway == s->machine->spare_node ? 1 : 0;
 }
 
 /* --- the beginning ------------------------------------------------------- */
@@ -44,11 +44,11 @@ static void close_start(struct host_service *s, unsigned i)
 
 static unsigned distance(const struct host_service *s, unsigned node)
 {
-    return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gate);
+    return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gateway);
 }
 
 /* Pings one more node: of those that have not answered one that is nearest to
- * the gate, so that the way to it leads over nodes that have. */
+ * the gateway, so that the way to it leads over nodes that have. */
 static void ping_next(struct host_service *s)
 {
     unsigned best = UINT32_MAX;
@@ -206,7 +206,7 @@ static void ping_in_turn(struct host_service *s, uint64_t now_us)
 
 unsigned host_detector_link(const struct host_service *service, unsigned node)
 {
-    return host_link_to(node, cube_wiring(service->cube)->gate,
+    return host_link_to(node, cube_wiring(service->cube)->gateway,
                         service->machine->dimension);
 }
 
@@ -226,11 +226,12 @@ static int fail_wrong(const struct host_service *s, struct host_error *error)
  * silent: at first nobody is blamed, but each is pinged alone. */
 static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
 {
-    uint16_t gate = cube_wiring(s->cube)->gate;
+    uint16_t gateway = cube_wiring(s->cube)->gateway;
     for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];
-        /* Without the only gate the run is over: haste gains nothing. */
-        bool haste = s->probing && (i != gate || s->machine->spare_node != 0);
+        /* Without the only gateway the run is over: haste gains nothing. */
+        bool haste =
+            s->probing && (i != gateway || s->machine->spare_node != 0);
         uint64_t limit =
             haste && s->patience_us > PROBE_US ? PROBE_US : s->patience_us;
         if (node->pinged && now_us - node->pinged_us >= node->ping_again_us) {
@@ -295,21 +296,21 @@ static int check_wire(struct host_service *s, uint64_t now_us,
 {
     unsigned wire = wire_of(s);
     enum link_state state = cube_link_state(s->cube, wire);
-    uint16_t gate = cube_wiring(s->cube)->gate;
+    uint16_t gateway = cube_wiring(s->cube)->gateway;
     if (in_use(s, now_us)) {
         return !stays_in_use(s, now_us)
                    ? 0
                    : host_fail(error, HOST_CUBE,
                                "node %u link %u: the cube is in use by another "
                                "host; wait until its run is over, or end it",
-                               gate, s->machine->dimension);
+                               gateway, s->machine->dimension);
     }
     if (state == LINK_REFUSED) {
         return host_fail(error, HOST_CUBE,
                          "node %u link %u: the host's wire leads to node %u "
                          "link %u, or to another version of the program; put "
                          "the wire right, or run make",
-                         gate, s->machine->dimension,
+                         gateway, s->machine->dimension,
                          cube_link_peer(s->cube, wire)->node,
                          cube_link_peer(s->cube, wire)->port);
     }
@@ -320,7 +321,7 @@ static int check_wire(struct host_service *s, uint64_t now_us,
     }
     if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX) {
         s->wire_lost = true;
-        s->blamed = gate;
+        s->blamed = gateway;
         s->loss = true;
     }
     return 0;

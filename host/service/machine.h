@@ -65,12 +65,12 @@ struct host_machine {
     void (*stop)(void *context);
 };
 
-/* The link by which a node is reached from the gate, the last of e-cube's way;
- * of the gate, the host's wire. */
-static inline unsigned host_link_to(unsigned node, unsigned gate,
+/* The link by which a node is reached from the gateway, the last of e-cube's
+ * way; of the gateway, the host's wire. */
+static inline unsigned host_link_to(unsigned node, unsigned gateway,
                                     unsigned dimension)
 {
-    unsigned away = node ^ gate;
+    unsigned away = node ^ gateway;
     return away == 0 ? dimension : 31u - (unsigned)__builtin_clz(away);
 }
 

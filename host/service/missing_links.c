@@ -14,14 +14,14 @@ enum {
     ATTENTIVE_US = 1000000 /* a node without an answer for longer is not */
 };
 
-/* Follows live links from the gate; true: they lead to all nodes. */
+/* Follows live links from the gateway; true: they lead to all nodes. */
 static bool holds_together(const struct host_service *s,
                            const struct cube_wiring *w)
 {
     static bool reached[HOST_NODES_MAX];
     unsigned dimension = s->machine->dimension, count = 1, before = 0;
     memset(reached, 0, sizeof reached);
-    reached[w->gate] = true;
+    reached[w->gateway] = true;
     while (count > before) {
         before = count;
         for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -36,7 +36,7 @@ static bool holds_together(const struct host_service *s,
         }
     }
     return count == s->machine->nodes &&
-           !wiring_is_dead(w, w->dead_count, w->gate, dimension, dimension);
+           !wiring_is_dead(w, w->dead_count, w->gateway, dimension, dimension);
 }
 
 /* Errors and what is as good as one go there, whatever else is quiet. */
@@ -83,7 +83,7 @@ static void end_search(struct host_service *s, uint64_t now_us, bool missing)
     next.absent_s = missing ? s->machine->absent_s : 0;
     if (missing) {
         tell(s, &next);
-        next.gate = host_service_gate(s, &next);
+        next.gateway = host_service_gateway(s, &next);
         s->generations++;
     } else {
         next.dead_count = next.settled;
@@ -129,7 +129,7 @@ bool host_missing_links_check(struct host_service *service, uint64_t now_us,
         }
         return s->searching;
     }
-    found.gate = host_service_gate(s, &found);
+    found.gateway = host_service_gateway(s, &found);
     if (s->here == s->living) {
         end_search(s, now_us,
                    false); /* all have come, or the wires are not needed */

@@ -16,7 +16,7 @@
  *
  * Memory: none of its own.  Work: constant a check, and a pass over nodes and
  * links until every wire has been up; at the end of a search such a pass for
- * each hop from the gate.
+ * each hop from the gateway.
  *
  *     searching = host_missing_links_check(service, now_us, patience_us);
  *     host_missing_links_heard(service, node, answer.links);

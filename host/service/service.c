@@ -340,33 +340,35 @@ static bool pages_wait(const struct host_service *s)
 
 /* Whether the host can speak by that node: by a wire, and on to another. */
 static bool speaks(const struct host_service *s, const struct cube_wiring *w,
-                   uint16_t gate)
+                   uint16_t gateway)
 {
     unsigned dimension = s->machine->dimension;
     bool on = dimension == 0;
     for (unsigned d = 0; d < dimension; d++) {
-        on = on || !wiring_is_dead(w, w->dead_count, gate, d, dimension);
+        on = on || !wiring_is_dead(w, w->dead_count, gateway, d, dimension);
     }
-    return on && !wiring_is_dead(w, w->dead_count, gate, dimension, dimension);
+    return on &&
+           !wiring_is_dead(w, w->dead_count, gateway, dimension, dimension);
 }
 
-uint16_t host_service_gate(const struct host_service *service,
-                           const struct cube_wiring *next)
+uint16_t host_service_gateway(const struct host_service *service,
+                              const struct cube_wiring *next)
 {
     const struct host_service *s = service;
-    uint16_t other = next->gate != 0 ? 0 : s->machine->spare_node;
-    return !speaks(s, next, next->gate) && speaks(s, next, other) ? other
-                                                                  : next->gate;
+    uint16_t other = next->gateway != 0 ? 0 : s->machine->spare_node;
+    return !speaks(s, next, next->gateway) && speaks(s, next, other)
+               ? other
+               : next->gateway;
 }
 
-/* The gate must be there, and what was given up must not be on the way. */
+/* The gateway must be there, and what was given up must not be on the way. */
 static int check_renewed(const struct host_service *s, struct host_error *error)
 {
     const struct cube_wiring *w = cube_wiring(s->cube);
     unsigned dimension = s->machine->dimension;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         bool dead = wiring_is_dead(w, w->dead_count, i, dimension, dimension);
-        if (i == w->gate ? dead : s->node[i].given_up && !dead) {
+        if (i == w->gateway ? dead : s->node[i].given_up && !dead) {
             return host_detector_doubt(s, i, error) != 0
                        ? error->code
                        : host_fail(
@@ -434,7 +436,7 @@ static int renew(struct host_service *s, uint64_t now_us,
         next.absent_s = s->started ? s->machine->absent_s : next.absent_s;
     }
     if (s->wire_lost) {
-        struct cube_dead dead = {next.gate, (uint8_t)dimension};
+        struct cube_dead dead = {next.gateway, (uint8_t)dimension};
         (void)wiring_add_dead(&next, dead, dimension);
         s->wire_lost = false;
         s->wire_down_us = now_us;
@@ -445,7 +447,7 @@ static int renew(struct host_service *s, uint64_t now_us,
             (void)wiring_add_dead(&next, dead, dimension);
         }
     }
-    next.gate = host_service_gate(s, &next);
+    next.gateway = host_service_gateway(s, &next);
     cube_renew(s->cube, &next);
     s->generations++;
     return begin_again(s, now_us, error);

@@ -149,8 +149,8 @@ int host_service_wires(struct host_service *service, struct host_error *error);
 
 /* For missing_links.h: the node by which the host speaks from now on: as
  * before, or the other one that has a wire to the host. */
-uint16_t host_service_gate(const struct host_service *service,
-                           const struct cube_wiring *next);
+uint16_t host_service_gateway(const struct host_service *service,
+                              const struct cube_wiring *next);
 
 /* Tells the nodes to stop, ends those that do not, and frees all. */
 void host_service_end(struct host_service *service);

@@ -116,19 +116,19 @@ static const uint8_t news[] = "what is so";
 
 static void tell(struct end *end, bool ask)
 {
-    link_note(end->link, news, 1 + end->sent % sizeof news, ask);
+    link_put_datagram(end->link, news, 1 + end->sent % sizeof news, ask);
 }
 
-static void read_note(struct end *end, bool trusted)
+static void read_datagram(struct end *end, bool trusted)
 {
-    struct link_message note;
+    struct link_message datagram;
     bool ask;
-    if (!link_take_note(end->link, &note, &ask)) {
+    if (!link_take_datagram(end->link, &datagram, &ask)) {
         return;
     }
-    if (note.size < 1 || note.size > LINK_NOTE_MAX ||
-        (trusted && (note.size > sizeof news ||
-                     memcmp(note.data, news, note.size) != 0))) {
+    if (datagram.size < 1 || datagram.size > LINK_DATAGRAM_MAX ||
+        (trusted && (datagram.size > sizeof news ||
+                     memcmp(datagram.data, news, datagram.size) != 0))) {
         abort();
     }
 }
@@ -251,7 +251,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             now += 1u << (step >> 3) % 18;
             (void)link_poll(step >> 7 ? a.link : b.link, now);
             read_messages(step >> 7 ? &a : &b, !hostile);
-            read_note(step >> 7 ? &a : &b, !hostile);
+            read_datagram(step >> 7 ? &a : &b, !hostile);
             break;
         }
     }

@@ -1,5 +1,6 @@
-/* Notes between the nodes of a cube, from anywhere: what is taken for a wiring
- * can be merged, settled and routed, and merging it again changes nothing. */
+/* State datagrams between the nodes of a cube, from anywhere: what is taken for
+ * a wiring can be merged, settled and routed, and merging it again changes
+ * nothing. */
 #include <stdlib.h>
 
 #include "transport/learn.h"

@@ -151,7 +151,7 @@ static void a_node_that_dies(void **unused)
 
 /* The host's wire to node 0 dies, or node 0 itself: the host goes on by its
  * spare wire. */
-static void the_gate_is_moved(void **unused)
+static void the_gateway_is_moved(void **unused)
 {
     (void)unused;
     for (unsigned round = 0; round < 6; round++) {
@@ -170,7 +170,7 @@ static void the_gate_is_moved(void **unused)
         }
         until_reported(m, node_dies ? 4 : 1);
         struct cube_wiring next = *cube_wiring(host);
-        next.gate = c.spare_node;
+        next.gateway = c.spare_node;
         cube_renew(host, &next);
         settle(m, 2);
         traffic(m, 5);
@@ -251,7 +251,7 @@ int main(void)
         cmocka_unit_test(links_that_die_one_after_another),
         cmocka_unit_test(a_link_that_falls_silent),
         cmocka_unit_test(a_node_that_dies),
-        cmocka_unit_test(the_gate_is_moved),
+        cmocka_unit_test(the_gateway_is_moved),
         cmocka_unit_test(who_sleeps_does_not_call_others_dead),
         cmocka_unit_test(many_dead_links),
         cmocka_unit_test(nodes_start_late),

@@ -35,7 +35,7 @@ static void nothing_of_an_old_generation_is_read(void **unused)
 }
 
 /* On lines that lose every third frame or so. */
-static void notes_that_are_lost_are_told_again(void **unused)
+static void datagrams_that_are_lost_are_told_again(void **unused)
 {
     struct line_quality bad = perfect;
     struct cube_config c = {.window = 2};
@@ -92,11 +92,11 @@ static void nothing_of_the_new_generation_is_lost(void **unused)
     destroy(m);
 }
 
-/* Notes cost nothing once all agree. */
+/* State datagrams cost nothing once all agree. */
 static void all_is_quiet_when_all_agree(void **unused)
 {
     struct cube_config c = {.window = 2};
-    uint64_t notes[2] = {0, 0};
+    uint64_t datagrams[2] = {0, 0};
     (void)unused;
     struct machine *m = build(3, &c, &perfect, 3);
     settle(m, 1);
@@ -106,13 +106,13 @@ static void all_is_quiet_when_all_agree(void **unused)
         }
         for (unsigned i = 0; i < m->count; i++) {
             for (unsigned d = 0; d < cube_links(m->places[i].cube); d++) {
-                notes[round] +=
-                    cube_link_statistics(m->places[i].cube, d)->notes_sent;
+                datagrams[round] +=
+                    cube_link_statistics(m->places[i].cube, d)->datagrams_sent;
             }
         }
     }
-    assert_true(notes[0] > 0 && notes[0] < 200);
-    assert_int_equal(notes[1], notes[0]);
+    assert_true(datagrams[0] > 0 && datagrams[0] < 200);
+    assert_int_equal(datagrams[1], datagrams[0]);
     destroy(m);
 }
 
@@ -201,7 +201,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_of_an_old_generation_is_read),
-        cmocka_unit_test(notes_that_are_lost_are_told_again),
+        cmocka_unit_test(datagrams_that_are_lost_are_told_again),
         cmocka_unit_test(nothing_of_the_new_generation_is_lost),
         cmocka_unit_test(all_is_quiet_when_all_agree),
         cmocka_unit_test(a_node_that_restarts_is_told),

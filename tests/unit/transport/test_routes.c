@@ -19,7 +19,7 @@ struct cut_cube {
     struct cube_wiring wiring;
     struct routes routes;
     struct routes_altered *memory;
-    bool linked[NODES_MAX]; /* to the gate, by a search of the graph */
+    bool linked[NODES_MAX]; /* to the gateway, by a search of the graph */
     uint64_t random;
     unsigned path_max, altered_max;
 };
@@ -42,8 +42,8 @@ static void search(struct cut_cube *c)
 {
     unsigned queue[NODES_MAX], first = 0, end = 0;
     memset(c->linked, 0, sizeof c->linked);
-    queue[end++] = c->wiring.gate;
-    c->linked[c->wiring.gate] = true;
+    queue[end++] = c->wiring.gateway;
+    c->linked[c->wiring.gateway] = true;
     while (first < end) {
         unsigned node = queue[first++];
         for (unsigned d = 0; d < c->dimension; d++) {
@@ -56,13 +56,13 @@ static void search(struct cut_cube *c)
     }
 }
 
-static void open_cube(struct cut_cube *c, unsigned dimension, unsigned gate)
+static void open_cube(struct cut_cube *c, unsigned dimension, unsigned gateway)
 {
     memset(c, 0, sizeof *c);
     c->dimension = dimension;
     c->nodes = 1u << dimension;
     c->random = 88172645463325252u + dimension;
-    c->wiring.gate = (uint16_t)gate;
+    c->wiring.gateway = (uint16_t)gateway;
     c->memory = malloc(routes_bytes(dimension));
     assert_non_null(c->memory);
     routes_init(&c->routes, c->memory, dimension);
@@ -91,10 +91,10 @@ static unsigned walk(const struct cut_cube *c, unsigned from, unsigned to)
         assert_true(d < c->dimension);
         assert_true(live(c, node, d));
         unsigned next = node ^ 1u << d;
-        /* A child's way to the gate leads through its parent. */
-        bool to_child =
-            next != c->wiring.gate &&
-            (next ^ 1u << routes_way(&c->routes, next, c->wiring.gate)) == node;
+        /* A child's way to the gateway leads through its parent. */
+        bool to_child = next != c->wiring.gateway &&
+                        (next ^ 1u << routes_way(&c->routes, next,
+                                                 c->wiring.gateway)) == node;
         assert_true(to_child || !down);
         down = to_child;
         node = next;
@@ -157,7 +157,7 @@ static void check(struct cut_cube *c, unsigned pairs)
     if (c->linked[root]) {
         check_to_all(c, root);
     }
-    check_to_all(c, c->wiring.gate);
+    check_to_all(c, c->wiring.gateway);
 }
 
 static void while_nothing_is_dead_e_cube(void **unused)
@@ -188,12 +188,13 @@ static void each_single_dead_link_and_node(void **unused)
     struct cut_cube c;
     (void)unused;
     for (unsigned dimension = 1; dimension <= 6; dimension++) {
-        for (unsigned gate = 0; gate < 1u << dimension; gate += 1 + gate * 2) {
-            open_cube(&c, dimension, gate);
+        for (unsigned gateway = 0; gateway < 1u << dimension;
+             gateway += 1 + gateway * 2) {
+            open_cube(&c, dimension, gateway);
             for (unsigned node = 0; node < c.nodes; node++) {
                 for (unsigned d = 0; d <= dimension; d++) {
                     bool whole = d == dimension;
-                    if (whole && node == gate) {
+                    if (whole && node == gateway) {
                         continue;
                     }
                     cut(&c, node, whole ? CUBE_WHOLE_NODE : d);
@@ -218,7 +219,7 @@ static void random_sets_of_dead_links_and_nodes(void **unused)
         open_cube(&c, dimension, 0);
         unsigned rounds = dimension < 7 ? 800 : 4000u >> (dimension - 4);
         for (unsigned round = 0; round < rounds; round++) {
-            c.wiring.gate = (uint16_t)(draw(&c) % c.nodes);
+            c.wiring.gateway = (uint16_t)(draw(&c) % c.nodes);
             unsigned count = 1 + draw(&c) % CUBE_DEAD_MAX;
             /* Near one node, or anywhere: the former cut more apart. */
             unsigned centre = draw(&c), mask = draw(&c);
@@ -226,7 +227,7 @@ static void random_sets_of_dead_links_and_nodes(void **unused)
             unsigned nodes = draw(&c) % 4;
             for (unsigned i = 0; i < count; i++) {
                 unsigned node = (centre ^ (draw(&c) & mask)) % c.nodes;
-                bool whole = draw(&c) % 4 < nodes && node != c.wiring.gate;
+                bool whole = draw(&c) % 4 < nodes && node != c.wiring.gateway;
                 cut(&c, node, whole ? CUBE_WHOLE_NODE : draw(&c) % dimension);
             }
             check(&c, 300);

@@ -417,7 +417,7 @@ static const uint8_t sack_5[] = {0x0c, 0x03, 0x08, 0xcc, 0x41, 0xc0, 0x42,
 static const uint8_t ack_all_5[] = {0x09, 0x03, 0x08, 0xcc, 0x41, 0xc0, 0x42,
                                     0x44, 0x33, 0x01, 0x01, 0x01, 0x07, 0x34,
                                     0x0c, 0xda, 0xea, 0x50, 0x11, 0x00};
-static const uint8_t note_5[] = {
+static const uint8_t state_5[] = {
     0x09, 0x25, 0x08, 0xcc, 0x41, 0xc0, 0x42, 0x44, 0x33, 0x01, 0x02, 0x1b,
     0x04, 0xb0, 0x0b, 0x03, 0x01, 0x01, 0x05, 0xfe, 0xca, 0xad, 0x0b, 0x01,
     0x04, 0x01, 0x02, 0x01, 0x02, 0x06, 0x02, 0xff, 0x01, 0x03, 0x01, 0x05,
@@ -434,7 +434,7 @@ static const uint8_t bye_1[] = {0x00, 0x07, 0x24, 0x08, 0x8f, 0x87, 0x96,
 static void test_vectors(void **unused)
 {
     const uint8_t head[8] = {5, 0, 1, 0, 34, 0, 1, 0};
-    struct link_message note;
+    struct link_message datagram;
     bool ask;
     struct script s = {.left = 0};
     struct link_config c = {.pipe = {&s, script_send, script_receive},
@@ -469,12 +469,12 @@ static void test_vectors(void **unused)
     hear(&s, link, ack_all_5, sizeof ack_all_5);
     assert_int_equal(s.size, 0);
     assert_true(link_idle(link));
-    assert_false(link_take_note(link, &note, &ask));
-    hear(&s, link, note_5, sizeof note_5);
+    assert_false(link_take_datagram(link, &datagram, &ask));
+    hear(&s, link, state_5, sizeof state_5);
     assert_int_equal(s.size, 0);
-    assert_true(link_take_note(link, &note, &ask) && ask);
-    assert_int_equal(note.size, sizeof wiring_5);
-    assert_memory_equal(note.data, wiring_5, sizeof wiring_5);
+    assert_true(link_take_datagram(link, &datagram, &ask) && ask);
+    assert_int_equal(datagram.size, sizeof wiring_5);
+    assert_memory_equal(datagram.data, wiring_5, sizeof wiring_5);
     link_close(link, 100000);
     hear(&s, link, NULL, 0);
     assert_int_equal(s.size, sizeof bye_1);

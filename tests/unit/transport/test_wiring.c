@@ -133,10 +133,11 @@ static const uint8_t vector[] = {3, 0, 0, 0, 0xfe, 0xca, 0xad, 0x0b, 0,
                                  0, 1, 2, 1, 0,    6,    0,    0xff, 0,
                                  0, 1, 5, 0, 2,    2,    3,    0,    2};
 
-/* The gate may lose every link between nodes and still have its host's wire. */
-static void a_gate_lives_while_its_hosts_wire_does(void **unused)
+/* The gateway may lose every link between nodes and still have its host's wire.
+ */
+static void a_gateway_lives_while_its_hosts_wire_does(void **unused)
 {
-    struct cube_wiring w = {.generation = 2, .gate = 4};
+    struct cube_wiring w = {.generation = 2, .gateway = 4};
     (void)unused;
     for (unsigned d = 0; d < DIMENSION; d++) {
         struct cube_dead dead = {4, (uint8_t)d};
@@ -147,7 +148,7 @@ static void a_gate_lives_while_its_hosts_wire_does(void **unused)
     for (unsigned i = 0; i < w.dead_count; i++) {
         assert_int_not_equal(w.dead[i].dimension, CUBE_WHOLE_NODE);
     }
-    w.gate = 0;
+    w.gateway = 0;
     wiring_settle(&w, DIMENSION);
     assert_int_equal(w.dead_count, 1);
     assert_int_equal(w.dead[0].dimension, CUBE_WHOLE_NODE);
@@ -161,7 +162,7 @@ static void its_bytes(void **unused)
     assert_true(wiring_unpack(&w, vector, sizeof vector, 3));
     assert_int_equal(w.generation, 3);
     assert_int_equal(w.host_epoch, 0x0badcafe);
-    assert_int_equal(w.gate, 0);
+    assert_int_equal(w.gateway, 0);
     assert_int_equal(w.settled, 1);
     assert_int_equal(w.dead_count, 2);
     assert_int_equal(w.wrong_count, 1);
@@ -191,7 +192,7 @@ static void its_bytes(void **unused)
     bytes[10] = 3; /* more settled than there are */
     assert_false(wiring_unpack(&again, bytes, sizeof vector, 3));
     bytes[10] = 0;
-    bytes[8] = 8; /* no such gate */
+    bytes[8] = 8; /* no such gateway */
     assert_false(wiring_unpack(&again, bytes, sizeof vector, 3));
 }
 
@@ -201,7 +202,7 @@ int main(void)
         cmocka_unit_test(all_come_to_the_same),
         cmocka_unit_test(what_is_newer_wins_entirely),
         cmocka_unit_test(a_node_whose_links_are_dead_is_one_entry),
-        cmocka_unit_test(a_gate_lives_while_its_hosts_wire_does),
+        cmocka_unit_test(a_gateway_lives_while_its_hosts_wire_does),
         cmocka_unit_test(its_bytes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

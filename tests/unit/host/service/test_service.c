@@ -383,7 +383,7 @@ static void test_gone(void **unused)
 }
 
 /* Node 0 is done without where another has a wire to the host. */
-static void test_gate(void **unused)
+static void test_gateway(void **unused)
 {
     (void)unused;
     prepare();
@@ -608,7 +608,7 @@ int main(void)
         cmocka_unit_test(test_mixtures),
         cmocka_unit_test(test_stopped),
         cmocka_unit_test(test_gone),
-        cmocka_unit_test(test_gate),
+        cmocka_unit_test(test_gateway),
         cmocka_unit_test(test_for_ever),
         cmocka_unit_test(test_next_host),
         cmocka_unit_test(test_cut),
