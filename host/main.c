@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "incode/predicates/predicates.h"
+#include "host/base/parse.h"
 #include "host/run/arguments.h"
 #include "host/run/begin.h"
 #include "host/bench/bench_links.h"
@@ -13,7 +14,8 @@
 #include "host/mesh/gen.h"
 #include "host/run/launch.h"
 #include "host/files/output.h"
-#include "host/machines/remote.h"
+#include "host/machines/cube_file.h"
+#include "host/run/on_cube.h"
 #include "host/run/report.h"
 #include "host/run/run.h"
 #include "host/sim/sim.h"
@@ -101,7 +103,7 @@ static int command_run(int argc, char **argv, struct host_error *error)
         return rank >= 0 ? host_launch_become(rank, argv, error)
                          : host_launch_mpi(argv, &options, error);
     }
-    if (options.cube != NULL && host_remote_prepare(&options, error) != 0) {
+    if (options.cube != NULL && host_run_on_cube(&options, error) != 0) {
         return error->code;
     }
     return host_run(&options, &result, error);

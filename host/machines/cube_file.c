@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/parse.h"
 #include "transport/cube.h"
 #include "transport/drivers/key_file.h"
-#include "host/run/arguments.h"
 
 enum { TEXT_MAX = 4 << 20 };
 
@@ -430,18 +430,16 @@ static int read_board(struct host_cube_file *file, const config_setting_t *root,
 {
     const config_setting_t *where = config_setting_get_member(root, "board");
     const char *name =
-        where == NULL ? host_boards[0] : config_setting_get_string(where);
-    char text[120];
-    size_t used = 0;
-    for (unsigned i = 0; host_boards[i] != NULL; i++) {
-        if (name != NULL && strcmp(name, host_boards[i]) == 0) {
-            file->board = host_boards[i];
-            return 0;
-        }
-        used += (size_t)snprintf(text + used, sizeof text - used, "%s\"%s\"",
-                                 i == 0 ? "board: not one that there is; give "
-                                        : " or ",
-                                 host_boards[i]);
+        where == NULL ? host_board_name(0) : config_setting_get_string(where);
+    char text[120] = "board: not one that there is; give ";
+    file->board = name == NULL ? NULL : host_board_named(name);
+    if (file->board != NULL) {
+        return 0;
+    }
+    for (unsigned i = 0; host_board_name(i) != NULL; i++) {
+        size_t used = strlen(text);
+        snprintf(text + used, sizeof text - used, "%s\"%s\"",
+                 i == 0 ? "" : " or ", host_board_name(i));
     }
     return wrong(file, where, error, text);
 }
@@ -673,7 +671,7 @@ unsigned host_cube_straps(const struct host_cube_file *file, unsigned node,
         }
     }
     snprintf(straps[n++], HOST_STRAP_BYTES, "--board");
-    snprintf(straps[n++], HOST_STRAP_BYTES, "%s", file->board);
+    snprintf(straps[n++], HOST_STRAP_BYTES, "%s", file->board->name);
     return n;
 }
 

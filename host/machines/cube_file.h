@@ -11,10 +11,11 @@
 #ifndef HOST_CUBE_FILE_H
 #define HOST_CUBE_FILE_H
 
+#include "host/base/error.h"
+#include "host/machines/boards.h"
+#include "host/service/machine.h"
 #include "transport/drivers/serial_port.h"
 #include "transport/drivers/tcp_wire.h"
-#include "host/base/error.h"
-#include "host/service/machine.h"
 
 enum { HOST_STRAPS_MAX = 64, HOST_STRAP_BYTES = 256 };
 
@@ -32,7 +33,7 @@ struct host_cube_wire {
 struct host_cube_file {
     const char *path;
     unsigned nodes, dimension;
-    const char *board; /* one of host_boards */
+    const struct host_board *board;
     uint64_t memory;
     unsigned window;
     unsigned dead_s; /* a link silent so long is given up; 0: never */

@@ -5,10 +5,6 @@
  * Memory: two ports, and 24 bytes a node.  Work: a fork and an exec for each
  * node that the host starts.
  *
- *     host_remote_prepare(&options, &error); host_run(&options, ..);
- *
- * or by itself
- *
  *     host_remote_start(&remote, &file, program, &error);
  *     machine = host_remote_machine(&remote);
  *     ... give it to the service, whose end stops it ...
@@ -30,13 +26,6 @@ struct host_remote {
     struct host_process process[HOST_NODES_MAX]; /* of those started here */
     unsigned restarts;
 };
-
-struct host_run_options;
-
-/* Reads options->cube and makes these options those of its cube, on whose
- * nodes the run will be. */
-int host_remote_prepare(struct host_run_options *options,
-                        struct host_error *error);
 
 /* program: of a node, for those that are started here. */
 int host_remote_start(struct host_remote *remote,

@@ -4,18 +4,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "transport/drivers/serial.h"
-#include "transport/drivers/tcp.h"
-
-/* How a wire of each kind is made, and what it may lack. */
-static const struct {
-    int (*pair)(int fds[2]);
-    const char *needs;
-} kinds[] = {
-    [HOST_WIRE_TCP] = {tcp_pair, "loopback connections"},
-    [HOST_WIRE_SERIAL] = {serial_pair, "pseudo-terminals"},
-};
-
 static void close_end(int *end)
 {
     if (*end >= 0) {
@@ -35,11 +23,12 @@ static int make_between_nodes(struct host_wires *wires,
             if (other < i) {
                 continue;
             }
-            if (kinds[kind].pair(pair) != 0) {
+            if (host_links[kind].pair(pair) != 0) {
                 return host_fail(error, HOST_CUBE,
                                  "wire between nodes %u and %u: %s; are %s "
                                  "and %u open files allowed?",
-                                 i, other, strerror(errno), kinds[kind].needs,
+                                 i, other, strerror(errno),
+                                 host_links[kind].needs,
                                  nodes * (dimension + 1) + 16);
             }
             wires->end[i][d] = pair[0];
@@ -60,12 +49,12 @@ int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
         host_wires_close(wires);
         return error->code;
     }
-    if (kinds[kind].pair(pair) != 0) {
+    if (host_links[kind].pair(pair) != 0) {
         int reason = errno;
         host_wires_close(wires);
         return host_fail(error, HOST_CUBE,
                          "wire between host and node 0: %s; are %s allowed?",
-                         strerror(reason), kinds[kind].needs);
+                         strerror(reason), host_links[kind].needs);
     }
     wires->end[0][dimension] = pair[0];
     wires->host = pair[1];

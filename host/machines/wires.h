@@ -11,16 +11,11 @@
 #ifndef HOST_WIRES_H
 #define HOST_WIRES_H
 
-#include "transport/cube.h"
 #include "host/base/error.h"
+#include "host/machines/links.h"
+#include "transport/cube.h"
 
 enum { HOST_PROCESSES_MAX = 64 }; /* nodes on one machine */
-
-enum host_wire_kind {
-    HOST_WIRE_TCP,
-    HOST_WIRE_SERIAL,
-    HOST_WIRE_MPI /* made by host/mpi */
-};
 
 struct host_wires {
     int host;           /* the host's end of its wire to node 0; -1: none */
@@ -28,8 +23,8 @@ struct host_wires {
     int end[HOST_PROCESSES_MAX][CUBE_LINKS_MAX]; /* [node][link]; -1: none */
 };
 
-/* All ends non-blocking and closed on exec.  HOST_CUBE where the machine does
- * not give so many; what was made is closed then. */
+/* Of a kind that has pairs; all ends non-blocking and closed on exec. HOST_CUBE
+ * where the machine does not give so many; what was made is closed then. */
 int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
                     unsigned nodes, unsigned dimension,
                     struct host_error *error);

@@ -1,9 +1,11 @@
 #include "arguments.h"
 
 #include <argp.h>
-#include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "host/base/parse.h"
 
 enum {
     KEY_STRATEGY = 256,
@@ -65,11 +67,8 @@ static const struct argp_option options_of_run[] = {
      "Data memory of a node, stack included: 640K .. 1G; a small cube does "
      "with less, and an error says with how much. Default: 4M",
      1},
-    {"link", KEY_LINK, "NAME", 0,
-     "Wires between nodes: tcp, the default, serial (pseudo-terminals) or mpi "
-     "(ranks of Open MPI, also under mpirun)",
-     1},
-    {"board", KEY_BOARD, "NAME", 0, "What a node runs on: linux", 1},
+    {"link", KEY_LINK, "NAME", 0, "Wires between nodes:", 1},
+    {"board", KEY_BOARD, "NAME", 0, "What a node runs on:", 1},
     {"patience", KEY_PATIENCE, "SECONDS", 0,
      "Wait so long for a node that does not answer, then start it again or "
      "go on without it. Default: 60",
@@ -116,47 +115,6 @@ struct parse {
     uint64_t given; /* bits of keys from KEY_STRATEGY on */
 };
 
-int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
-                      uint64_t *number)
-{
-    char *end;
-    errno = 0;
-    if (*text < '0' || *text > '9') {
-        return -1;
-    }
-    unsigned long long value = strtoull(text, &end, 10);
-    if (errno != 0 || *end != '\0' || value < lo || value > hi) {
-        return -1;
-    }
-    *number = value;
-    return 0;
-}
-
-int host_parse_bytes(const char *text, uint64_t *bytes)
-{
-    char *end;
-    errno = 0;
-    if (*text < '0' || *text > '9') {
-        return -1;
-    }
-    unsigned long long value = strtoull(text, &end, 10);
-    unsigned shift = 0;
-    if (*end != '\0') {
-        static const char units[] = "KMG";
-        const char *unit = strchr(units, *end >= 'a' ? *end - 32 : *end);
-        if (unit == NULL) {
-            return -1;
-        }
-        shift = 10 * (unsigned)(unit - units + 1);
-        end += strcmp(end + 1, "iB") == 0 ? 3 : 1;
-    }
-    if (errno != 0 || *end != '\0' || value > UINT64_MAX >> 20 >> shift) {
-        return -1;
-    }
-    *bytes = (uint64_t)value << shift;
-    return 0;
-}
-
 /* Index of `value` in names (a NULL-terminated list), or -1 with the error:
  * what is allowed, and what other versions have. */
 static int choose(struct parse *p, const char *option, const char *value,
@@ -179,6 +137,19 @@ static int choose(struct parse *p, const char *option, const char *value,
                   : "no such name",
               allowed);
     return -1;
+}
+
+enum { ROWS_MAX = 32 };
+
+/* The same with the names that a table gives. */
+static int choose_row(struct parse *p, const char *option, const char *value,
+                      const char *(*name)(unsigned i), const char *later)
+{
+    const char *names[ROWS_MAX + 1] = {NULL};
+    for (unsigned i = 0; i < ROWS_MAX && name(i) != NULL; i++) {
+        names[i] = name(i);
+    }
+    return choose(p, option, value, names, later);
 }
 
 static int number(struct parse *p, const char *option, const char *value,
@@ -254,11 +225,12 @@ static bool parse_names(int key, const char *value, struct parse *p)
                                                      host_face_rules, NULL);
         return true;
     case KEY_LINK:
-        o->link =
-            (enum host_wire_kind)choose(p, "link", value, host_links, NULL);
+        o->link = (enum host_wire_kind)choose_row(p, "link", value,
+                                                  host_link_name, NULL);
         return true;
     case KEY_BOARD:
-        (void)choose(p, "board", value, host_boards, ",mps2-an500,mps2-an385,");
+        o->board = host_board_row((unsigned)choose_row(
+            p, "board", value, host_board_name, ",mps2-an500,mps2-an385,"));
         return true;
     default:
         return false;
@@ -415,6 +387,52 @@ static int check_together(const struct parse *p)
     return 0;
 }
 
+static const char *link_help(unsigned i)
+{
+    return host_links[i].help;
+}
+
+static const char *board_help(unsigned i)
+{
+    return host_board_row(i)->help;
+}
+
+/* Option's help with the rows of the table that its values are from. */
+static char *list_rows(const char *text, const char *(*name)(unsigned i),
+                       const char *(*help)(unsigned i))
+{
+    size_t size = strlen(text) + 1;
+    for (unsigned i = 0; name(i) != NULL; i++) {
+        size += strlen(name(i)) + strlen(help(i)) + sizeof " (; the default),";
+    }
+    char *whole = malloc(size);
+    size_t used = 0;
+    if (whole == NULL) {
+        return NULL;
+    }
+    used += (size_t)snprintf(whole, size, "%s", text);
+    for (unsigned i = 0; name(i) != NULL; i++) {
+        used += (size_t)snprintf(whole + used, size - used, "%s %s (%s%s)",
+                                 i == 0 ? "" : ",", name(i), help(i),
+                                 i == 0 ? "; the default" : "");
+    }
+    return whole;
+}
+
+/* As argp asks for it: `text` itself, or what is to be freed. */
+static char *complete_help(int key, const char *text, void *input)
+{
+    (void)input;
+    switch (key) {
+    case KEY_LINK:
+        return list_rows(text, host_link_name, link_help);
+    case KEY_BOARD:
+        return list_rows(text, host_board_name, board_help);
+    default:
+        return (char *)text;
+    }
+}
+
 /* flags: of argp_parse. */
 static int parse_run(int argc, char **argv, unsigned flags,
                      struct host_run_options *options, struct host_error *error)
@@ -436,7 +454,7 @@ static int parse_run(int argc, char **argv, unsigned flags,
         "Exit status: 0 done, 1 the program failed, 2 wrong usage, 3 wrong "
         "input, 4 cube, link or node failure, 5 a verification failed.",
         NULL,
-        NULL,
+        complete_help,
         NULL};
     struct parse parse = {options, error, 0};
     host_run_defaults(options);

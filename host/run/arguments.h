@@ -18,11 +18,4 @@ int host_arguments_run(int argc, char **argv, struct host_run_options *options,
 /* The same where somebody else says what is wrong: prints nothing. */
 int host_arguments_try(int argc, char **argv, struct host_run_options *options);
 
-/* A count of bytes with an optional K, M or G: 4M.  0, or -1. */
-int host_parse_bytes(const char *text, uint64_t *bytes);
-
-/* A number from lo to hi.  0, or -1. */
-int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
-                      uint64_t *number);
-
 #endif

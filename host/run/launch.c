@@ -16,8 +16,9 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "host/base/parse.h"
+#include "host/base/progress.h"
 #include "transport/drivers/mpi_environment.h"
-#include "arguments.h"
 
 #define SOCKET_NAME "INCODE_LAUNCHER"
 #define REPORT_NAME "INCODE_REPORT"

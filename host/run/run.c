@@ -24,11 +24,6 @@ const char *const host_indexes[] = {
     [INCODE_NAIVE] = "naive", [INCODE_GRID] = "grid", [INCODE_KD] = "kd", NULL};
 const char *const host_face_rules[] = {
     [INCODE_FACE_OWN] = "own", [INCODE_FACE_PAPER] = "paper", NULL};
-const char *const host_links[] = {[HOST_WIRE_TCP] = "tcp",
-                                  [HOST_WIRE_SERIAL] = "serial",
-                                  [HOST_WIRE_MPI] = "mpi",
-                                  NULL};
-const char *const host_boards[] = {"linux", NULL};
 
 void host_run_defaults(struct host_run_options *options)
 {
@@ -37,6 +32,7 @@ void host_run_defaults(struct host_run_options *options)
     options->partition = HOST_ADAPTIVE;
     options->index = INCODE_KD;
     options->face_rule = INCODE_FACE_OWN;
+    options->board = host_board_row(0);
     options->memory = 4u << 20;
     options->patience_s = 60;
     options->progress = true;
@@ -74,6 +70,7 @@ static void settle(const struct host_run_options *options,
     result->partition = options->partition;
     result->index = options->index;
     result->link = options->link;
+    result->board = options->board;
     result->memory = options->memory;
     result->nodes = host_run_nodes(options);
     if (result->strategy == HOST_AUTO) {
@@ -265,41 +262,45 @@ int host_triangulate_on(const struct host_run_options *options,
     return status;
 }
 
-int host_triangulate(const struct host_run_options *options,
-                     const struct host_points *points,
-                     struct host_tetrahedra *tets,
-                     struct host_run_result *result, struct host_error *error)
+/* Starts nodes of the board that is asked for. */
+static int begin_on_board(const struct host_run_options *options,
+                          struct host_run_result *result,
+                          struct host_machine *machine,
+                          struct host_error *error)
 {
-    static struct host_cluster cluster;
-    static const uint32_t no_cells[3] = {0, 0, 0};
     struct host_cluster_options nodes = {0};
-    uint64_t start = host_now_us();
-    settle(options, result);
+    struct host_started started;
+    memset(&started, 0, sizeof started);
     nodes.nodes = result->nodes;
     nodes.memory = options->memory;
     nodes.window = options->window;
     nodes.link = options->link;
     nodes.unplug_us = options->unplug_us;
     nodes.program = options->node_program;
-    if (check_memory(options, result->nodes, 1, no_cells, error) != 0) {
+    if (options->board->start(&nodes, &started, error) != 0) {
         return error->code;
     }
-    if (options->begin != NULL) {
-        struct host_machine machine;
-        if (options->begin(options, result, &machine, error) != 0) {
-            return error->code;
-        }
-        result->time_start_up_s = seconds_since(start);
-        return host_triangulate_on(options, &machine, points, tets, result,
-                                   error);
-    }
-    if (host_cluster_start(&cluster, &nodes, error) != 0) {
+    *machine = started.machine;
+    result->limited = started.limited;
+    result->socket_send_bytes = started.send_bytes;
+    result->socket_receive_bytes = started.receive_bytes;
+    return 0;
+}
+
+int host_triangulate(const struct host_run_options *options,
+                     const struct host_points *points,
+                     struct host_tetrahedra *tets,
+                     struct host_run_result *result, struct host_error *error)
+{
+    static const uint32_t no_cells[3] = {0, 0, 0};
+    struct host_machine machine;
+    uint64_t start = host_now_us();
+    settle(options, result);
+    if (check_memory(options, result->nodes, 1, no_cells, error) != 0 ||
+        (options->begin != NULL ? options->begin : begin_on_board)(
+            options, result, &machine, error) != 0) {
         return error->code;
     }
-    struct host_machine machine = host_cluster_machine(&cluster);
-    result->limited = cluster.limited;
-    (void)tcp_buffers(cluster.port.tcp.fd, &result->socket_send_bytes,
-                      &result->socket_receive_bytes);
     result->time_start_up_s = seconds_since(start);
     return host_triangulate_on(options, &machine, points, tets, result, error);
 }

@@ -13,7 +13,7 @@
 
 #include <sys/types.h>
 
-#include "host/machines/cluster.h"
+#include "host/machines/boards.h"
 #include "host/machines/throttle.h"
 #include "host/order/order.h"
 #include "host/mesh/points.h"
@@ -37,6 +37,7 @@ struct host_run_options {
     enum incode_index index;
     enum incode_face_rule face_rule;
     enum host_wire_kind link;
+    const struct host_board *board;
     unsigned nodes; /* 0: what suits this machine */
     uint64_t memory;
     uint64_t patience_s; /* for a node that does not answer */
@@ -49,7 +50,7 @@ struct host_run_options {
     uint64_t unplug_us;
     struct host_throttle throttle;
     const char *node_program;
-    /* Begins a cube of result->nodes where it is not host_cluster that does. */
+    /* Begins a cube of result->nodes where it is not the board that does. */
     int (*begin)(const struct host_run_options *options,
                  struct host_run_result *result, struct host_machine *machine,
                  struct host_error *error);
@@ -63,6 +64,7 @@ struct host_run_result {
     enum host_partition partition;
     enum incode_index index;
     enum host_wire_kind link;
+    const struct host_board *board;
     unsigned nodes;
     uint64_t memory;
     double time_total_s, time_read_s, time_order_s, time_io_s;
@@ -85,10 +87,9 @@ struct host_run_result {
 void host_run_defaults(struct host_run_options *options);
 
 /* The names of the enumerations by their values, as options and statistics have
- * them, and of what a node may run on; a NULL behind them. */
+ * them; a NULL behind them. */
 extern const char *const host_strategies[], *const host_partitions[];
 extern const char *const host_indexes[], *const host_face_rules[];
-extern const char *const host_links[], *const host_boards[];
 
 /* How many nodes the cube gets. */
 unsigned host_run_nodes(const struct host_run_options *options);

@@ -1,7 +1,8 @@
 #include <argp.h>
 #include <string.h>
 
-#include "host/run/arguments.h"
+#include "host/base/parse.h"
+#include "host/service/machine.h"
 #include "sim.h"
 
 enum { KEY_SEED = 256, KEY_SEEDS, KEY_NODES, KEY_SECONDS };

@@ -9,58 +9,6 @@
 
 #include "host/run/arguments.h"
 
-static void test_bytes(void **unused)
-{
-    (void)unused;
-    static const struct {
-        const char *text;
-        uint64_t bytes;
-    } good[] = {{"0", 0},
-                {"4194304", 4194304},
-                {"512K", 524288},
-                {"512k", 524288},
-                {"4M", 4194304},
-                {"4MiB", 4194304},
-                {"1G", UINT64_C(1) << 30}};
-    static const char *const bad[] = {"",
-                                      "K",
-                                      "-1",
-                                      "4T",
-                                      "4MB",
-                                      "4M4",
-                                      " 4",
-                                      "4 M",
-                                      "0x4",
-                                      "4Mi",
-                                      "99999999999999999999",
-                                      "18446744073709551615G"};
-    uint64_t bytes;
-    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
-        assert_int_equal(host_parse_bytes(good[i].text, &bytes), 0);
-        assert_int_equal(bytes, good[i].bytes);
-    }
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        assert_int_equal(host_parse_bytes(bad[i], &bytes), -1);
-    }
-}
-
-static void test_numbers(void **unused)
-{
-    (void)unused;
-    uint64_t n;
-    assert_int_equal(host_parse_number("7", 1, 7, &n), 0);
-    assert_int_equal(n, 7);
-    assert_int_equal(
-        host_parse_number("18446744073709551615", 0, UINT64_MAX, &n), 0);
-    assert_int_equal(host_parse_number("8", 1, 7, &n), -1);
-    assert_int_equal(host_parse_number("0", 1, 7, &n), -1);
-    assert_int_equal(host_parse_number("+3", 1, 7, &n), -1);
-    assert_int_equal(host_parse_number("3x", 1, 7, &n), -1);
-    assert_int_equal(host_parse_number("", 0, 7, &n), -1);
-    assert_int_equal(
-        host_parse_number("18446744073709551616", 0, UINT64_MAX, &n), -1);
-}
-
 enum { WORDS_MAX = 12 };
 
 /* Parses "incode run" with these words, ended by NULL. */
@@ -191,7 +139,8 @@ static void test_in_vain(void **unused)
 /* Each value of an enumeration has a name, which the options know it by. */
 static void test_names(void **unused)
 {
-    static const struct {
+    const char *links[HOST_WIRE_KINDS + 1] = {NULL}, *boards[] = {NULL, NULL};
+    const struct {
         const char *option;
         const char *const *names;
         int last;
@@ -199,8 +148,13 @@ static void test_names(void **unused)
                   {"--partition", host_partitions, HOST_UNIFORM},
                   {"--index", host_indexes, INCODE_KD},
                   {"--face-rule", host_face_rules, INCODE_FACE_PAPER},
-                  {"--link", host_links, HOST_WIRE_MPI}};
+                  {"--link", links, HOST_WIRE_MPI},
+                  {"--board", boards, 0}};
     (void)unused;
+    for (unsigned i = 0; host_link_name(i) != NULL; i++) {
+        links[i] = host_link_name(i);
+    }
+    boards[0] = host_board_name(0);
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
         for (int value = 0; value <= tables[i].last; value++) {
             struct host_run_options o;
@@ -209,8 +163,10 @@ static void test_names(void **unused)
                                    "a.xyz", NULL};
             assert_non_null(words[1]);
             assert_int_equal(parse(words, &o, &error), 0);
-            const int found[] = {(int)o.strategy, (int)o.partition,
-                                 (int)o.index, (int)o.face_rule, (int)o.link};
+            const int found[] = {
+                (int)o.strategy, (int)o.partition,
+                (int)o.index,    (int)o.face_rule,
+                (int)o.link,     o.board == host_board_row(0) ? 0 : -1};
             assert_int_equal(found[i], value);
         }
         assert_null(tables[i].names[tables[i].last + 1]);
@@ -220,7 +176,6 @@ static void test_names(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_bytes),    cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_defaults), cmocka_unit_test(test_options),
         cmocka_unit_test(test_refused),  cmocka_unit_test(test_in_vain),
         cmocka_unit_test(test_names),

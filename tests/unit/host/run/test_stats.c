@@ -69,6 +69,8 @@ static void fill(struct host_run_result *r)
     r->nodes = 4;
     r->strategy = HOST_SPATIAL;
     r->index = INCODE_KD;
+    r->link = HOST_WIRE_SERIAL;
+    r->board = host_board_named("linux");
     r->make_tetra_calls = 1000;
     r->candidates = 64000;
     r->candidates_histogram[10] = 980;
@@ -103,6 +105,10 @@ static void test_names(void **unused)
                      99);
     assert_string_equal(json_string_value(json_object_get(o, "strategy")),
                         "spatial");
+    assert_string_equal(json_string_value(json_object_get(o, "link")),
+                        "serial");
+    assert_string_equal(json_string_value(json_object_get(o, "board")),
+                        "linux");
     assert_true(json_real_value(json_object_get(o, "duplication_factor")) ==
                 1.2);
     assert_true(json_real_value(json_object_get(o, "tetrahedra_per_second")) ==

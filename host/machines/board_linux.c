@@ -1,0 +1,22 @@
+/* Nodes as processes of this machine, of the program of boards/linux. */
+#include "boards.h"
+
+static int start(const struct host_cluster_options *options,
+                 struct host_started *started, struct host_error *error)
+{
+    static struct host_cluster cluster;
+    if (host_cluster_start(&cluster, options, error) != 0) {
+        return error->code;
+    }
+    started->machine = host_cluster_machine(&cluster);
+    started->limited = cluster.limited;
+    (void)tcp_buffers(cluster.port.tcp.fd, &started->send_bytes,
+                      &started->receive_bytes);
+    return 0;
+}
+
+const struct host_board host_board_linux = {
+    .name = "linux",
+    .help = "processes of this machine",
+    .start = start,
+};

@@ -1,0 +1,31 @@
+#include "boards.h"
+
+#include <stddef.h>
+#include <string.h>
+
+/* A row a board: host_board_NAME of some file of this room. */
+#define BOARDS(ROW) ROW(linux)
+
+#define DECLARE(name) extern const struct host_board host_board_##name;
+#define POINT(name) &host_board_##name,
+BOARDS(DECLARE)
+static const struct host_board *const boards[] = {BOARDS(POINT)};
+
+const struct host_board *host_board_row(unsigned i)
+{
+    return i < sizeof boards / sizeof boards[0] ? boards[i] : NULL;
+}
+
+const char *host_board_name(unsigned i)
+{
+    return host_board_row(i) == NULL ? NULL : boards[i]->name;
+}
+
+const struct host_board *host_board_named(const char *name)
+{
+    const struct host_board *board = NULL;
+    for (unsigned i = 0; host_board_row(i) != NULL; i++) {
+        board = strcmp(name, boards[i]->name) == 0 ? boards[i] : board;
+    }
+    return board;
+}

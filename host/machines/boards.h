@@ -1,0 +1,43 @@
+/* What a node may run on, one row a board, by which --board, cube files,
+ * statistics and messages name it, and by which its nodes are started.  A new
+ * board is a file that defines host_board_NAME, and a row of boards.c.
+ *
+ * Memory: the table.  Work: as that of the board's start.
+ *
+ *     const struct host_board *board = host_board_named("linux");
+ *     if (board == NULL || board->start(&options, &started, &error) != 0)
+ *         return error.code;
+ *     service.machine = &started.machine;
+ */
+#ifndef HOST_BOARDS_H
+#define HOST_BOARDS_H
+
+#include <stdbool.h>
+
+#include "host/machines/cluster.h"
+#include "host/service/machine.h"
+
+/* A cube of nodes that a board has started. */
+struct host_started {
+    struct host_machine machine;   /* whose end stops them */
+    bool limited;                  /* each is held to its memory */
+    int send_bytes, receive_bytes; /* buffers of a wire's end; 0: not known */
+};
+
+struct host_board {
+    const char *name;
+    const char *help; /* what it is, in one line */
+    /* Starts nodes of this board here, wired as a cube.  0, HOST_CUBE or
+     * HOST_BROKEN.  Once at a time. */
+    int (*start)(const struct host_cluster_options *options,
+                 struct host_started *started, struct host_error *error);
+};
+
+/* Row i, the first being the default; NULL past the last. */
+const struct host_board *host_board_row(unsigned i);
+const char *host_board_name(unsigned i);
+
+/* NULL: there is none of that name. */
+const struct host_board *host_board_named(const char *name);
+
+#endif
