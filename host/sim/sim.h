@@ -31,8 +31,14 @@ struct host_sim_outcome {
 int host_sim_run(const struct host_sim_plan *plan,
                  struct host_sim_outcome *outcome, struct host_error *error);
 
+enum { HOST_SIM_RANGES_MAX = 64 };
+
 struct host_sim_options {
-    uint64_t first, last; /* seeds, each with a line of its own */
+    /* Seeds first .. last, each with a line of its own. */
+    struct {
+        uint64_t first, last;
+    } range[HOST_SIM_RANGES_MAX];
+    unsigned ranges;
     unsigned nodes;       /* 0: the seeds decide */
     uint64_t seconds_max; /* of processor time: then no seed is begun; or 0 */
 };
@@ -41,7 +47,9 @@ struct host_sim_options {
 int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
                        struct host_error *error);
 
-/* The command.  A failure prints the command that replays it. */
+/* The command.  Each seed's line says which faults struck, a table at the end
+ * how often each kind did, and in how many seeds.  A failure prints the command
+ * that replays it. */
 int host_sim_seeds(const struct host_sim_options *options,
                    struct host_error *error);
 

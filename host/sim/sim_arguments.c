@@ -12,10 +12,23 @@ struct parse_sim {
     struct host_error *error;
 };
 
+static void add_range(struct parse_sim *p, uint64_t first, uint64_t last)
+{
+    struct host_sim_options *o = p->options;
+    if (o->ranges == HOST_SIM_RANGES_MAX) {
+        host_fail(p->error, HOST_USAGE,
+                  "--seed: more than %d of --seed and --seeds; give a range",
+                  HOST_SIM_RANGES_MAX);
+        return;
+    }
+    o->range[o->ranges].first = first;
+    o->range[o->ranges++].last = last;
+}
+
 /* A..B, both included. */
 static void parse_seeds(struct parse_sim *p, const char *value)
 {
-    struct host_sim_options *o = p->options;
+    uint64_t first_seed = 0, last_seed = 0;
     char first[32] = "";
     const char *dots = strstr(value, "..");
     size_t length = dots == NULL ? sizeof first : (size_t)(dots - value);
@@ -23,12 +36,14 @@ static void parse_seeds(struct parse_sim *p, const char *value)
         memcpy(first, value, length);
     }
     if (dots == NULL ||
-        host_parse_number(first, 0, UINT64_MAX, &o->first) != 0 ||
-        host_parse_number(dots + 2, o->first, UINT64_MAX, &o->last) != 0) {
+        host_parse_number(first, 0, UINT64_MAX, &first_seed) != 0 ||
+        host_parse_number(dots + 2, first_seed, UINT64_MAX, &last_seed) != 0) {
         host_fail(p->error, HOST_USAGE,
                   "--seeds %s: not a range of seeds; give A..B, as in 1..1000",
                   value);
+        return;
     }
+    add_range(p, first_seed, last_seed);
 }
 
 static error_t parse_sim_option(int key, char *value, struct argp_state *state)
@@ -40,8 +55,9 @@ static error_t parse_sim_option(int key, char *value, struct argp_state *state)
         if (host_parse_number(value, 0, UINT64_MAX, &n) != 0) {
             host_fail(p->error, HOST_USAGE,
                       "--seed %s: not a number; give 0 or more", value);
+        } else {
+            add_range(p, n, n);
         }
-        p->options->first = p->options->last = n;
         return 0;
     case KEY_SEEDS:
         parse_seeds(p, value);
@@ -72,7 +88,8 @@ int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
                        struct host_error *error)
 {
     static const struct argp_option options_of_sim[] = {
-        {"seed", KEY_SEED, "S", 0, "Run seed S. Default: 1", 0},
+        {"seed", KEY_SEED, "S", 0,
+         "Run seed S, which may be given more than once. Default: 1", 0},
         {"seeds", KEY_SEEDS, "A..B", 0, "Run seeds A to B, and print totals",
          0},
         {"nodes", KEY_NODES, "N", 0,
@@ -93,6 +110,7 @@ int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
         "work was open; a failure prints the command that replays it.\v"
         "Examples:\n"
         "  incode sim --seed 17\n"
+        "  incode sim --seed 17 --seed 34\n"
         "  incode sim --seeds 1..1000\n"
         "  incode sim --seeds 1..20 --nodes 64\n\n"
         "Exit status: 0 every result right, 1 something was left behind or the "
@@ -102,10 +120,13 @@ int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
         NULL,
         NULL};
     struct parse_sim parse = {options, error};
-    *options = (struct host_sim_options){.first = 1, .last = 1};
+    memset(options, 0, sizeof *options);
     if (argp_parse(&argp, argc, argv, 0, NULL, &parse) != 0) {
         return host_fail(error, HOST_USAGE,
                          "incode sim: wrong usage; see incode sim --help");
+    }
+    if (error->code == 0 && options->ranges == 0) {
+        add_range(&parse, 1, 1);
     }
     return error->code;
 }

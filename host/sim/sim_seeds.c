@@ -144,15 +144,17 @@ int host_sim_seeds(const struct host_sim_options *options,
 {
     struct totals totals = {0};
     double start = processor_s(), seconds = 0;
+    bool late = false;
     host_threads_limit(1);
     watch_crashes();
-    for (uint64_t seed = options->first;; seed++) {
-        run_seed(seed, options->nodes, &totals, error);
-        seconds = processor_s() - start;
-        bool late =
-            options->seconds_max > 0 && seconds > (double)options->seconds_max;
-        if (seed == options->last || late) {
-            break;
+    for (unsigned i = 0; i < options->ranges && !late; i++) {
+        uint64_t seed = options->range[i].first;
+        uint64_t left = options->range[i].last - seed;
+        for (bool more = true; more && !late; more = left-- > 0) {
+            run_seed(seed++, options->nodes, &totals, error);
+            seconds = processor_s() - start;
+            late = options->seconds_max > 0 &&
+                   seconds > (double)options->seconds_max;
         }
     }
     print_totals(&totals, seconds);
