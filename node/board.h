@@ -29,7 +29,7 @@ struct node_identity {
     uint8_t host_wires; /* nodes that have, where all below this; see cube.h */
     uint32_t dead_us;   /* a link that is down or silent for so long is given up
                            for the run; 0: never */
-    uint32_t line_baud; /* of the slowest serial line of the cube; 0: none */
+    uint32_t serial_baud; /* of the slowest serial wire of the cube; 0: none */
 };
 
 struct node_board {

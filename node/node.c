@@ -55,7 +55,7 @@ static struct cube_config configure(const struct node_identity *identity,
     config.host_wire = identity->host_wire;
     config.host_wires = identity->host_wires;
     config.dead_us = identity->dead_us;
-    cube_for_lines(&config, identity->line_baud);
+    cube_for_serial(&config, identity->serial_baud);
     return config;
 }
 

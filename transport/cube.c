@@ -129,8 +129,8 @@ static struct link_config link_config_of(const struct cube_config *config,
     c.message_max = MESSAGE_MAX;
     c.frame_payload = config->frame_payload;
     c.staging = config->staging;
-    if (config->line_baud != 0) {
-        link_for_line(&c, config->line_baud);
+    if (config->serial_baud != 0) {
+        link_for_serial(&c, config->serial_baud);
     }
     return c;
 }
@@ -170,9 +170,9 @@ static size_t up64(size_t bytes)
     return (bytes + 63) / 64 * 64;
 }
 
-void cube_for_lines(struct cube_config *config, uint32_t baud)
+void cube_for_serial(struct cube_config *config, uint32_t baud)
 {
-    config->line_baud = baud;
+    config->serial_baud = baud;
     if (baud != 0) {
         config->window = config->window >= 8 ? 14 : 7;
     }

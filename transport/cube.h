@@ -94,7 +94,7 @@ struct cube_config {
     uint16_t frame_payload; /* bytes, a multiple of 8, the same on both ends of
                                a wire; a message a frame */
     uint16_t staging;       /* frames encoded ahead of the pipe; see link.h */
-    uint32_t line_baud;     /* see cube_for_lines */
+    uint32_t serial_baud;   /* see cube_for_serial */
 };
 
 struct cube_message {
@@ -113,10 +113,10 @@ struct cube_statistics {
     uint64_t outdated;      /* dropped: of an older generation */
 };
 
-/* Settings for a cube with serial lines, of which the slowest has that baud
+/* Settings for a cube with serial wires, of which the slowest has that baud
  * rate, and a window that fits them: the same on all nodes and the host.  0:
- * there are no lines, and nothing changes. */
-void cube_for_lines(struct cube_config *config, uint32_t baud);
+ * there are none, and nothing changes. */
+void cube_for_serial(struct cube_config *config, uint32_t baud);
 
 struct cube; /* opaque: lives at the start of its arena */
 

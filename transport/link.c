@@ -36,14 +36,14 @@ static struct link_config complete(const struct link_config *config)
     return c;
 }
 
-/* Bytes that may go over the line between a frame and its acknowledgement: what
- * either driver has given to the line, and what the peer has encoded ahead. */
-enum { LINE_BYTES = 2400, LINE_BAUD_MIN = 300 };
+/* Bytes that may go over the wire between a frame and its acknowledgement: what
+ * either driver has given to the wire, and what the peer has encoded ahead. */
+enum { SERIAL_BYTES = 2400, SERIAL_BAUD_MIN = 300 };
 
-void link_for_line(struct link_config *config, uint32_t baud)
+void link_for_serial(struct link_config *config, uint32_t baud)
 {
-    uint32_t rate = baud < LINE_BAUD_MIN ? LINE_BAUD_MIN : baud;
-    uint32_t wait_us = (uint32_t)(UINT64_C(10000000) * LINE_BYTES / rate);
+    uint32_t rate = baud < SERIAL_BAUD_MIN ? SERIAL_BAUD_MIN : baud;
+    uint32_t wait_us = (uint32_t)(UINT64_C(10000000) * SERIAL_BYTES / rate);
     config->frame_payload = 408;
     config->staging = 2;
     config->timeout_min_us =

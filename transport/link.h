@@ -119,16 +119,16 @@ struct link_config {
     uint16_t frame_payload;  /* bytes; default: a message a frame */
     uint16_t staging;        /* frames; default half a window, 4 to 8 */
     uint32_t timeout_min_us; /* retransmission: 100 ms, */
-    uint32_t timeout_max_us; /* and 1 s; a slow line wants more */
+    uint32_t timeout_max_us; /* and 1 s; a slow wire wants more */
     uint32_t ack_delay_us;   /* of acknowledgements; 5 ms */
     uint32_t hello_us;       /* between greetings; 50 ms */
     uint32_t keep_alive_us;  /* a frame at least so often; 500 ms */
     uint32_t silence_us;     /* then the peer counts as silent; 3 s */
 };
 
-/* PROTOCOL.md's settings for a serial line: all but pipe, epoch, who is at its
+/* PROTOCOL.md's settings for a serial wire: all but pipe, epoch, who is at its
  * ends, window and message_max. */
-void link_for_line(struct link_config *config, uint32_t baud);
+void link_for_serial(struct link_config *config, uint32_t baud);
 
 struct link_message {
     const uint8_t *data;

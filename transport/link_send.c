@@ -232,7 +232,7 @@ static void stage(struct link *link, unsigned kind, unsigned flags,
         r->ack_now &= r->early > 0; /* what came early must be listed */
     }
     if (out->end == 0) {
-        /* Noise on a line at rest must not take the next frame with it. */
+        /* Noise on a wire at rest must not take the next frame with it. */
         out->bytes[out->end++] = 0;
     }
     LINK_ASSERT(link->buffer_bytes - out->end >=

@@ -149,59 +149,59 @@ bool secure_shake_other_key(const struct secure_shake *shake)
 
 /* --- records ------------------------------------------------------------- */
 
-void secure_channel_start(struct secure_channel *channel,
+void secure_records_start(struct secure_records *records,
                           const struct secure_shake *shake,
                           const struct link_pipe *pipe)
 {
     LINK_ASSERT(shake->proven && !shake->failed);
-    memset(channel, 0, sizeof *channel);
-    channel->suite = shake->suite;
-    channel->keys = shake->keys;
-    channel->pipe = *pipe;
+    memset(records, 0, sizeof *records);
+    records->suite = shake->suite;
+    records->keys = shake->keys;
+    records->pipe = *pipe;
 }
 
-static int fail(struct secure_channel *c)
+static int fail(struct secure_records *r)
 {
-    c->failed = true;
-    memset(&c->keys, 0, sizeof c->keys);
+    r->failed = true;
+    memset(&r->keys, 0, sizeof r->keys);
     return LINK_PIPE_CLOSED;
 }
 
 /* Sends what is sealed; false: the pipe is closed. */
-static bool flush(struct secure_channel *c)
+static bool flush(struct secure_records *r)
 {
-    if (c->out_begin < c->out_end) {
-        int sent = c->pipe.send(c->pipe.context, c->out + c->out_begin,
-                                c->out_end - c->out_begin);
+    if (r->out_begin < r->out_end) {
+        int sent = r->pipe.send(r->pipe.context, r->out + r->out_begin,
+                                r->out_end - r->out_begin);
         if (sent < 0) {
             return false;
         }
-        c->out_begin += (size_t)sent;
+        r->out_begin += (size_t)sent;
     }
     return true;
 }
 
 /* All that the pipe has room for: what is not taken, the link holds back until
  * the pipe has room again. */
-static int channel_send(void *context, const uint8_t *bytes, size_t size)
+static int records_send(void *context, const uint8_t *bytes, size_t size)
 {
-    struct secure_channel *c = context;
+    struct secure_records *r = context;
     size_t done = 0;
-    if (c->failed || !flush(c)) {
-        return fail(c);
+    if (r->failed || !flush(r)) {
+        return fail(r);
     }
-    while (done < size && c->out_begin == c->out_end) {
+    while (done < size && r->out_begin == r->out_end) {
         size_t part =
             size - done < SECURE_RECORD_MAX ? size - done : SECURE_RECORD_MAX;
-        put_head(c->out, part, c->keys.out_count);
-        c->suite->seal(c->out + SECURE_HEAD_BYTES, bytes + done, part, c->out,
-                       c->keys.out_count++, c->keys.out);
-        c->records_out++;
-        c->out_begin = 0;
-        c->out_end = SECURE_HEAD_BYTES + part + SECURE_TAG_BYTES;
+        put_head(r->out, part, r->keys.out_count);
+        r->suite->seal(r->out + SECURE_HEAD_BYTES, bytes + done, part, r->out,
+                       r->keys.out_count++, r->keys.out);
+        r->records_out++;
+        r->out_begin = 0;
+        r->out_end = SECURE_HEAD_BYTES + part + SECURE_TAG_BYTES;
         done += part;
-        if (!flush(c)) {
-            return fail(c);
+        if (!flush(r)) {
+            return fail(r);
         }
     }
     return (int)done;
@@ -209,68 +209,68 @@ static int channel_send(void *context, const uint8_t *bytes, size_t size)
 
 /* Where the next record begins in what has come, from `at` on; else where one
  * might whose head is not whole. */
-static size_t find_head(const struct secure_channel *c, size_t at)
+static size_t find_head(const struct secure_records *r, size_t at)
 {
-    while (at + SECURE_HEAD_BYTES <= c->in_end &&
-           (head_size(c->in + at) == SIZE_MAX ||
-            head_ahead(c->in + at, c->keys.in_count) >= SECURE_AHEAD_MAX)) {
+    while (at + SECURE_HEAD_BYTES <= r->in_end &&
+           (head_size(r->in + at) == SIZE_MAX ||
+            head_ahead(r->in + at, r->keys.in_count) >= SECURE_AHEAD_MAX)) {
         at++;
     }
     return at;
 }
 
 /* The first bytes of what has come are taken. */
-static void take(struct secure_channel *c, size_t size)
+static void take(struct secure_records *r, size_t size)
 {
-    c->in_end -= size;
-    c->seen = 0;
-    memmove(c->in, c->in + size, c->in_end);
+    r->in_end -= size;
+    r->seen = 0;
+    memmove(r->in, r->in + size, r->in_end);
 }
 
 /* Leaves out at least so many, and all that begin no record. */
-static void skip(struct secure_channel *c, size_t least)
+static void skip(struct secure_records *r, size_t least)
 {
-    size_t at = find_head(c, least);
+    size_t at = find_head(r, least);
     if (at > 0) {
-        c->lost += at;
-        take(c, at);
+        r->lost += at;
+        take(r, at);
     }
 }
 
 /* Whether the record that is awaited was cut short, as another begins within
  * it: then that is the first.  By chance one in 2^37 bytes looks like a head.
  */
-static bool is_cut(struct secure_channel *c)
+static bool is_cut(struct secure_records *r)
 {
-    size_t at = find_head(c, c->seen > 0 ? c->seen : 1);
-    if (c->in_end < SECURE_HEAD_BYTES || at + SECURE_HEAD_BYTES > c->in_end) {
-        c->seen = at;
+    size_t at = find_head(r, r->seen > 0 ? r->seen : 1);
+    if (r->in_end < SECURE_HEAD_BYTES || at + SECURE_HEAD_BYTES > r->in_end) {
+        r->seen = at;
         return false;
     }
-    c->lost += at;
-    take(c, at);
+    r->lost += at;
+    take(r, at);
     return true;
 }
 
 /* The record at the front of what has come: true if it is the peer's.  What is
  * missing before it ends the frame that it was in. */
-static bool open_record(struct secure_channel *c, size_t size)
+static bool open_record(struct secure_records *r, size_t size)
 {
-    uint32_t ahead = head_ahead(c->in, c->keys.in_count);
-    if (!c->suite->open(c->plain + 1, c->in + SECURE_HEAD_BYTES, size, c->in,
-                        c->keys.in_count + ahead, c->keys.in)) {
-        c->refused++;
-        c->lost += size;
-        skip(c, 1);
+    uint32_t ahead = head_ahead(r->in, r->keys.in_count);
+    if (!r->suite->open(r->plain + 1, r->in + SECURE_HEAD_BYTES, size, r->in,
+                        r->keys.in_count + ahead, r->keys.in)) {
+        r->refused++;
+        r->lost += size;
+        skip(r, 1);
         return false;
     }
-    c->keys.in_count += (uint64_t)ahead + 1;
-    c->records_in++;
-    c->lost = 0;
-    c->plain[0] = 0;
-    c->plain_begin = ahead == 0 ? 1 : 0;
-    c->plain_end = 1 + size;
-    take(c, SECURE_HEAD_BYTES + size + SECURE_TAG_BYTES);
+    r->keys.in_count += (uint64_t)ahead + 1;
+    r->records_in++;
+    r->lost = 0;
+    r->plain[0] = 0;
+    r->plain_begin = ahead == 0 ? 1 : 0;
+    r->plain_end = 1 + size;
+    take(r, SECURE_HEAD_BYTES + size + SECURE_TAG_BYTES);
     return true;
 }
 
@@ -278,70 +278,70 @@ static bool open_record(struct secure_channel *c, size_t size)
  * bytes that are here; but a place that was lost is not looked for byte by
  * byte.
  */
-static size_t missing(const struct secure_channel *c)
+static size_t missing(const struct secure_records *r)
 {
     size_t whole = SECURE_HEAD_BYTES;
-    if (c->in_end >= SECURE_HEAD_BYTES) {
-        whole += head_size(c->in) + SECURE_TAG_BYTES;
+    if (r->in_end >= SECURE_HEAD_BYTES) {
+        whole += head_size(r->in) + SECURE_TAG_BYTES;
     }
-    if (c->in_end < whole && c->lost > 0) {
-        whole = sizeof c->in;
+    if (r->in_end < whole && r->lost > 0) {
+        whole = sizeof r->in;
     }
-    return whole > c->in_end ? whole - c->in_end : 0;
+    return whole > r->in_end ? whole - r->in_end : 0;
 }
 
 /* Takes the next good record, of what is here or can be read: 1, 0 it has not
  * come yet, or LINK_PIPE_CLOSED. */
-static int take_record(struct secure_channel *c, bool reads)
+static int take_record(struct secure_records *r, bool reads)
 {
     bool dry = !reads;
-    while (c->lost <= SECURE_LOST_MAX) {
-        skip(c, 0);
-        size_t want = missing(c);
+    while (r->lost <= SECURE_LOST_MAX) {
+        skip(r, 0);
+        size_t want = missing(r);
         if (want == 0) {
-            if (open_record(c, head_size(c->in))) {
+            if (open_record(r, head_size(r->in))) {
                 return 1;
             }
             continue;
         }
-        if (dry && is_cut(c)) {
+        if (dry && is_cut(r)) {
             continue;
         }
         if (dry) {
             return 0;
         }
-        int got = c->pipe.receive(c->pipe.context, c->in + c->in_end, want);
+        int got = r->pipe.receive(r->pipe.context, r->in + r->in_end, want);
         if (got < 0) {
             return got;
         }
-        c->in_end += (size_t)got;
+        r->in_end += (size_t)got;
         dry = (size_t)got < want;
     }
     return LINK_PIPE_CLOSED;
 }
 
-static int channel_receive(void *context, uint8_t *bytes, size_t size)
+static int records_receive(void *context, uint8_t *bytes, size_t size)
 {
-    struct secure_channel *c = context;
+    struct secure_records *r = context;
     size_t done = 0, have = 1;
     int status = 1;
-    if (c->failed || !flush(c)) {
-        return fail(c);
+    if (r->failed || !flush(r)) {
+        return fail(r);
     }
     while (status > 0 && have > 0) {
-        if (c->plain_begin == c->plain_end) {
-            status = take_record(c, done == 0);
+        if (r->plain_begin == r->plain_end) {
+            status = take_record(r, done == 0);
         }
-        have = c->plain_end - c->plain_begin;
+        have = r->plain_end - r->plain_begin;
         have = have < size - done ? have : size - done;
-        memcpy(bytes + done, c->plain + c->plain_begin, have);
-        c->plain_begin += have;
+        memcpy(bytes + done, r->plain + r->plain_begin, have);
+        r->plain_begin += have;
         done += have;
     }
-    return status < 0 ? fail(c) : (int)done;
+    return status < 0 ? fail(r) : (int)done;
 }
 
-struct link_pipe secure_channel_pipe(struct secure_channel *channel)
+struct link_pipe secure_records_pipe(struct secure_records *records)
 {
-    return (struct link_pipe){channel, channel_send, channel_receive};
+    return (struct link_pipe){records, records_send, records_receive};
 }

@@ -10,15 +10,15 @@
  * RFC 8439), from a library that is known for them.
  *
  * Memory: struct secure_shake while a connection is not proven, struct
- * secure_channel then.  Work: a shake hashes at most three short inputs and
- * opens one empty record; a channel's functions are linear in the bytes given
+ * secure_records then.  Work: a shake hashes at most three short inputs and
+ * opens one empty record; all functions are linear in the bytes given
  * and taken, and between two good records no more than SECURE_LOST_MAX bytes
  * are opened or skipped in vain.
  *
  *     secure_shake_init(&shake, suite, key, caller, nonce);
  *     while ((status = secure_shake(&shake, &pipe)) == 0) wait;
- *     if (status > 0) secure_channel_start(&channel, &shake, &pipe);
- *     config.pipe = secure_channel_pipe(&channel);
+ *     if (status > 0) secure_records_start(&records, &shake, &pipe);
+ *     config.pipe = secure_records_pipe(&records);
  */
 #ifndef TRANSPORT_SECURE_H
 #define TRANSPORT_SECURE_H
@@ -83,7 +83,7 @@ int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe);
  * damaged on the way. */
 bool secure_shake_other_key(const struct secure_shake *shake);
 
-struct secure_channel {
+struct secure_records {
     const struct secure_suite *suite;
     struct link_pipe pipe; /* beneath */
     struct secure_keys keys;
@@ -100,11 +100,11 @@ struct secure_channel {
 };
 
 /* Takes the keys of a shake that returned 1. */
-void secure_channel_start(struct secure_channel *channel,
+void secure_records_start(struct secure_records *records,
                           const struct secure_shake *shake,
                           const struct link_pipe *pipe);
 
 /* LINK_PIPE_CLOSED from either function: this connection is over. */
-struct link_pipe secure_channel_pipe(struct secure_channel *channel);
+struct link_pipe secure_records_pipe(struct secure_records *records);
 
 #endif

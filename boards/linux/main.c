@@ -153,7 +153,7 @@ static struct node_identity identity_of(const struct straps *straps)
     id.dimension = (uint8_t)straps->dimension;
     id.window = (uint8_t)straps->window;
     id.epoch = (uint32_t)straps->epoch;
-    id.line_baud = (uint32_t)straps->lines;
+    id.serial_baud = (uint32_t)straps->lines;
     id.dead_us = (uint32_t)straps->dead;
     id.host_wire = straps->host_wire != 0;
     return id;

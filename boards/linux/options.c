@@ -15,7 +15,7 @@ static const char help[] =
     "  --memory BYTES     data memory in all, stack included (4194304)\n"
     "  --stack BYTES      of it (65536)\n"
     "  --window N         frames a link and direction, 1 to 64; by memory\n"
-    "  --lines BAUD       the cube has serial lines, the slowest so fast\n"
+    "  --lines BAUD       the cube has serial wires, the slowest so fast\n"
     "  --host-wire 0|1    besides node 0, this node has a wire to the host\n"
     "  --dead US          microseconds of silence after which a link is given "
     "up; 0: never\n"

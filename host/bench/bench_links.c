@@ -356,7 +356,7 @@ static int open_line(struct wire *wire, struct host_bench_end *end, int fd,
                     : (struct link_pipe){&wire->slow, slow_send, slow_receive};
     end->idle = idle_line;
     end->settings = (struct link_config){.window = 14, .message_max = 1608};
-    link_for_line(&end->settings, baud == 0 ? FAST_BAUD : baud);
+    link_for_serial(&end->settings, baud == 0 ? FAST_BAUD : baud);
     return 0;
 }
 

@@ -181,7 +181,7 @@ static int read_line(const struct host_cube_file *file,
     wire->serial = true;
     if (!take_number(group, "baud", 300, 20000000, &baud)) {
         return wrong(file, config_setting_get_member(group, "baud"), error,
-                     "baud: not a rate of a serial line; give 300 to "
+                     "baud: not a rate of a serial wire; give 300 to "
                      "20000000");
     }
     if (flow != NULL && config_setting_type(flow) != CONFIG_TYPE_BOOL) {
@@ -269,8 +269,8 @@ static int read_wire(struct host_cube_file *file, config_setting_t *group,
     }
     int status = serial ? read_line(file, group, wire, error)
                         : read_net(file, group, wire, error);
-    if (serial && (file->line_baud == 0 || wire->baud < file->line_baud)) {
-        file->line_baud = wire->baud;
+    if (serial && (file->serial_baud == 0 || wire->baud < file->serial_baud)) {
+        file->serial_baud = wire->baud;
     }
     file->wires++;
     return status;
@@ -649,7 +649,7 @@ unsigned host_cube_straps(const struct host_cube_file *file, unsigned node,
                    {"--memory", file->memory},
                    {"--window", file->window},
                    {"--dead", UINT64_C(1000000) * file->dead_s},
-                   {"--lines", file->line_baud},
+                   {"--lines", file->serial_baud},
                    {"--host-wire", host != NULL ? 1 : 0}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         snprintf(straps[n++], HOST_STRAP_BYTES, "%s", numbers[i].name);

@@ -40,7 +40,7 @@ struct host_cube_file {
     char key_path[HOST_STRAP_BYTES];
     bool has_key;
     uint8_t key[SECURE_KEY_BYTES];
-    uint32_t line_baud; /* of the slowest serial line; 0: there is none */
+    uint32_t serial_baud; /* of the slowest serial wire; 0: there is none */
     struct host_cube_wire *wire;
     unsigned wires;
     bool local[HOST_NODES_MAX]; /* the host starts this node itself */

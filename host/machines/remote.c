@@ -197,7 +197,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     machine.context = remote;
     machine.nodes = remote->file->nodes;
     machine.dimension = remote->file->dimension;
-    machine.line_baud = remote->file->line_baud;
+    machine.serial_baud = remote->file->serial_baud;
     machine.absent_s = absent_s(remote->file);
     while (machine.epoch == 0) {
         (void)!getrandom(&machine.epoch, sizeof machine.epoch, 0);

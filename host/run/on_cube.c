@@ -58,7 +58,8 @@ int host_run_on_cube(struct host_run_options *options, struct host_error *error)
     options->nodes = the_file.nodes;
     options->memory = the_file.memory;
     options->board = the_file.board;
-    options->link = the_file.line_baud != 0 ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
+    options->link =
+        the_file.serial_baud != 0 ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
     options->begin = begin;
     return 0;
 }

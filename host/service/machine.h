@@ -25,7 +25,7 @@ struct host_machine {
     unsigned nodes, dimension;
     uint32_t epoch;        /* of this start of the host, never repeated */
     struct link_pipe pipe; /* the bytes to and from node 0 */
-    uint32_t line_baud;    /* of the slowest serial line; 0: there is none */
+    uint32_t serial_baud;  /* of the slowest serial wire; 0: there is none */
     /* A second wire, to another node, for when node 0 is lost; 0: none. */
     uint16_t spare_node;
     struct link_pipe spare;

@@ -41,7 +41,7 @@ static int make_cube(struct host_service *s, struct host_error *error)
     for (unsigned i = 1; i < config.host_wires; i++) {
         config.pipes[i] = s->machine->wires[i];
     }
-    cube_for_lines(&config, s->machine->line_baud);
+    cube_for_serial(&config, s->machine->serial_baud);
     size_t bytes = cube_arena_bytes(&config);
     s->cube_memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
     if (s->cube_memory == NULL) {

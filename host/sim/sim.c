@@ -210,7 +210,7 @@ static void tell(struct host_sim_run *r)
         }
     }
     for (unsigned i = 0; i < 2 * w->cube.wires; i++) {
-        out->frames += host_sim_cube_line(&w->cube, i / 2, i % 2)->frames;
+        out->frames += host_sim_cube_direction(&w->cube, i / 2, i % 2)->frames;
     }
 }
 

@@ -62,10 +62,10 @@ struct host_sim_port *host_sim_cube_port(const struct host_sim_cube *cube,
     return &cube->port[place * cube->links_max + link];
 }
 
-struct sim_line *host_sim_cube_line(const struct host_sim_cube *cube,
-                                    unsigned wire, unsigned side)
+struct sim_direction *host_sim_cube_direction(const struct host_sim_cube *cube,
+                                              unsigned wire, unsigned side)
 {
-    return &cube->wire[wire].wire.line[side];
+    return &cube->wire[wire].wire.direction[side];
 }
 
 /* --- bytes ---------------------------------------------------------------- */
@@ -154,7 +154,8 @@ void host_sim_cube_faults(struct host_sim_cube *cube,
                           const struct sim_faults *faults)
 {
     for (unsigned i = 0; i < 2 * cube->wires; i++) {
-        sim_line_faults(host_sim_cube_line(cube, i / 2, i % 2), faults);
+        sim_direction_faults(host_sim_cube_direction(cube, i / 2, i % 2),
+                             faults);
     }
 }
 
@@ -163,7 +164,7 @@ uint64_t host_sim_cube_struck(const struct host_sim_cube *cube,
 {
     uint64_t sum = 0;
     for (unsigned i = 0; i < 2 * cube->wires; i++) {
-        sum += host_sim_cube_line(cube, i / 2, i % 2)->struck[fault];
+        sum += host_sim_cube_direction(cube, i / 2, i % 2)->struck[fault];
     }
     return sum;
 }
@@ -182,7 +183,7 @@ void host_sim_cube_deaf(struct host_sim_cube *cube, unsigned wire,
 {
     struct host_sim_wire *one = &cube->wire[wire];
     one->deaf[side] += deaf ? 1u : UINT32_MAX;
-    sim_line_deaf(&one->wire.line[side], one->deaf[side] > 0);
+    sim_direction_deaf(&one->wire.direction[side], one->deaf[side] > 0);
 }
 
 void host_sim_cube_leave_out(struct host_sim_cube *cube, unsigned wire)

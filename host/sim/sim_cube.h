@@ -82,8 +82,8 @@ struct link_pipe host_sim_cube_pipe(const struct host_sim_cube *cube,
                                     unsigned place, unsigned link);
 
 /* A line of a wire: 0 from its lower end on, 1 towards it. */
-struct sim_line *host_sim_cube_line(const struct host_sim_cube *cube,
-                                    unsigned wire, unsigned side);
+struct sim_direction *host_sim_cube_direction(const struct host_sim_cube *cube,
+                                              unsigned wire, unsigned side);
 
 /* Chance on all lines from now on; NULL: none any more. */
 void host_sim_cube_faults(struct host_sim_cube *cube,

@@ -239,8 +239,9 @@ static void weather(struct host_sim_run *r, bool bad)
 {
     for (unsigned i = 0; i < 2 * r->world.cube.wires; i++) {
         bool here = bad && draw(r, 0, 2) > 0;
-        sim_line_faults(host_sim_cube_line(&r->world.cube, i / 2, i % 2),
-                        here ? &r->plan->weather : NULL);
+        sim_direction_faults(
+            host_sim_cube_direction(&r->world.cube, i / 2, i % 2),
+            here ? &r->plan->weather : NULL);
     }
 }
 
@@ -389,10 +390,10 @@ void host_sim_faults_strike(void *run)
 }
 
 /* The frame that the plan names meets its fate. */
-static enum sim_fate decide(void *context, struct sim_line *line)
+static enum sim_fate decide(void *context, struct sim_direction *direction)
 {
     struct host_sim_run *r = context;
-    (void)line;
+    (void)direction;
     if (++r->frames != r->plan->frame) {
         return SIM_PASSES;
     }
@@ -410,9 +411,10 @@ static void watch_frames(struct host_sim_run *r)
         return;
     }
     for (unsigned i = 0; i < 2 * cube->wires; i++) {
-        struct sim_line *line = host_sim_cube_line(cube, i / 2, i % 2);
-        line->decide = r->plan->restart ? NULL : decide;
-        line->context = r;
+        struct sim_direction *direction =
+            host_sim_cube_direction(cube, i / 2, i % 2);
+        direction->decide = r->plan->restart ? NULL : decide;
+        direction->context = r;
     }
     for (unsigned d = 0; r->plan->restart && d < r->world.node[node].links;
          d++) {

@@ -192,7 +192,7 @@ static void plug_in(struct host_world *w, unsigned i, bool in)
             host_sim_cube_cut(&w->cube, port->wire, !in);
         } else {
             host_sim_cube_deaf(&w->cube, port->wire, 1 - port->side, !in);
-            sim_line_flush(port->end->in);
+            sim_direction_flush(port->end->in);
         }
     }
 }

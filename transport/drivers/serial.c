@@ -19,7 +19,7 @@ static uint64_t clock_us(void)
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
-/* Ten bits a byte: the line sends baud / 10 bytes a second, which is as many
+/* Ten bits a byte: the wire sends baud / 10 bytes a second, which is as many
  * millionths of a byte a microsecond. */
 static void drain_by_clock(struct serial_pipe *pipe)
 {
@@ -97,7 +97,7 @@ static int serial_receive(void *context, uint8_t *bytes, size_t size)
     if (size == 0) {
         return pipe->closed ? LINK_PIPE_CLOSED : 0;
     }
-    /* With VMIN 1, no bytes is EAGAIN, and 0 is a line that hung up. */
+    /* With VMIN 1, no bytes is EAGAIN, and 0 is a terminal that hung up. */
     ssize_t got = read(pipe->fd, bytes, size);
     if (got == 0) {
         pipe->closed = true;
@@ -135,7 +135,7 @@ uint64_t serial_wait_us(const struct serial_pipe *pipe)
     if (pipe->closed || !pipe->blocked || pipe->baud == 0) {
         return UINT64_MAX;
     }
-    /* Until half of what may be ahead is on the line. */
+    /* Until half of what may be ahead is on the wire. */
     return (uint64_t)ahead_most(pipe) / 2 * 10000000 / pipe->baud;
 }
 
@@ -170,7 +170,7 @@ static const struct {
               {1500000, B1500000}, {2000000, B2000000}, {2500000, B2500000},
               {3000000, B3000000}, {3500000, B3500000}, {4000000, B4000000}};
 
-static int set_line(int fd, uint32_t baud, bool rts_cts)
+static int set_wire(int fd, uint32_t baud, bool rts_cts)
 {
     struct termios t;
     if (tcgetattr(fd, &t) != 0) {
@@ -197,7 +197,7 @@ int serial_open(const char *path, uint32_t baud, bool rts_cts)
         return -1;
     }
     if (ioctl(fd, TIOCEXCL) != 0 || serial_raw(fd) != 0 ||
-        set_line(fd, baud, rts_cts) != 0) {
+        set_wire(fd, baud, rts_cts) != 0) {
         int reason = errno;
         serial_close(fd);
         errno = reason;

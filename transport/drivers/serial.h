@@ -1,11 +1,11 @@
-/* Pipes of bytes over serial lines on Linux: any open terminal, be it a real
+/* Pipes of bytes over serial wires on Linux: any open terminal, be it a real
  * port, a USB adapter or a pseudo-terminal.  What is above the opening is here;
  * serial_port.h finds and opens real ports.
  *
- * No more than SERIAL_AHEAD_BYTES, or on a fast line the bytes of
+ * No more than SERIAL_AHEAD_BYTES, or on a fast wire the bytes of
  * SERIAL_AHEAD_US, are given to the kernel ahead of the wire, by
  * its own count where it has one and by the clock where the baud rate is given:
- * a link measures the line then, and not the kernel's queue.
+ * a link measures the wire then, and not the kernel's queue.
  *
  * Memory: struct serial_pipe.  Work: at most three system calls a function.
  *
@@ -46,7 +46,7 @@ int serial_raw(int fd);
  * without RTS/CTS; no library takes part.  The descriptor, or -1 and errno. */
 int serial_open(const char *path, uint32_t baud, bool rts_cts);
 
-/* Closes without waiting for bytes that the line does not take. */
+/* Closes without waiting for bytes that the wire does not take. */
 void serial_close(int fd);
 
 /* A pseudo-terminal, both ends raw: fds[0] its master, fds[1] its slave.  0, or
@@ -60,7 +60,7 @@ struct link_pipe serial_link_pipe(struct serial_pipe *pipe);
 /* What to wait for with poll(2), as tcp_events of tcp.h, */
 short serial_events(const struct serial_pipe *pipe);
 
-/* and for how long at most: bytes may wait for the line's time. */
+/* and for how long at most: bytes may wait for the wire's time. */
 uint64_t serial_wait_us(const struct serial_pipe *pipe);
 
 #endif

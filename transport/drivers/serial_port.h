@@ -4,7 +4,7 @@
  * Pseudo-terminals, which libserialport refuses, are opened by serial.h.
  *
  * Memory: struct serial_port, and libserialport's while it opens.  Work: a walk
- * through /sys and /proc to open; none of it waits for the line.
+ * through /sys and /proc to open; none of it waits for the wire.
  *
  *     struct serial_port_settings s = {"usb:A50285BI", 921600, true, 1, 1};
  *     if (serial_port_open(&port, &s) != 0) puts(port.fault);

@@ -56,9 +56,10 @@ static uint64_t draw_gap(uint64_t *state, double chance)
 }
 
 /* Whether one of the next `steps` is struck; the gap is counted down. */
-static bool strikes(struct sim_line *line, enum sim_fault kind, uint64_t steps)
+static bool strikes(struct sim_direction *direction, enum sim_fault kind,
+                    uint64_t steps)
 {
-    uint64_t *gap = &line->gap[kind];
+    uint64_t *gap = &direction->gap[kind];
     if (*gap == UINT64_MAX) {
         return false;
     }
@@ -66,217 +67,228 @@ static bool strikes(struct sim_line *line, enum sim_fault kind, uint64_t steps)
         *gap -= steps;
         return false;
     }
-    *gap = draw_gap(&line->random, line->faults.chance[kind]);
-    line->struck[kind]++;
+    *gap = draw_gap(&direction->random, direction->faults.chance[kind]);
+    direction->struck[kind]++;
     return true;
 }
 
-/* --- the line ------------------------------------------------------------ */
+/* --- the direction
+ * ------------------------------------------------------------ */
 
-static uint64_t now_ns(const struct sim_line *line)
+static uint64_t now_ns(const struct sim_direction *direction)
 {
-    return *line->now_us * 1000;
+    return *direction->now_us * 1000;
 }
 
-static uint64_t latency_ns(const struct sim_line *line)
+static uint64_t latency_ns(const struct sim_direction *direction)
 {
-    return (uint64_t)line->quality.latency_us * 1000;
+    return (uint64_t)direction->quality.latency_us * 1000;
 }
 
-static struct sim_segment *segment_at(const struct sim_line *line, uint32_t i)
+static struct sim_segment *segment_at(const struct sim_direction *direction,
+                                      uint32_t i)
 {
-    return (struct sim_segment *)&line
-        ->segment[(line->segment_first + i) % SIM_SEGMENTS];
+    return (struct sim_segment *)&direction
+        ->segment[(direction->segment_first + i) % SIM_SEGMENTS];
 }
 
 /* Past the last byte of segment i. */
-static uint64_t segment_end(const struct sim_line *line, uint32_t i)
+static uint64_t segment_end(const struct sim_direction *direction, uint32_t i)
 {
-    return i + 1 < line->segments ? segment_at(line, i + 1)->first : line->end;
+    return i + 1 < direction->segments ? segment_at(direction, i + 1)->first
+                                       : direction->end;
 }
 
 /* Bytes [first, result) of segment i have left the driver at time_ns. */
-static uint64_t passed_of(const struct sim_line *line, uint32_t i,
+static uint64_t passed_of(const struct sim_direction *direction, uint32_t i,
                           uint64_t time_ns)
 {
-    const struct sim_segment *s = segment_at(line, i);
-    uint64_t end = segment_end(line, i);
+    const struct sim_segment *s = segment_at(direction, i);
+    uint64_t end = segment_end(direction, i);
     if (time_ns < s->from_ns) {
         return s->first;
     }
-    if (line->step_ns == 0) {
+    if (direction->step_ns == 0) {
         return end;
     }
-    uint64_t count = (time_ns - s->from_ns) / line->step_ns;
+    uint64_t count = (time_ns - s->from_ns) / direction->step_ns;
     return count < end - s->first ? s->first + count : end;
 }
 
 /* Position up to which bytes have left the driver at time_ns. */
-static uint64_t passed(const struct sim_line *line, uint64_t time_ns)
+static uint64_t passed(const struct sim_direction *direction, uint64_t time_ns)
 {
-    for (uint32_t i = line->segments; i-- > 0;) {
-        if (segment_at(line, i)->from_ns <= time_ns) {
-            uint64_t at = passed_of(line, i, time_ns);
-            return at > line->begin ? at : line->begin;
+    for (uint32_t i = direction->segments; i-- > 0;) {
+        if (segment_at(direction, i)->from_ns <= time_ns) {
+            uint64_t at = passed_of(direction, i, time_ns);
+            return at > direction->begin ? at : direction->begin;
         }
     }
-    return line->begin;
+    return direction->begin;
 }
 
 /* Bytes that nobody holds up any more begin a segment of their own. */
-static void put(struct sim_line *line, const uint8_t *bytes, size_t size)
+static void put(struct sim_direction *direction, const uint8_t *bytes,
+                size_t size)
 {
-    uint64_t now = now_ns(line), room = line->quality.bytes;
-    uint64_t left = room - (line->end - line->begin);
+    uint64_t now = now_ns(direction), room = direction->quality.bytes;
+    uint64_t left = room - (direction->end - direction->begin);
     size = size < left ? size : (size_t)left;
     if (size == 0) {
         return;
     }
-    if (line->segments == 0 || line->free_ns < now) {
-        line->free_ns = line->free_ns < now ? now : line->free_ns;
-        struct sim_segment *s = segment_at(line, line->segments++);
-        *s = (struct sim_segment){line->end, line->free_ns};
+    if (direction->segments == 0 || direction->free_ns < now) {
+        direction->free_ns =
+            direction->free_ns < now ? now : direction->free_ns;
+        struct sim_segment *s = segment_at(direction, direction->segments++);
+        *s = (struct sim_segment){direction->end, direction->free_ns};
     }
-    size_t at = (size_t)(line->end % room);
+    size_t at = (size_t)(direction->end % room);
     size_t first = size < room - at ? size : (size_t)room - at;
-    memcpy(line->bytes + at, bytes, first);
-    memcpy(line->bytes, bytes + first, size - first);
-    line->end += size;
-    line->free_ns += size * line->step_ns;
+    memcpy(direction->bytes + at, bytes, first);
+    memcpy(direction->bytes, bytes + first, size - first);
+    direction->end += size;
+    direction->free_ns += size * direction->step_ns;
 }
 
 /* Nothing for a while; then another segment. */
-static void stall(struct sim_line *line, uint64_t us)
+static void stall(struct sim_direction *direction, uint64_t us)
 {
-    uint64_t now = now_ns(line);
-    if (line->segments + 1 >= SIM_SEGMENTS) {
+    uint64_t now = now_ns(direction);
+    if (direction->segments + 1 >= SIM_SEGMENTS) {
         return;
     }
-    line->free_ns = (line->free_ns < now ? now : line->free_ns) + us * 1000;
-    if (line->segments > 0 && segment_end(line, line->segments - 1) ==
-                                  segment_at(line, line->segments - 1)->first) {
-        line->segments--; /* an empty one */
+    direction->free_ns =
+        (direction->free_ns < now ? now : direction->free_ns) + us * 1000;
+    if (direction->segments > 0 &&
+        segment_end(direction, direction->segments - 1) ==
+            segment_at(direction, direction->segments - 1)->first) {
+        direction->segments--; /* an empty one */
     }
-    struct sim_segment *s = segment_at(line, line->segments++);
-    *s = (struct sim_segment){line->end, line->free_ns};
+    struct sim_segment *s = segment_at(direction, direction->segments++);
+    *s = (struct sim_segment){direction->end, direction->free_ns};
 }
 
 /* A frame that went by, once more, if it is still there. */
-static void put_again(struct sim_line *line)
+static void put_again(struct sim_direction *direction)
 {
-    uint64_t at = line->frame, end = line->end, room = line->quality.bytes;
+    uint64_t at = direction->frame, end = direction->end,
+             room = direction->quality.bytes;
     if (2 * (end - at) > room) {
         return;
     }
     for (; at < end; at++) {
-        uint8_t byte = line->bytes[at % room];
-        put(line, &byte, 1);
+        uint8_t byte = direction->bytes[at % room];
+        put(direction, &byte, 1);
     }
 }
 
 /* --- what goes wrong ----------------------------------------------------- */
 
 /* Bytes that pass before the next strike. */
-static uint64_t untouched(const struct sim_line *line)
+static uint64_t untouched(const struct sim_direction *direction)
 {
-    uint64_t least = line->gap[SIM_FLIP] / 8;
+    uint64_t least = direction->gap[SIM_FLIP] / 8;
     for (int kind = SIM_DELETE; kind < SIM_CHANCES; kind++) {
-        least = line->gap[kind] < least ? line->gap[kind] : least;
+        least = direction->gap[kind] < least ? direction->gap[kind] : least;
     }
-    return line->burst > 0 ? 0 : least;
+    return direction->burst > 0 ? 0 : least;
 }
 
-static void count_down(struct sim_line *line, uint64_t bytes)
+static void count_down(struct sim_direction *direction, uint64_t bytes)
 {
     for (int kind = SIM_FLIP; kind < SIM_CHANCES; kind++) {
-        if (line->gap[kind] != UINT64_MAX) {
-            line->gap[kind] -= kind == SIM_FLIP ? 8 * bytes : bytes;
+        if (direction->gap[kind] != UINT64_MAX) {
+            direction->gap[kind] -= kind == SIM_FLIP ? 8 * bytes : bytes;
         }
     }
 }
 
 /* A byte that something may happen to. */
-static void put_struck(struct sim_line *line, uint8_t byte)
+static void put_struck(struct sim_direction *direction, uint8_t byte)
 {
-    while (strikes(line, SIM_FLIP, 8)) {
-        byte ^= (uint8_t)(1u << (sim_draw(&line->random) >> 32) % 8);
+    while (strikes(direction, SIM_FLIP, 8)) {
+        byte ^= (uint8_t)(1u << (sim_draw(&direction->random) >> 32) % 8);
     }
-    if (strikes(line, SIM_BURST, 1)) {
-        line->burst = line->faults.burst_bytes;
+    if (strikes(direction, SIM_BURST, 1)) {
+        direction->burst = direction->faults.burst_bytes;
     }
-    if (line->burst > 0) {
-        line->burst--;
-        byte = (uint8_t)(sim_draw(&line->random) >> 32);
+    if (direction->burst > 0) {
+        direction->burst--;
+        byte = (uint8_t)(sim_draw(&direction->random) >> 32);
     }
-    if (strikes(line, SIM_STALL, 1)) {
-        stall(line, line->faults.stall_us);
+    if (strikes(direction, SIM_STALL, 1)) {
+        stall(direction, direction->faults.stall_us);
     }
-    bool gone = strikes(line, SIM_DELETE, 1);
+    bool gone = strikes(direction, SIM_DELETE, 1);
     if (!gone) {
-        put(line, &byte, 1);
+        put(direction, &byte, 1);
     }
-    if (strikes(line, SIM_REPEAT, 1)) {
-        put(line, &byte, 1);
+    if (strikes(direction, SIM_REPEAT, 1)) {
+        put(direction, &byte, 1);
     }
-    if (strikes(line, SIM_INSERT, 1)) {
-        byte = (uint8_t)(sim_draw(&line->random) >> 32);
-        put(line, &byte, 1);
+    if (strikes(direction, SIM_INSERT, 1)) {
+        byte = (uint8_t)(sim_draw(&direction->random) >> 32);
+        put(direction, &byte, 1);
     }
 }
 
-static void put_piece(struct sim_line *line, const uint8_t *bytes, size_t size)
+static void put_piece(struct sim_direction *direction, const uint8_t *bytes,
+                      size_t size)
 {
     while (size > 0) {
-        uint64_t good = untouched(line);
+        uint64_t good = untouched(direction);
         size_t run = good < size ? (size_t)good : size;
-        put(line, bytes, run);
-        count_down(line, run);
+        put(direction, bytes, run);
+        count_down(direction, run);
         bytes += run;
         size -= run;
         if (size > 0) {
-            put_struck(line, *bytes++);
+            put_struck(direction, *bytes++);
             size--;
         }
     }
 }
 
 /* The first piece of a frame. */
-static void begin_frame(struct sim_line *line)
+static void begin_frame(struct sim_direction *direction)
 {
-    line->frames++;
-    line->inside = true;
-    line->frame = line->end;
-    line->fate =
-        line->decide != NULL ? line->decide(line->context, line) : SIM_PASSES;
-    line->losing = line->fate == SIM_DROPPED || strikes(line, SIM_LOSS, 1);
-    if (line->fate == SIM_LATE) {
-        stall(line, LATE_STALLS * 100000);
+    direction->frames++;
+    direction->inside = true;
+    direction->frame = direction->end;
+    direction->fate = direction->decide != NULL
+                          ? direction->decide(direction->context, direction)
+                          : SIM_PASSES;
+    direction->losing =
+        direction->fate == SIM_DROPPED || strikes(direction, SIM_LOSS, 1);
+    if (direction->fate == SIM_LATE) {
+        stall(direction, LATE_STALLS * 100000);
     }
 }
 
 /* A frame, or a part of one: its last byte is the only zero it may hold. */
-static void send_piece(struct sim_line *line, const uint8_t *bytes, size_t size,
-                       bool last)
+static void send_piece(struct sim_direction *direction, const uint8_t *bytes,
+                       size_t size, bool last)
 {
-    bool first = !line->inside;
+    bool first = !direction->inside;
     if (first) {
-        begin_frame(line);
+        begin_frame(direction);
     }
-    if (line->deaf) {
-        line->struck[SIM_DEAF]++;
-    } else if (!line->losing && line->fate == SIM_SPOILED && first) {
+    if (direction->deaf) {
+        direction->struck[SIM_DEAF]++;
+    } else if (!direction->losing && direction->fate == SIM_SPOILED && first) {
         size_t at = size > SPOILED_BYTE ? SPOILED_BYTE : size - 1;
         uint8_t byte = bytes[at] ^ 0x10;
-        put_piece(line, bytes, at);
-        put_piece(line, &byte, 1);
-        put_piece(line, bytes + at + 1, size - at - 1);
-    } else if (!line->losing) {
-        put_piece(line, bytes, size);
+        put_piece(direction, bytes, at);
+        put_piece(direction, &byte, 1);
+        put_piece(direction, bytes + at + 1, size - at - 1);
+    } else if (!direction->losing) {
+        put_piece(direction, bytes, size);
     }
     if (last) {
-        line->inside = false;
-        if (line->fate == SIM_TWICE && !line->deaf) {
-            put_again(line);
+        direction->inside = false;
+        if (direction->fate == SIM_TWICE && !direction->deaf) {
+            put_again(direction);
         }
     }
 }
@@ -286,24 +298,26 @@ static void send_piece(struct sim_line *line, const uint8_t *bytes, size_t size,
 static int sim_send(void *context, const uint8_t *bytes, size_t size)
 {
     struct sim_end *end = context;
-    struct sim_line *line = end->out;
+    struct sim_direction *direction = end->out;
     if (*end->cut) {
         return LINK_PIPE_CLOSED;
     }
-    uint64_t held = line->end - passed(line, now_ns(line));
-    uint64_t most = held < line->quality.room ? line->quality.room - held : 0;
-    uint64_t place = line->quality.bytes - (line->end - line->begin);
+    uint64_t held = direction->end - passed(direction, now_ns(direction));
+    uint64_t most =
+        held < direction->quality.room ? direction->quality.room - held : 0;
+    uint64_t place =
+        direction->quality.bytes - (direction->end - direction->begin);
     most = most < place ? most : place;
-    if (line->segments == SIM_SEGMENTS) {
+    if (direction->segments == SIM_SEGMENTS) {
         most = 0;
     }
-    line->blocked = most < size;
+    direction->blocked = most < size;
     size = size < most ? size : (size_t)most;
     for (size_t at = 0; at < size;) {
         const uint8_t *zero = memchr(bytes + at, 0, size - at);
         size_t piece =
             zero != NULL ? (size_t)(zero + 1 - (bytes + at)) : size - at;
-        send_piece(line, bytes + at, piece, zero != NULL);
+        send_piece(direction, bytes + at, piece, zero != NULL);
         at += piece;
     }
     return (int)size;
@@ -312,23 +326,26 @@ static int sim_send(void *context, const uint8_t *bytes, size_t size)
 static int sim_receive(void *context, uint8_t *bytes, size_t size)
 {
     struct sim_end *end = context;
-    struct sim_line *line = end->in;
-    uint64_t now = now_ns(line), late = latency_ns(line);
+    struct sim_direction *direction = end->in;
+    uint64_t now = now_ns(direction), late = latency_ns(direction);
     if (*end->cut) {
         return LINK_PIPE_CLOSED;
     }
-    uint64_t there = now < late ? line->begin : passed(line, now - late);
-    uint64_t room = line->quality.bytes, got = there - line->begin;
+    uint64_t there =
+        now < late ? direction->begin : passed(direction, now - late);
+    uint64_t room = direction->quality.bytes, got = there - direction->begin;
     got = got < size ? got : size;
-    size_t at = (size_t)(line->begin % room);
+    size_t at = (size_t)(direction->begin % room);
     size_t first = got < room - at ? (size_t)got : (size_t)room - at;
-    memcpy(bytes, line->bytes + at, first);
-    memcpy(bytes + first, line->bytes, (size_t)got - first);
-    line->begin += got;
-    while (line->segments > 0 && segment_end(line, 0) <= line->begin &&
-           (line->segments > 1 || line->free_ns <= now)) {
-        line->segment_first = (line->segment_first + 1) % SIM_SEGMENTS;
-        line->segments--;
+    memcpy(bytes, direction->bytes + at, first);
+    memcpy(bytes + first, direction->bytes, (size_t)got - first);
+    direction->begin += got;
+    while (direction->segments > 0 &&
+           segment_end(direction, 0) <= direction->begin &&
+           (direction->segments > 1 || direction->free_ns <= now)) {
+        direction->segment_first =
+            (direction->segment_first + 1) % SIM_SEGMENTS;
+        direction->segments--;
     }
     return (int)got;
 }
@@ -338,69 +355,73 @@ struct link_pipe sim_pipe(struct sim_end *end)
     return (struct link_pipe){end, sim_send, sim_receive};
 }
 
-uint64_t sim_next_us(const struct sim_line *line, uint32_t gather_us)
+uint64_t sim_next_us(const struct sim_direction *direction, uint32_t gather_us)
 {
-    for (uint32_t i = 0; i < line->segments; i++) {
-        const struct sim_segment *s = segment_at(line, i);
-        uint64_t end = segment_end(line, i);
-        uint64_t first = s->first > line->begin ? s->first : line->begin;
+    for (uint32_t i = 0; i < direction->segments; i++) {
+        const struct sim_segment *s = segment_at(direction, i);
+        uint64_t end = segment_end(direction, i);
+        uint64_t first =
+            s->first > direction->begin ? s->first : direction->begin;
         if (first >= end) {
             continue;
         }
-        uint64_t from = s->from_ns + latency_ns(line);
-        uint64_t head = from + (first - s->first + 1) * line->step_ns;
-        uint64_t tail = from + (end - s->first) * line->step_ns;
+        uint64_t from = s->from_ns + latency_ns(direction);
+        uint64_t head = from + (first - s->first + 1) * direction->step_ns;
+        uint64_t tail = from + (end - s->first) * direction->step_ns;
         uint64_t most = head + (uint64_t)gather_us * 1000;
         return ((tail < most ? tail : most) + 999) / 1000;
     }
     return UINT64_MAX;
 }
 
-uint64_t sim_room_us(const struct sim_line *line)
+uint64_t sim_room_us(const struct sim_direction *direction)
 {
-    uint64_t half = line->quality.room / 2 * line->step_ns;
-    if (!line->blocked || line->segments == SIM_SEGMENTS ||
-        line->end - line->begin == line->quality.bytes) {
+    uint64_t half = direction->quality.room / 2 * direction->step_ns;
+    if (!direction->blocked || direction->segments == SIM_SEGMENTS ||
+        direction->end - direction->begin == direction->quality.bytes) {
         return UINT64_MAX;
     }
-    return line->free_ns > half ? (line->free_ns - half + 999) / 1000 : 0;
+    return direction->free_ns > half ? (direction->free_ns - half + 999) / 1000
+                                     : 0;
 }
 
 /* --- the wire ------------------------------------------------------------ */
 
-void sim_line_faults(struct sim_line *line, const struct sim_faults *faults)
+void sim_direction_faults(struct sim_direction *direction,
+                          const struct sim_faults *faults)
 {
-    line->burst = 0;
+    direction->burst = 0;
     if (faults == NULL) {
-        memset(&line->faults, 0, sizeof line->faults);
+        memset(&direction->faults, 0, sizeof direction->faults);
     } else {
-        line->faults = *faults;
+        direction->faults = *faults;
     }
     for (int kind = 0; kind < SIM_CHANCES; kind++) {
-        line->gap[kind] = draw_gap(&line->random, line->faults.chance[kind]);
+        direction->gap[kind] =
+            draw_gap(&direction->random, direction->faults.chance[kind]);
     }
 }
 
-void sim_line_deaf(struct sim_line *line, bool deaf)
+void sim_direction_deaf(struct sim_direction *direction, bool deaf)
 {
-    line->deaf = deaf;
+    direction->deaf = deaf;
 }
 
-void sim_line_flush(struct sim_line *line)
+void sim_direction_flush(struct sim_direction *direction)
 {
-    line->begin = line->end;
-    line->segments = 0;
-    line->segment_first = 0;
-    line->free_ns = now_ns(line);
-    line->inside = false;
-    line->blocked = false;
+    direction->begin = direction->end;
+    direction->segments = 0;
+    direction->segment_first = 0;
+    direction->free_ns = now_ns(direction);
+    direction->inside = false;
+    direction->blocked = false;
 }
 
 void sim_wire_cut(struct sim_wire *wire, bool cut)
 {
     for (int i = 0; i < 2; i++) {
-        sim_line_flush(&wire->line[i]);
-        wire->line[i].struck[SIM_CUT] += cut && !wire->cut;
+        sim_direction_flush(&wire->direction[i]);
+        wire->direction[i].struck[SIM_CUT] += cut && !wire->cut;
     }
     wire->cut = cut;
 }
@@ -416,16 +437,16 @@ void sim_wire_init(struct sim_wire *wire, void *memory,
 {
     memset(wire, 0, sizeof *wire);
     for (unsigned i = 0; i < 2; i++) {
-        struct sim_line *line = &wire->line[i];
-        line->quality = *quality;
-        line->now_us = now_us;
-        line->bytes = (uint8_t *)memory + (size_t)i * quality->bytes;
-        line->step_ns = quality->bytes_per_s == 0
-                            ? 0
-                            : UINT64_C(1000000000) / quality->bytes_per_s;
-        line->random = sim_seed(seed, i);
-        sim_line_faults(line, NULL);
-        wire->end[i] =
-            (struct sim_end){&wire->line[i], &wire->line[1 - i], &wire->cut};
+        struct sim_direction *direction = &wire->direction[i];
+        direction->quality = *quality;
+        direction->now_us = now_us;
+        direction->bytes = (uint8_t *)memory + (size_t)i * quality->bytes;
+        direction->step_ns = quality->bytes_per_s == 0
+                                 ? 0
+                                 : UINT64_C(1000000000) / quality->bytes_per_s;
+        direction->random = sim_seed(seed, i);
+        sim_direction_faults(direction, NULL);
+        wire->end[i] = (struct sim_end){&wire->direction[i],
+                                        &wire->direction[1 - i], &wire->cut};
     }
 }

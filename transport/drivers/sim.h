@@ -1,7 +1,7 @@
-/* Wires in virtual time: two ends, a line each way with a rate, a latency, the
- * room of a driver's buffer, and all that goes wrong with bytes and frames,
- * drawn from a seed.  The same calls at the same times give the same bytes at
- * the same times, on every machine.
+/* Wires in virtual time: two ends, a direction each way, with a rate, a
+ * latency, the room of a driver's buffer, and all that goes wrong with bytes
+ * and frames, drawn from a seed.  The same calls at the same times give the
+ * same bytes at the same times, on every machine.
  *
  * Memory: struct sim_wire, and sim_wire_bytes() that the caller gives.  Work:
  * linear in the bytes, and a step a fault.
@@ -18,11 +18,11 @@
 #include "transport/link.h"
 
 enum {
-    SIM_SEGMENTS = 32, /* bursts of bytes on a line at a time */
+    SIM_SEGMENTS = 32, /* bursts of bytes on a direction at a time */
     SIM_BYTES_MIN = 8192
 };
 
-/* What strikes a line by chance, and what is done to it. */
+/* What strikes a direction by chance, and what is done to it. */
 enum sim_fault {
     SIM_LOSS,   /* a frame, up to its zero, is not there */
     SIM_FLIP,   /* a bit is the other one */
@@ -32,7 +32,7 @@ enum sim_fault {
     SIM_BURST,  /* burst_bytes of noise */
     SIM_STALL,  /* nothing for stall_us */
     SIM_CHANCES,
-    SIM_DEAF = SIM_CHANCES, /* sim_line_deaf: takes bytes, brings none */
+    SIM_DEAF = SIM_CHANCES, /* sim_direction_deaf: takes bytes, brings none */
     SIM_CUT,                /* sim_wire_cut: both ends see it closed */
     SIM_FAULTS
 };
@@ -44,7 +44,7 @@ struct sim_quality {
     uint32_t bytes_per_s; /* 0: as many as there are */
     uint32_t latency_us;
     uint32_t room;  /* bytes that a driver takes ahead of the wire */
-    uint32_t bytes; /* on a line at a time, room included; SIM_BYTES_MIN or
+    uint32_t bytes; /* on a direction at a time, room included; SIM_BYTES_MIN or
                        more; what an end does not read holds up the other */
 };
 
@@ -61,7 +61,7 @@ struct sim_segment {
 };
 
 /* One direction.  Positions count the bytes ever put on it. */
-struct sim_line {
+struct sim_direction {
     struct sim_quality quality;
     struct sim_faults faults;
     const uint64_t *now_us;
@@ -78,22 +78,22 @@ struct sim_line {
     uint64_t frames; /* begun */
     uint64_t struck[SIM_FAULTS];
     /* NULL, or what becomes of frame `frames`, counted from 1. */
-    enum sim_fate (*decide)(void *context, struct sim_line *line);
+    enum sim_fate (*decide)(void *context, struct sim_direction *direction);
     void *context;
 };
 
 struct sim_end {
-    struct sim_line *out, *in;
+    struct sim_direction *out, *in;
     const bool *cut;
 };
 
 struct sim_wire {
-    struct sim_line line[2];
+    struct sim_direction direction[2];
     struct sim_end end[2];
     bool cut;
 };
 
-/* Bytes of memory for the lines of a wire. */
+/* Bytes of memory for the directions of a wire. */
 size_t sim_wire_bytes(const struct sim_quality *quality);
 
 /* A wire without faults. */
@@ -104,27 +104,28 @@ void sim_wire_init(struct sim_wire *wire, void *memory,
 struct link_pipe sim_pipe(struct sim_end *end);
 
 /* From now on; NULL: no more faults of chance. */
-void sim_line_faults(struct sim_line *line, const struct sim_faults *faults);
+void sim_direction_faults(struct sim_direction *direction,
+                          const struct sim_faults *faults);
 
-/* A line that is deaf loses all that is sent. */
-void sim_line_deaf(struct sim_line *line, bool deaf);
+/* A direction that is deaf loses all that is sent. */
+void sim_direction_deaf(struct sim_direction *direction, bool deaf);
 
-/* Loses what is on the line. */
-void sim_line_flush(struct sim_line *line);
+/* Loses what is on the direction. */
+void sim_direction_flush(struct sim_direction *direction);
 
 /* A wire that is cut loses what is on it, and is closed at both ends. */
 void sim_wire_cut(struct sim_wire *wire, bool cut);
 
 /* When the far end may read: at the first byte or up to gather_us later, if
  * more is on its way; UINT64_MAX: nothing comes. */
-uint64_t sim_next_us(const struct sim_line *line, uint32_t gather_us);
+uint64_t sim_next_us(const struct sim_direction *direction, uint32_t gather_us);
 
 /* When half of the driver's room is free for one who found none; UINT64_MAX:
  * the last bytes offered were all taken, or it is the far end that must read
  * first. */
-uint64_t sim_room_us(const struct sim_line *line);
+uint64_t sim_room_us(const struct sim_direction *direction);
 
-/* Draws as the lines do: xorshift, never 0. */
+/* Draws as the directions do: xorshift, never 0. */
 uint64_t sim_draw(uint64_t *state);
 
 /* A state of one's own for each seed and purpose. */

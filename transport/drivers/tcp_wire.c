@@ -253,7 +253,7 @@ static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
     wire->proven = wire->config.suite != NULL;
     if (wire->proven) {
         struct link_pipe beneath = tcp_link_pipe(&wire->tcp);
-        secure_channel_start(&wire->channel, &c->heard.shake, &beneath);
+        secure_records_start(&wire->records, &c->heard.shake, &beneath);
     } else {
         wire->first = c->heard.first;
     }
@@ -344,7 +344,7 @@ static int broken(struct tcp_wire *wire)
 
 static struct link_pipe inner(struct tcp_wire *wire)
 {
-    return wire->config.suite != NULL ? secure_channel_pipe(&wire->channel)
+    return wire->config.suite != NULL ? secure_records_pipe(&wire->records)
                                       : tcp_link_pipe(&wire->tcp);
 }
 

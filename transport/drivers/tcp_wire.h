@@ -103,7 +103,7 @@ struct tcp_wire {
     uint64_t look_us;  /* when candidates are looked at again; 0: at once */
     struct tcp_first first;
     struct tcp_candidate candidate[TCP_CANDIDATES_MAX];
-    struct secure_channel channel;
+    struct secure_records records;
     uint64_t connections, strangers; /* taken; sent away */
     int fault;                       /* errno of the last call, 0: none */
 };

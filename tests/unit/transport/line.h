@@ -51,8 +51,8 @@ static inline void line_set(struct line_wire *wire,
     faults.chance[SIM_REPEAT] = quality->repeat;
     faults.chance[SIM_STALL] = quality->stall;
     for (int i = 0; i < 2; i++) {
-        sim_line_faults(&wire->sim.line[i], &faults);
-        sim_line_deaf(&wire->sim.line[i], quality->drop >= 1);
+        sim_direction_faults(&wire->sim.direction[i], &faults);
+        sim_direction_deaf(&wire->sim.direction[i], quality->drop >= 1);
     }
 }
 
@@ -90,7 +90,8 @@ static inline uint64_t line_damaged(const struct line_wire *wire)
 {
     uint64_t sum = 0;
     for (int k = 0; k < SIM_CHANCES; k++) {
-        sum += wire->sim.line[0].struck[k] + wire->sim.line[1].struck[k];
+        sum +=
+            wire->sim.direction[0].struck[k] + wire->sim.direction[1].struck[k];
     }
     return sum;
 }

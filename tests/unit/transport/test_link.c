@@ -100,10 +100,10 @@ static void lost_credits_are_asked_for(void **unused)
         step(p, 200);
     }
     p->ends[1].lazy = false;
-    sim_line_deaf(&p->wire.sim.line[1], true);
+    sim_direction_deaf(&p->wire.sim.direction[1], true);
     step(p, 200);
     step(p, 200);
-    sim_line_deaf(&p->wire.sim.line[1], false);
+    sim_direction_deaf(&p->wire.sim.direction[1], false);
     uint32_t before = p->ends[1].read;
     for (unsigned i = 0; i < 10000 && p->ends[1].read == before; i++) {
         step(p, 200);
@@ -212,7 +212,7 @@ static double share(double baud, double bit_error, uint32_t step_us,
                              .room = 512,
                              .bit_error = bit_error};
     struct link_config c = {.window = 14, .message_max = 1608};
-    link_for_line(&c, (uint32_t)baud);
+    link_for_serial(&c, (uint32_t)baud);
     struct pair *p = new_pair(&c, &q, 1);
     uint32_t messages = (65536 * 8 + 1607) / 1608;
     run(p, messages, step_us, UINT64_MAX / 2);

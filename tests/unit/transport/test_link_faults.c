@@ -166,7 +166,7 @@ static void spoil(struct world *w)
 static void strike(struct world *w)
 {
     unsigned kind = draw(w) % 400;
-    struct sim_line *line = &w->wire.sim.line[draw(w) % 2];
+    struct sim_direction *direction = &w->wire.sim.direction[draw(w) % 2];
     if (kind < KINDS) {
         w->struck[kind]++;
     }
@@ -187,14 +187,14 @@ static void strike(struct world *w)
         w->ends[draw(w) % 2].lazy ^= true;
         break;
     case 5: /* one way is dead */
-        sim_line_deaf(line, true);
+        sim_direction_deaf(direction, true);
         break;
     case 6:
         w->now_us += draw(w) % 5000000;
         break;
     case 7:
-        sim_line_deaf(&w->wire.sim.line[0], true);
-        sim_line_deaf(&w->wire.sim.line[1], true);
+        sim_direction_deaf(&w->wire.sim.direction[0], true);
+        sim_direction_deaf(&w->wire.sim.direction[1], true);
         break;
     default:
         if (kind < 20) {

@@ -52,7 +52,7 @@ struct world {
     struct ends ends[2];
     struct link_pipe pipes[2];
     struct secure_shake shake[2];
-    struct secure_channel channel[2];
+    struct secure_records records[2];
 };
 
 /* End 0 calls.  `salt` makes the nonces. */
@@ -88,7 +88,7 @@ static void shake_hands(struct world *w, int want[2])
     }
     for (unsigned who = 0; who < 2; who++) {
         if (want[who] > 0) {
-            secure_channel_start(&w->channel[who], &w->shake[who],
+            secure_records_start(&w->records[who], &w->shake[who],
                                  &w->pipes[who]);
         }
     }
@@ -107,7 +107,7 @@ static struct world *connected(uint8_t salt, size_t most)
 static int send_all(struct world *w, unsigned who, const uint8_t *bytes,
                     size_t size)
 {
-    struct link_pipe p = secure_channel_pipe(&w->channel[who]);
+    struct link_pipe p = secure_records_pipe(&w->records[who]);
     size_t done = 0;
     for (unsigned i = 0; i < 100000 && done < size; i++) {
         int n = p.send(p.context, bytes + done, size - done);
@@ -128,7 +128,7 @@ static int send_all(struct world *w, unsigned who, const uint8_t *bytes,
 static int receive_all(struct world *w, unsigned who, uint8_t *bytes,
                        size_t size)
 {
-    struct link_pipe p = secure_channel_pipe(&w->channel[who]);
+    struct link_pipe p = secure_records_pipe(&w->records[who]);
     size_t done = 0;
     for (unsigned idle = 0; idle < 4000;) {
         int n = p.receive(p.context, bytes + done, size - done);
@@ -171,7 +171,7 @@ static void all_that_fits_is_taken(void **unused)
 {
     static uint8_t said[3 * SECURE_RECORD_MAX], heard[sizeof said];
     struct world *w = connected(2, 0);
-    struct link_pipe p = secure_channel_pipe(&w->channel[0]);
+    struct link_pipe p = secure_records_pipe(&w->records[0]);
     (void)unused;
     assert_int_equal(p.send(p.context, said, sizeof said), sizeof said);
     assert_int_equal(receive_all(w, 1, heard, sizeof heard), sizeof said);
@@ -226,7 +226,7 @@ static void expect_two(struct world *w, const uint8_t *said, int size)
     assert_int_equal(heard[0], 0);
     assert_memory_equal(heard + 1, said, (size_t)size);
     assert_memory_equal(heard + 1 + size, said, (size_t)size);
-    assert_int_equal(w->channel[1].records_in, 2);
+    assert_int_equal(w->records[1].records_in, 2);
 }
 
 /* Each byte of a record changed, or cut out, or twice there. */
@@ -306,7 +306,7 @@ static void a_repeated_record_is_not_heard(void **unused)
                    size);
             w->lanes[1].end += size;
             assert_int_equal(receive_all(w, 0, heard, sizeof heard), 0);
-            assert_int_equal(w->channel[0].refused, 1);
+            assert_int_equal(w->records[0].refused, 1);
             free(w);
             continue;
         }
@@ -381,7 +381,7 @@ static void noise_without_end_ends_it(void **unused)
     (void)unused;
     for (unsigned crafted = 0; crafted < 2; crafted++) {
         struct world *w = connected(8, 0);
-        struct link_pipe p = secure_channel_pipe(&w->channel[1]);
+        struct link_pipe p = secure_records_pipe(&w->records[1]);
         struct lane *lane = &w->lanes[0];
         uint32_t random = 4;
         size_t come = 0;
@@ -399,10 +399,10 @@ static void noise_without_end_ends_it(void **unused)
             come += ROOM;
         }
         assert_int_equal(status, LINK_PIPE_CLOSED);
-        assert_true(w->channel[1].refused <=
+        assert_true(w->records[1].refused <=
                     SECURE_LOST_MAX / SECURE_RECORD_MAX + 1);
-        assert_true((w->channel[1].refused > 0) == (crafted != 0));
-        assert_int_equal(w->channel[1].records_in, 0);
+        assert_true((w->records[1].refused > 0) == (crafted != 0));
+        assert_int_equal(w->records[1].records_in, 0);
         assert_int_equal(p.send(p.context, &byte, 1), LINK_PIPE_CLOSED);
         free(w);
     }
@@ -478,7 +478,7 @@ static void damage_costs_what_it_touches(void **unused)
         }
         assert_int_equal(last, RECORDS - 1);
         assert_true(found > RECORDS / 3);
-        assert_int_equal(w->channel[1].records_in, found);
+        assert_int_equal(w->records[1].records_in, found);
         free(w);
     }
 }

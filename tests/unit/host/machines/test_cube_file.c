@@ -72,7 +72,7 @@ static void nodes_are_started_as_it_says(void **unused)
     assert_int_equal(host_cube_file_read(&file, path, &error), 0);
     assert_int_equal(file.nodes, 2);
     assert_int_equal(file.memory, 512 * 1024);
-    assert_true(file.has_key && file.line_baud == 921600);
+    assert_true(file.has_key && file.serial_baud == 921600);
     assert_int_equal(file.key[0], 0);
     assert_int_equal(file.key[31], 0x1f);
     assert_true(file.local[1] && !file.local[0]);

@@ -1,4 +1,4 @@
-/* Serial lines: pseudo-terminals pass every byte, lines that break come back, a
+/* Serial wires: pseudo-terminals pass every byte, lines that break come back, a
  * port in use is named with its user, and a link fills a paced line. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -307,7 +307,7 @@ static void open_line(struct line *line, uint32_t baud, double error_rate)
                                 .peer_node = (uint16_t)(1 - who),
                                 .window = 14,
                                 .message_max = 1608};
-        link_for_line(&c, baud);
+        link_for_serial(&c, baud);
         serial_pipe_init(&end->pipe, line->fds[3 * who], baud);
         end->pipe.now_us = test_clock;
         end->pipe.ahead_us = now;

@@ -59,12 +59,12 @@ static void bytes_take_their_time(void **unused)
     (void)unused;
     memset(out, 7, sizeof out);
     lab->now_us = 1000;
-    assert_true(sim_next_us(&lab->wire.line[0], 0) == UINT64_MAX);
+    assert_true(sim_next_us(&lab->wire.direction[0], 0) == UINT64_MAX);
     assert_int_equal(put(lab, out, 200), 150); /* the driver's room */
     /* A byte takes 100 us, and each is late by 5,000. */
-    assert_true(sim_next_us(&lab->wire.line[0], 0) == 6100);
-    assert_true(sim_next_us(&lab->wire.line[0], 300) == 6400);
-    assert_true(sim_room_us(&lab->wire.line[0]) == 1000 + 7500);
+    assert_true(sim_next_us(&lab->wire.direction[0], 0) == 6100);
+    assert_true(sim_next_us(&lab->wire.direction[0], 300) == 6400);
+    assert_true(sim_room_us(&lab->wire.direction[0]) == 1000 + 7500);
     lab->now_us = 6099;
     assert_int_equal(get(lab, in, 200), 0);
     lab->now_us = 6100;
@@ -72,7 +72,7 @@ static void bytes_take_their_time(void **unused)
     lab->now_us = 7050;
     assert_int_equal(get(lab, in, 200), 9);
     assert_int_equal(put(lab, out, 50), 50); /* 60 bytes have left */
-    assert_true(sim_room_us(&lab->wire.line[0]) == UINT64_MAX);
+    assert_true(sim_room_us(&lab->wire.direction[0]) == UINT64_MAX);
     lab->now_us = 100000;
     assert_int_equal(get(lab, in, 200), 190);
     assert_int_equal(get(lab, in, 200), 0);
@@ -81,7 +81,7 @@ static void bytes_take_their_time(void **unused)
 }
 
 /* What is not read holds up who sends, and nothing is lost by that. */
-static void a_full_line_takes_no_more(void **unused)
+static void a_full_wire_takes_no_more(void **unused)
 {
     uint8_t out[1000], in[1000];
     struct lab *lab = new_lab(0, 10, BYTES, 1);
@@ -92,8 +92,8 @@ static void a_full_line_takes_no_more(void **unused)
         sent += (uint64_t)put(lab, out, sizeof out);
         lab->now_us += 3;
     }
-    assert_true(sent <= BYTES && lab->wire.line[0].blocked);
-    assert_true(sim_room_us(&lab->wire.line[0]) == UINT64_MAX);
+    assert_true(sent <= BYTES && lab->wire.direction[0].blocked);
+    assert_true(sim_room_us(&lab->wire.direction[0]) == UINT64_MAX);
     lab->now_us += 100;
     for (int n; (n = get(lab, in, sizeof in)) > 0;) {
         got += (uint64_t)n;
@@ -105,13 +105,13 @@ static void a_full_line_takes_no_more(void **unused)
 
 /* Sends FRAMES frames under such faults; a sum of all that arrives. */
 static uint64_t shower(const struct sim_faults *faults, uint64_t seed,
-                       struct sim_line *line, uint64_t *got)
+                       struct sim_direction *direction, uint64_t *got)
 {
     uint8_t frame[FRAME], in[BYTES];
     struct lab *lab = new_lab(1000000, 50, BYTES / 2, seed);
     uint64_t sum = 0;
     *got = 0;
-    sim_line_faults(&lab->wire.line[0], faults);
+    sim_direction_faults(&lab->wire.direction[0], faults);
     for (uint32_t i = 0; i < FRAMES; i++) {
         fill(frame, i);
         assert_int_equal(put(lab, frame, FRAME), FRAME);
@@ -122,7 +122,7 @@ static uint64_t shower(const struct sim_faults *faults, uint64_t seed,
         }
         *got += (uint64_t)n;
     }
-    *line = lab->wire.line[0];
+    *direction = lab->wire.direction[0];
     free(lab);
     return sum;
 }
@@ -134,29 +134,29 @@ static void faults_strike_as_often_as_they_should(void **unused)
     const double each[SIM_CHANCES] = {
         FRAMES,         8.0 * FRAMES * FRAME, FRAMES * FRAME, FRAMES * FRAME,
         FRAMES * FRAME, FRAMES * FRAME,       FRAMES * FRAME};
-    struct sim_line line;
+    struct sim_direction direction;
     uint64_t got, clean;
     (void)unused;
-    uint64_t right = shower(NULL, 1, &line, &clean);
+    uint64_t right = shower(NULL, 1, &direction, &clean);
     assert_true(clean == FRAMES * FRAME);
-    assert_true(shower(NULL, 2, &line, &clean) == right);
+    assert_true(shower(NULL, 2, &direction, &clean) == right);
     for (int kind = 0; kind < SIM_CHANCES; kind++) {
         struct sim_faults faults = {.burst_bytes = 50, .stall_us = 100};
         faults.chance[kind] = chance[kind];
-        uint64_t sum = shower(&faults, 3, &line, &got);
+        uint64_t sum = shower(&faults, 3, &direction, &got);
         double expected = each[kind] * chance[kind];
-        double struck = (double)line.struck[kind];
+        double struck = (double)direction.struck[kind];
         assert_true(struck > 0.5 * expected && struck < 1.5 * expected);
         for (int other = 0; other < SIM_FAULTS; other++) {
-            assert_true(other == kind || line.struck[other] == 0);
+            assert_true(other == kind || direction.struck[other] == 0);
         }
         assert_true(kind == SIM_STALL ? sum == right : sum != right);
         assert_true((got < clean) == (kind == SIM_LOSS || kind == SIM_DELETE));
         assert_true((got > clean) ==
                     (kind == SIM_INSERT || kind == SIM_REPEAT));
-        assert_true(shower(&faults, 3, &line, &got) == sum);
+        assert_true(shower(&faults, 3, &direction, &got) == sum);
         assert_true(kind == SIM_STALL ||
-                    shower(&faults, 4, &line, &got) != sum);
+                    shower(&faults, 4, &direction, &got) != sum);
     }
 }
 
@@ -165,10 +165,10 @@ struct judge {
     uint64_t frame;
 };
 
-static enum sim_fate decide(void *context, struct sim_line *line)
+static enum sim_fate decide(void *context, struct sim_direction *direction)
 {
     const struct judge *judge = context;
-    return line->frames == judge->frame ? judge->fate : SIM_PASSES;
+    return direction->frames == judge->frame ? judge->fate : SIM_PASSES;
 }
 
 /* The second frame of three, each sent in two pieces. */
@@ -179,8 +179,8 @@ static void a_frame_meets_its_fate(void **unused)
         uint8_t frame[3][FRAME], in[5 * FRAME];
         struct judge judge = {(enum sim_fate)fate, 2};
         struct lab *lab = new_lab(0, 50, BYTES / 2, 1);
-        lab->wire.line[0].decide = decide;
-        lab->wire.line[0].context = &judge;
+        lab->wire.direction[0].decide = decide;
+        lab->wire.direction[0].context = &judge;
         for (uint32_t i = 0; i < 3; i++) {
             fill(frame[i], i);
             assert_int_equal(put(lab, frame[i], 40), 40);
@@ -215,14 +215,14 @@ static void wires_fail_one_way_and_both(void **unused)
     struct lab *lab = new_lab(0, 0, BYTES / 2, 1);
     (void)unused;
     fill(frame, 1);
-    sim_line_deaf(&lab->wire.line[0], true);
+    sim_direction_deaf(&lab->wire.direction[0], true);
     assert_int_equal(put(lab, frame, FRAME), FRAME);
     assert_int_equal(get(lab, in, FRAME), 0);
     assert_int_equal(lab->pipe[1].send(lab->pipe[1].context, frame, FRAME),
                      FRAME);
     assert_int_equal(lab->pipe[0].receive(lab->pipe[0].context, in, FRAME),
                      FRAME);
-    sim_line_deaf(&lab->wire.line[0], false);
+    sim_direction_deaf(&lab->wire.direction[0], false);
     assert_int_equal(put(lab, frame, FRAME), FRAME);
     sim_wire_cut(&lab->wire, true);
     assert_int_equal(put(lab, frame, FRAME), LINK_PIPE_CLOSED);
@@ -232,8 +232,8 @@ static void wires_fail_one_way_and_both(void **unused)
     assert_int_equal(put(lab, frame, FRAME), FRAME);
     assert_int_equal(get(lab, in, FRAME), FRAME);
     assert_memory_equal(in, frame, FRAME);
-    assert_int_equal(lab->wire.line[0].struck[SIM_CUT], 1);
-    assert_int_equal(lab->wire.line[0].struck[SIM_DEAF], 1);
+    assert_int_equal(lab->wire.direction[0].struck[SIM_CUT], 1);
+    assert_int_equal(lab->wire.direction[0].struck[SIM_DEAF], 1);
     free(lab);
 }
 
@@ -241,7 +241,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bytes_take_their_time),
-        cmocka_unit_test(a_full_line_takes_no_more),
+        cmocka_unit_test(a_full_wire_takes_no_more),
         cmocka_unit_test(faults_strike_as_often_as_they_should),
         cmocka_unit_test(a_frame_meets_its_fate),
         cmocka_unit_test(wires_fail_one_way_and_both),

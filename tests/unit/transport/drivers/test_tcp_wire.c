@@ -164,7 +164,7 @@ static void wires_that_break_go_on(void **unused)
             }
             assert_true(ends[1].wire.connections >= 7);
             assert_int_equal(link_statistics(ends[0].link)->sessions, 1);
-            assert_int_equal(ends[1].wire.channel.refused, 0);
+            assert_int_equal(ends[1].wire.records.refused, 0);
             close_end(&ends[0]);
             close_end(&ends[1]);
         }
