@@ -91,18 +91,11 @@ static void remember_bytes(struct host_sim_cube *c, const uint8_t *bytes,
     remember(c, rest);
 }
 
-static void wake(const struct host_sim_port *port, uint64_t us)
-{
-    const struct host_sim_cube_options *o = &port->cube->options;
-    if (o->wake != NULL) {
-        o->wake(o->context, port->peer, us);
-    }
-}
-
 static int port_send(void *context, const uint8_t *bytes, size_t size)
 {
     struct host_sim_port *port = context;
     struct host_sim_cube *c = port->cube;
+    const struct host_sim_cube_options *o = &c->options;
     if (port->replaced) {
         return LINK_PIPE_CLOSED;
     }
@@ -110,7 +103,10 @@ static int port_send(void *context, const uint8_t *bytes, size_t size)
     if (taken > 0) {
         remember(c, *c->now_us << 16 ^ port->wire << 1 ^ port->side);
         remember_bytes(c, bytes, (size_t)taken);
-        wake(port, sim_next_us(port->end->out, c->options.gather_us));
+        if (o->wake != NULL) {
+            o->wake(o->context, port->peer,
+                    sim_next_us(port->end->out, o->gather_us));
+        }
     }
     return taken;
 }
@@ -123,8 +119,9 @@ static int port_receive(void *context, uint8_t *bytes, size_t size)
         return LINK_PIPE_CLOSED;
     }
     int got = port->pipe.receive(port->pipe.context, bytes, size);
-    if (got > 0 && port->end->in->blocked) {
-        wake(port, *port->cube->now_us);
+    const struct host_sim_cube_options *o = &port->cube->options;
+    if (got > 0 && port->end->in->blocked && o->wake != NULL) {
+        o->wake(o->context, port->peer, *port->cube->now_us);
     }
     return got;
 }
@@ -251,6 +248,7 @@ int host_sim_cube_open(struct host_sim_cube *cube,
             open_port(c, i, d, host_sim_cube_wire(c, i, d), peer_of(c, i, d));
         }
     }
+    host_sim_cube_faults(c, &options->faults);
     if (options->second_host) {
         host_sim_cube_cut(c, c->wires - 1, true);
     }

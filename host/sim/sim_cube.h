@@ -25,6 +25,7 @@ struct host_sim_cube_options {
     unsigned dimension; /* 0 .. CUBE_DIMENSION_MAX; 0: node 0 and its host */
     uint64_t seed;      /* of what befalls the wires by chance */
     struct sim_quality wire, host_wire; /* host_wire.bytes 0: as `wire` */
+    struct sim_faults faults;           /* of chance, on all lines */
     unsigned host_wires; /* nodes 0 .. host_wires - 1 have one, 1 (as 0) to
                             CUBE_HOST_WIRES_MAX; see cube.h */
     uint16_t spare_node; /* has the host's second wire; 0: none */
@@ -66,7 +67,7 @@ struct host_sim_cube {
     uint8_t *bytes; /* of all wires */
 };
 
-/* Wires without faults.  The clock is the caller's, and stays where it is. */
+/* The clock is the caller's, and stays where it is. */
 int host_sim_cube_open(struct host_sim_cube *cube,
                        const struct host_sim_cube_options *options,
                        const uint64_t *now_us, struct host_error *error);

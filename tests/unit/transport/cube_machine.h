@@ -1,7 +1,8 @@
-/* Cubes in virtual time, for tests: every place writes numbered messages to all
- * others, and what it reads must be those, whole and in order.
+/* Traffic on the simulator's cube in memory: a transport at each place and
+ * nothing above it.  Every place writes numbered messages to all others, and
+ * what it reads must be those, whole and in order.
  *
- * Memory: a cube for each place and a wire for each link.  Work: a poll of each
+ * Memory: a transport for each place, and the wires.  Work: a poll of each
  * place a step.
  *
  *     struct machine *m = build(dimension, &config, &perfect, seed);
@@ -20,14 +21,13 @@
 
 #include <cmocka.h>
 
-#define LINE_BYTES (1u << 13)
-#include "line.h"
-
+#include "host/sim/sim_cube.h"
 #include "transport/cube.h"
 
 enum { NODES_MAX = 32, ENDS_MAX = NODES_MAX + 1, TYPES = 4 };
 
-static const struct line_quality perfect = {.latency_us = 30, .room = 4000};
+static const struct host_sim_cube_options perfect = {
+    .wire = {.latency_us = 30, .room = 4000, .bytes = SIM_BYTES_MIN}};
 
 /* Place `count - 1` is the host's. */
 struct place {
@@ -40,7 +40,6 @@ struct place {
     uint32_t broadcasts_sent, broadcasts_read[ENDS_MAX];
     uint32_t next; /* place that is written to next */
     uint64_t deaf_until_us, stopped_until_us;
-    struct line_wire *wires[CUBE_LINKS_MAX];
     bool gone; /* does nothing any more, and nothing is expected of it */
 };
 
@@ -48,16 +47,15 @@ struct machine {
     uint64_t now_us, random;
     unsigned dimension, nodes, count;
     struct place places[ENDS_MAX];
-    struct line_wire *wires;
-    unsigned wires_count;
-    uint32_t each; /* messages a pair */
+    struct host_sim_cube cube; /* its wires */
+    uint32_t each;             /* messages a pair */
     uint32_t broadcasts;
     unsigned size_max;
 };
 
 static inline uint32_t draw(struct machine *m)
 {
-    return (uint32_t)(line_draw(&m->random) >> 32);
+    return (uint32_t)(sim_draw(&m->random) >> 32);
 }
 
 static inline unsigned place_of(const struct machine *m, uint16_t name)
@@ -65,16 +63,15 @@ static inline unsigned place_of(const struct machine *m, uint16_t name)
     return name == CUBE_HOST ? m->nodes : name;
 }
 
-/* Link d of place i leads to link e of place j. */
-static inline void connect_wire(struct machine *m, unsigned i, unsigned d,
-                                unsigned j, unsigned e,
-                                const struct line_quality *quality)
+static inline unsigned wire_of(const struct machine *m, unsigned i,
+                               unsigned link)
 {
-    struct line_wire *wire = &m->wires[m->wires_count++];
-    line_wire(wire, &m->now_us, quality, m->random + m->wires_count);
-    m->places[i].config.pipes[d] = line_pipe(&wire->ends[0]);
-    m->places[j].config.pipes[e] = line_pipe(&wire->ends[1]);
-    m->places[i].wires[d] = m->places[j].wires[e] = wire;
+    return host_sim_cube_wire(&m->cube, i, link);
+}
+
+static inline void cut_wire(struct machine *m, unsigned i, unsigned link)
+{
+    host_sim_cube_cut(&m->cube, wire_of(m, i, link), true);
 }
 
 static inline void open_place(struct machine *m, unsigned i)
@@ -94,7 +91,7 @@ static inline void open_place(struct machine *m, unsigned i)
 
 static inline struct machine *build(unsigned dimension,
                                     const struct cube_config *config,
-                                    const struct line_quality *quality,
+                                    const struct host_sim_cube_options *wires,
                                     uint64_t seed)
 {
     struct machine *m = calloc(1, sizeof *m);
@@ -104,9 +101,14 @@ static inline struct machine *build(unsigned dimension,
     m->nodes = 1u << dimension;
     m->count = m->nodes + 1;
     m->size_max = CUBE_PAYLOAD_MAX;
-    m->wires = calloc(m->nodes * dimension / 2 + 1 + CUBE_HOST_WIRES_MAX,
-                      sizeof *m->wires);
-    assert_non_null(m->wires);
+    struct host_sim_cube_options options = *wires;
+    struct host_error error = {0};
+    options.dimension = dimension;
+    options.seed = seed;
+    options.host_wires = config->host_wires;
+    options.spare_node = config->spare_node;
+    assert_int_equal(host_sim_cube_open(&m->cube, &options, &m->now_us, &error),
+                     0);
     for (unsigned i = 0; i < m->count; i++) {
         struct place *p = &m->places[i];
         p->self = i == m->nodes ? CUBE_HOST : (uint16_t)i;
@@ -115,22 +117,10 @@ static inline struct machine *build(unsigned dimension,
         p->config.dimension = (uint8_t)dimension;
         p->config.epoch = draw(m) | 1;
         p->next = i;
-    }
-    for (unsigned i = 0; i < m->nodes; i++) {
-        for (unsigned d = 0; d < dimension; d++) {
-            unsigned other = i ^ 1u << d;
-            if (other > i) {
-                connect_wire(m, i, d, other, d, quality);
-            }
+        p->config.host_wire = i > 0 && i == config->spare_node;
+        for (unsigned d = 0; d < host_sim_cube_links(&m->cube, i); d++) {
+            p->config.pipes[d] = host_sim_cube_pipe(&m->cube, i, d);
         }
-    }
-    connect_wire(m, 0, dimension, m->nodes, 0, quality);
-    for (unsigned i = 1; i < config->host_wires; i++) {
-        connect_wire(m, i, dimension, m->nodes, i, quality);
-    }
-    if (config->spare_node != 0) {
-        connect_wire(m, config->spare_node, dimension, m->nodes, 1, quality);
-        m->places[config->spare_node].config.host_wire = true;
     }
     for (unsigned i = 0; i < m->count; i++) {
         open_place(m, i);
@@ -143,7 +133,7 @@ static inline void destroy(struct machine *m)
     for (unsigned i = 0; i < m->count; i++) {
         free(m->places[i].arena);
     }
-    free(m->wires);
+    host_sim_cube_close(&m->cube);
     free(m);
 }
 

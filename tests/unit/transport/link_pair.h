@@ -1,5 +1,5 @@
-/* Two links on one wire in virtual time, for tests: each end sends a stream of
- * numbered messages, and what it reads must be the other's.
+/* Two links on one wire, that of the simulator's smallest cube: each end sends
+ * a stream of numbered messages, and what it reads must be the other's.
  *
  * Memory: two links and a wire.  Work: a poll of each a step.
  *
@@ -19,9 +19,12 @@
 
 #include <cmocka.h>
 
-#include "line.h"
+#include "host/sim/sim_cube.h"
 
-static const struct line_quality perfect = {.latency_us = 50, .room = 1 << 16};
+enum { PAIR_BYTES = 1 << 17 }; /* on the wire, each way */
+
+static const struct host_sim_cube_options perfect = {
+    .wire = {.latency_us = 50, .room = 1 << 16, .bytes = PAIR_BYTES}};
 
 struct end {
     struct link *link;
@@ -37,7 +40,7 @@ struct end {
 
 struct pair {
     uint64_t now_us;
-    struct line_wire wire;
+    struct host_sim_cube cube; /* node 0 is end 0, the host end 1 */
     struct end ends[2];
 };
 
@@ -80,7 +83,7 @@ static inline void fill(uint8_t *bytes, size_t size, unsigned who,
 static inline void start(struct pair *p, unsigned who, uint32_t epoch)
 {
     struct end *end = &p->ends[who];
-    end->config.pipe = line_pipe(&p->wire.ends[who]);
+    end->config.pipe = host_sim_cube_pipe(&p->cube, who, 0);
     end->config.epoch = epoch;
     end->config.node = (uint16_t)(10 + who);
     end->config.peer_node = (uint16_t)(11 - who);
@@ -94,13 +97,17 @@ static inline void start(struct pair *p, unsigned who, uint32_t epoch)
 }
 
 static inline struct pair *new_pair(const struct link_config *config,
-                                    const struct line_quality *quality,
+                                    const struct host_sim_cube_options *wire,
                                     uint64_t seed)
 {
     struct pair *p = calloc(1, sizeof *p);
+    struct host_sim_cube_options options = *wire;
+    struct host_error error = {0};
     assert_non_null(p);
+    options.seed = seed;
     p->now_us = 1000 * (seed % 7);
-    line_wire(&p->wire, &p->now_us, quality, seed);
+    assert_int_equal(host_sim_cube_open(&p->cube, &options, &p->now_us, &error),
+                     0);
     for (unsigned who = 0; who < 2; who++) {
         p->ends[who].config = *config;
         start(p, who, 0xffe0u + 40 * (uint32_t)seed + who);
@@ -113,7 +120,21 @@ static inline void free_pair(struct pair *p)
 {
     free(p->ends[0].memory);
     free(p->ends[1].memory);
+    host_sim_cube_close(&p->cube);
     free(p);
+}
+
+static inline void cut_pair(struct pair *p, bool cut)
+{
+    host_sim_cube_cut(&p->cube, 0, cut);
+}
+
+/* Bytes that nobody sent, on the way from that end. */
+static inline void put_noise(struct pair *p, unsigned who, const uint8_t *bytes,
+                             size_t size)
+{
+    struct link_pipe pipe = host_sim_cube_pipe(&p->cube, who, 0);
+    (void)pipe.send(pipe.context, bytes, size);
 }
 
 static inline void write_some(struct end *end, unsigned who)

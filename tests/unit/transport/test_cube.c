@@ -44,10 +44,11 @@ static void every_pair_at_once_in_small_frames(void **unused)
 
 static void every_pair_at_once_on_bad_wires(void **unused)
 {
-    struct line_quality bad = perfect;
+    struct host_sim_cube_options bad = perfect;
     (void)unused;
-    bad.bit_error = 1e-5;
-    bad.drop = bad.insert = bad.repeat = 2e-5;
+    bad.faults.chance[SIM_FLIP] = 1e-5;
+    bad.faults.chance[SIM_DELETE] = bad.faults.chance[SIM_INSERT] =
+        bad.faults.chance[SIM_REPEAT] = 2e-5;
     for (unsigned d = 0; d <= 3; d++) {
         struct cube_config c = {
             .window = 5, .frame_payload = 408, .staging = 2};
@@ -323,7 +324,7 @@ static void wrong_wires_in_words(void **unused)
 static void configs_that_make_no_sense(void **unused)
 {
     struct sim_end nowhere = {NULL, NULL, NULL};
-    struct link_pipe pipe = line_pipe(&nowhere);
+    struct link_pipe pipe = sim_pipe(&nowhere);
     struct cube_config good = {.self = 3, .dimension = 2, .window = 1};
     struct cube_config c;
     (void)unused;

@@ -70,7 +70,7 @@ static void all_pairs_after_each_single_dead_link(void **unused)
                 struct machine *m = build(d, &smallest, &perfect, i * 16 + d);
                 settle(m, 1);
                 chatter_for(m, 60);
-                line_cut(m->places[i].wires[link], true);
+                cut_wire(m, i, link);
                 chatter_for(m, 60);
                 until_reported(m, 1);
                 const struct cube_wiring *w = wiring_of(m, m->nodes);
@@ -94,8 +94,8 @@ static void links_that_die_one_after_another(void **unused)
     settle(m, 1);
     for (unsigned link = 0; link < 3; link++) {
         chatter_for(m, 100);
-        line_cut(m->places[6].wires[link], true);
-        line_cut(m->places[9].wires[3 - link], true);
+        cut_wire(m, 6, link);
+        cut_wire(m, 9, 3 - link);
         until_reported(m, 2);
         renew(m);
         traffic(m, 3);
@@ -106,13 +106,13 @@ static void links_that_die_one_after_another(void **unused)
 /* A wire that takes no byte and brings none, but does not say so. */
 static void a_link_that_falls_silent(void **unused)
 {
-    struct line_quality mute = perfect;
     (void)unused;
-    mute.drop = 1;
     struct machine *m = build(3, &smallest, &perfect, 5);
     settle(m, 1);
     chatter_for(m, 100);
-    line_set(m->places[5].wires[1], &mute);
+    for (unsigned side = 0; side < 2; side++) {
+        host_sim_cube_deaf(&m->cube, wire_of(m, 5, 1), side, true);
+    }
     until_reported(m, 1);
     renew(m);
     traffic(m, 5);
@@ -166,7 +166,7 @@ static void the_gateway_is_moved(void **unused)
         if (node_dies) {
             m->places[0].gone = true;
         } else {
-            line_cut(m->places[m->nodes].wires[0], true);
+            cut_wire(m, m->nodes, 0);
         }
         until_reported(m, node_dies ? 4 : 1);
         struct cube_wiring next = *cube_wiring(host);
@@ -204,10 +204,10 @@ static void many_dead_links(void **unused)
         unsigned cut = 0;
         settle(m, 1);
         for (unsigned i = 0; cut < CUBE_DEAD_MAX && i < m->nodes; i++) {
-            struct line_wire *wire =
-                m->places[i ^ draw(m) % 2].wires[draw(m) % m->dimension];
-            cut += !wire->sim.cut;
-            line_cut(wire, true);
+            unsigned node = i ^ draw(m) % 2;
+            unsigned wire = wire_of(m, node, draw(m) % m->dimension);
+            cut += m->cube.wire[wire].cuts == 0;
+            host_sim_cube_cut(&m->cube, wire, true);
         }
         until_reported(m, cut);
         renew(m);

@@ -37,10 +37,10 @@ static void nothing_of_an_old_generation_is_read(void **unused)
 /* On lines that lose every third frame or so. */
 static void datagrams_that_are_lost_are_told_again(void **unused)
 {
-    struct line_quality bad = perfect;
+    struct host_sim_cube_options bad = perfect;
     struct cube_config c = {.window = 2};
     (void)unused;
-    bad.drop = 0.005;
+    bad.faults.chance[SIM_DELETE] = 0.005;
     struct machine *m = build(4, &c, &bad, 3);
     for (uint32_t generation = 1; generation <= 10; generation++) {
         uint64_t start_us = m->now_us;
@@ -56,11 +56,11 @@ static void datagrams_that_are_lost_are_told_again(void **unused)
  * waits until they are. */
 static void nothing_of_the_new_generation_is_lost(void **unused)
 {
-    struct line_quality bad = perfect;
+    struct host_sim_cube_options bad = perfect;
     struct cube_config c = {.window = 4};
     uint32_t written = 0, read = 0;
     (void)unused;
-    bad.drop = 0.005;
+    bad.faults.chance[SIM_DELETE] = 0.005;
     struct machine *m = build(3, &c, &bad, 3);
     settle(m, 1);
     for (uint32_t generation = 2; generation <= 40; generation++) {

@@ -47,17 +47,16 @@ static void a_cube_learns_from_its_host(void **unused)
     unsigned heard_host = 0;
     (void)unused;
     for (unsigned d = 0; d <= 5; d++) {
-        struct line_quality bad = perfect;
-        bad.bit_error = d % 2 ? 1e-4 : 0;
-        bad.drop = bad.insert = d % 2 ? 1e-3 : 0;
+        struct host_sim_cube_options bad = perfect;
+        bad.faults.chance[SIM_FLIP] = d % 2 ? 1e-4 : 0;
+        bad.faults.chance[SIM_DELETE] = bad.faults.chance[SIM_INSERT] =
+            d % 2 ? 1e-3 : 0;
         struct cube_config c = {.window = 2};
         c.spare_node = d == 4 ? 9 : 0;
         struct machine *m = build(d, &c, &bad, d);
         forget(m, learners);
         learn_all(m, learners, &heard_host);
-        for (unsigned i = 0; i < m->wires_count; i++) {
-            line_set(&m->wires[i], &perfect);
-        }
+        host_sim_cube_faults(&m->cube, NULL);
         m->broadcasts = 1;
         settle(m, 1);
         run(m, 2, 1000000000);
@@ -95,25 +94,26 @@ static void noise_teaches_nothing(void **unused)
 {
     struct learner learner;
     struct learned learned;
-    struct line_wire *wire = calloc(1, sizeof *wire);
+    struct host_sim_cube cube;
+    struct host_error error = {0};
     uint64_t now_us = 0, random = 99;
     uint8_t noise[97];
     (void)unused;
-    assert_non_null(wire);
-    line_wire(wire, &now_us, &perfect, 7);
-    struct link_pipe pipe = line_pipe(&wire->ends[0]);
+    assert_int_equal(host_sim_cube_open(&cube, &perfect, &now_us, &error), 0);
+    struct link_pipe pipe = host_sim_cube_pipe(&cube, 0, 0);
+    struct link_pipe far = host_sim_cube_pipe(&cube, 1, 0);
     learner_init(&learner, &pipe, 1);
     for (unsigned i = 0; i < 20000; i++) {
-        size_t size = 1 + line_draw(&random) % sizeof noise;
+        size_t size = 1 + sim_draw(&random) % sizeof noise;
         for (size_t k = 0; k < size; k++) {
-            uint64_t byte = line_draw(&random) >> 32;
+            uint64_t byte = sim_draw(&random) >> 32;
             noise[k] = byte % 5 == 0 ? 0 : (uint8_t)(byte >> 8);
         }
-        line_put(wire, 1, noise, size);
+        (void)far.send(far.context, noise, size);
         now_us += 100;
         assert_false(learner_poll(&learner, &learned));
     }
-    free(wire);
+    host_sim_cube_close(&cube);
 }
 
 int main(void)

@@ -58,8 +58,8 @@ static void sequence_numbers_wrap(void **unused)
     assert_int_equal(link_statistics(p->ends[0].link)->retransmitted, 0);
     free_pair(p);
     /* And once with losses. */
-    struct line_quality lossy = perfect;
-    lossy.drop = 0.002;
+    struct host_sim_cube_options lossy = perfect;
+    lossy.faults.chance[SIM_DELETE] = 0.002;
     p = new_pair(&c, &lossy, 4);
     p->ends[0].size_max = p->ends[1].size_max = 8;
     run(p, 70000, 60, UINT64_MAX / 2);
@@ -100,10 +100,10 @@ static void lost_credits_are_asked_for(void **unused)
         step(p, 200);
     }
     p->ends[1].lazy = false;
-    sim_direction_deaf(&p->wire.sim.direction[1], true);
+    sim_direction_deaf(host_sim_cube_direction(&p->cube, 0, 1), true);
     step(p, 200);
     step(p, 200);
-    sim_direction_deaf(&p->wire.sim.direction[1], false);
+    sim_direction_deaf(host_sim_cube_direction(&p->cube, 0, 1), false);
     uint32_t before = p->ends[1].read;
     for (unsigned i = 0; i < 10000 && p->ends[1].read == before; i++) {
         step(p, 200);
@@ -121,15 +121,17 @@ static void every_kind_of_damage(void **unused)
     uint64_t damaged = 0, again = 0, duplicates = 0;
     (void)unused;
     for (uint64_t seed = 0; seed < 60; seed++) {
-        struct line_quality q = {.bytes_per_s = seed % 3 ? 300000 : 0,
-                                 .latency_us = (uint32_t)(seed % 5) * 400,
-                                 .room = seed % 2 ? 64 : 4096,
-                                 .bit_error = chances[seed % 4] / 4,
-                                 .drop = chances[seed / 4 % 4],
-                                 .insert = chances[seed / 5 % 4],
-                                 .repeat = chances[seed / 6 % 4],
-                                 .stall = chances[seed / 7 % 3],
-                                 .stall_us = 30000};
+        struct host_sim_cube_options q = {
+            .wire = {.bytes_per_s = seed % 3 ? 300000 : 0,
+                     .latency_us = (uint32_t)(seed % 5) * 400,
+                     .room = seed % 2 ? 64 : 4096,
+                     .bytes = PAIR_BYTES},
+            .faults = {.chance = {[SIM_FLIP] = chances[seed % 4] / 4,
+                                  [SIM_DELETE] = chances[seed / 4 % 4],
+                                  [SIM_INSERT] = chances[seed / 5 % 4],
+                                  [SIM_REPEAT] = chances[seed / 6 % 4],
+                                  [SIM_STALL] = chances[seed / 7 % 3]},
+                       .stall_us = 30000}};
         struct link_config c = {.window = (uint16_t)(10 + seed % 23),
                                 .frame_payload = 168,
                                 .message_max = 1608,
@@ -138,7 +140,9 @@ static void every_kind_of_damage(void **unused)
         p->ends[0].size_max = 1608;
         p->ends[1].size_max = 700;
         run(p, 150, 100 + 50 * (uint32_t)(seed % 9), 600000000);
-        damaged += line_damaged(&p->wire);
+        for (int k = 0; k < SIM_CHANCES; k++) {
+            damaged += host_sim_cube_struck(&p->cube, (enum sim_fault)k);
+        }
         again += link_statistics(p->ends[0].link)->retransmitted;
         duplicates += link_statistics(p->ends[1].link)->duplicates;
         free_pair(p);
@@ -156,14 +160,14 @@ static void garbage_between_frames(void **unused)
     for (unsigned i = 0; i < 40000 && !finished(p); i++) {
         if (i % 7 == 0) {
             for (unsigned k = 0; k < 1 + i % 700; k++) {
-                uint8_t byte = (uint8_t)(line_draw(&random) >> 40);
-                line_put(&p->wire, i % 2, &byte, 1);
+                uint8_t byte = (uint8_t)(sim_draw(&random) >> 40);
+                put_noise(p, i % 2, &byte, 1);
             }
         }
         if (i % 61 == 0) {
             uint8_t run_on[3000]; /* without a zero */
             memset(run_on, 0x55, sizeof run_on);
-            line_put(&p->wire, i % 2, run_on, sizeof run_on);
+            put_noise(p, i % 2, run_on, sizeof run_on);
         }
         step(p, 100);
     }
@@ -179,9 +183,9 @@ static void garbage_between_frames(void **unused)
 /* An end that sleeps until its next due time, or a byte, misses nothing. */
 static void sleeping_until_due_is_enough(void **unused)
 {
-    struct line_quality bad = perfect;
+    struct host_sim_cube_options bad = perfect;
     (void)unused;
-    bad.drop = 3e-4;
+    bad.faults.chance[SIM_DELETE] = 3e-4;
     for (uint64_t seed = 0; seed < 10; seed++) {
         struct pair *p = new_pair(&small, &bad, seed);
         p->ends[0].size_max = p->ends[1].size_max = 1608;
@@ -190,7 +194,8 @@ static void sleeping_until_due_is_enough(void **unused)
         while (!finished(p)) {
             uint64_t due = UINT64_MAX;
             for (unsigned who = 0; who < 2; who++) {
-                uint64_t at = sim_next_us(p->wire.ends[who].in, 0);
+                uint64_t at = sim_next_us(
+                    host_sim_cube_port(&p->cube, who, 0)->end->in, 0);
                 uint64_t byte = at > p->now_us ? at - p->now_us : 0;
                 uint64_t mine = link_next_due_us(p->ends[who].link, p->now_us);
                 mine = byte < mine ? byte : mine;
@@ -207,10 +212,9 @@ static void sleeping_until_due_is_enough(void **unused)
 static double share(double baud, double bit_error, uint32_t step_us,
                     size_t *bytes)
 {
-    struct line_quality q = {.bytes_per_s = baud / 10,
-                             .latency_us = 1000,
-                             .room = 512,
-                             .bit_error = bit_error};
+    struct host_sim_cube_options q = {
+        .wire = {(uint32_t)(baud / 10), 1000, 512, PAIR_BYTES},
+        .faults = {.chance = {[SIM_FLIP] = bit_error}}};
     struct link_config c = {.window = 14, .message_max = 1608};
     link_for_serial(&c, (uint32_t)baud);
     struct pair *p = new_pair(&c, &q, 1);

@@ -12,10 +12,15 @@
 
 #include <cmocka.h>
 
-#define LINE_BYTES (1u << 15)
-#include "line.h"
+#include "transport/drivers/sim.h"
 
-enum { MESSAGE_MAX = 600, HEAD = 8, KINDS = 8, QUIET_US = 20000000 };
+enum {
+    WIRE_BYTES = 1 << 15,
+    MESSAGE_MAX = 600,
+    HEAD = 8,
+    KINDS = 8,
+    QUIET_US = 20000000
+};
 
 struct end {
     struct link *link;
@@ -29,15 +34,15 @@ struct end {
 
 struct world {
     uint64_t now_us, random, seed;
-    struct line_wire wire;
-    struct line_quality quality;
+    struct sim_wire wire;
+    uint8_t bytes[2 * WIRE_BYTES]; /* on the wire */
     struct end ends[2];
     uint32_t struck[KINDS];
 };
 
 static uint32_t draw(struct world *w)
 {
-    return (uint32_t)(line_draw(&w->random) >> 32);
+    return (uint32_t)(sim_draw(&w->random) >> 32);
 }
 
 /* A start of the end: another life, another epoch. */
@@ -48,7 +53,7 @@ static void start(struct world *w, unsigned who)
     end->number = 0;
     end->has_read = false;
     end->config.epoch = draw(w) | 1;
-    end->config.pipe = line_pipe(&w->wire.ends[who]);
+    end->config.pipe = sim_pipe(&w->wire.end[who]);
     free(end->memory);
     size_t bytes = link_bytes(&end->config);
     end->memory = bytes > 0 ? malloc(bytes) : NULL;
@@ -63,10 +68,11 @@ static void begin(struct world *w, uint64_t seed)
     w->seed = seed;
     w->random = seed * 7919 + 1;
     draw(w);
-    w->quality = (struct line_quality){.latency_us = draw(w) % 3000,
-                                       .room = 64 + draw(w) % 4000};
-    w->quality.bytes_per_s = draw(w) % 2 ? 300000 : 0;
-    line_wire(&w->wire, &w->now_us, &w->quality, seed);
+    struct sim_quality quality = {.latency_us = draw(w) % 3000,
+                                  .room = 64 + draw(w) % 4000,
+                                  .bytes = WIRE_BYTES};
+    quality.bytes_per_s = draw(w) % 2 ? 300000 : 0;
+    sim_wire_init(&w->wire, w->bytes, &quality, &w->now_us, seed);
     unsigned payload = draw(w) % 3 ? 8 * (4 + draw(w) % 60) : MESSAGE_MAX;
     unsigned least = (MESSAGE_MAX + payload - 1) / payload;
     for (unsigned who = 0; who < 2; who++) {
@@ -152,21 +158,30 @@ static void step(struct world *w, uint32_t us, bool writing)
     }
 }
 
+/* NULL: no more faults of chance. */
+static void befall(struct world *w, const struct sim_faults *faults)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        sim_direction_faults(&w->wire.direction[i], faults);
+        sim_direction_deaf(&w->wire.direction[i], false);
+    }
+}
+
 static void spoil(struct world *w)
 {
     const double chances[] = {0, 1e-5, 1e-4, 1e-3, 1e-2};
-    struct line_quality bad = w->quality;
-    bad.bit_error = chances[draw(w) % 5] / 8;
-    bad.drop = chances[draw(w) % 5];
-    bad.insert = chances[draw(w) % 5];
-    bad.repeat = chances[draw(w) % 5];
-    line_set(&w->wire, &bad);
+    struct sim_faults bad = {.stall_us = 0};
+    bad.chance[SIM_FLIP] = chances[draw(w) % 5] / 8;
+    bad.chance[SIM_DELETE] = chances[draw(w) % 5];
+    bad.chance[SIM_INSERT] = chances[draw(w) % 5];
+    bad.chance[SIM_REPEAT] = chances[draw(w) % 5];
+    befall(w, &bad);
 }
 
 static void strike(struct world *w)
 {
     unsigned kind = draw(w) % 400;
-    struct sim_direction *direction = &w->wire.sim.direction[draw(w) % 2];
+    struct sim_direction *direction = &w->wire.direction[draw(w) % 2];
     if (kind < KINDS) {
         w->struck[kind]++;
     }
@@ -175,13 +190,13 @@ static void strike(struct world *w)
         start(w, draw(w) % 2);
         break;
     case 1:
-        line_cut(&w->wire, true);
+        sim_wire_cut(&w->wire, true);
         break;
     case 2:
         spoil(w);
         break;
     case 3:
-        line_set(&w->wire, &w->quality);
+        befall(w, NULL);
         break;
     case 4:
         w->ends[draw(w) % 2].lazy ^= true;
@@ -193,12 +208,12 @@ static void strike(struct world *w)
         w->now_us += draw(w) % 5000000;
         break;
     case 7:
-        sim_direction_deaf(&w->wire.sim.direction[0], true);
-        sim_direction_deaf(&w->wire.sim.direction[1], true);
+        sim_direction_deaf(&w->wire.direction[0], true);
+        sim_direction_deaf(&w->wire.direction[1], true);
         break;
     default:
         if (kind < 20) {
-            line_cut(&w->wire, false);
+            sim_wire_cut(&w->wire, false);
         }
     }
 }
@@ -207,8 +222,8 @@ static void strike(struct world *w)
 static void recover(struct world *w, uint32_t step_us)
 {
     struct end *a = &w->ends[0], *b = &w->ends[1];
-    line_set(&w->wire, &w->quality);
-    line_cut(&w->wire, false);
+    befall(w, NULL);
+    sim_wire_cut(&w->wire, false);
     a->lazy = b->lazy = false;
     uint64_t want_a = a->count + 60, want_b = b->count + 60;
     uint64_t deadline = w->now_us + QUIET_US;

@@ -14,9 +14,9 @@ static void a_cut_wire_goes_on_where_it_was(void **unused)
         for (unsigned i = 0; i < 20000 && !finished(p); i++) {
             uint64_t phase = (i + seed) % 90;
             if (phase == 60) {
-                line_cut(&p->wire, true);
+                cut_pair(p, true);
             } else if (phase == 61 + seed) {
-                line_cut(&p->wire, false);
+                cut_pair(p, false);
             }
             step(p, 150);
             if (phase > 61 && phase < 61 + seed) {
@@ -89,10 +89,10 @@ static void restart(struct pair *p, uint32_t epoch, struct link_statistics *sum)
 
 static void a_restarted_peer_is_noticed(void **unused)
 {
-    struct line_quality bad = perfect;
+    struct host_sim_cube_options bad = perfect;
     (void)unused;
-    bad.latency_us = 3000;
-    bad.drop = 2e-4;
+    bad.wire.latency_us = 3000;
+    bad.faults.chance[SIM_DELETE] = 2e-4;
     for (uint64_t seed = 0; seed < 20; seed++) {
         struct pair *p = new_pair(&small, seed % 2 ? &bad : &perfect, seed);
         struct link_statistics sum = {0};
@@ -241,7 +241,8 @@ static void a_wire_to_itself_is_refused(void **unused)
 {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 1);
-    p->wire.ends[0].in = p->wire.ends[0].out;
+    struct sim_end *end = host_sim_cube_port(&p->cube, 0, 0)->end;
+    end->in = end->out;
     greet_only(p);
     assert_true(link_state(p->ends[0].link) == LINK_REFUSED);
     assert_int_equal(link_peer(p->ends[0].link)->node, 10);
@@ -252,8 +253,8 @@ static void farewell(void **unused)
 {
     (void)unused;
     for (uint64_t seed = 0; seed < 20; seed++) {
-        struct line_quality bad = perfect;
-        bad.drop = seed % 2 ? 0.002 : 0;
+        struct host_sim_cube_options bad = perfect;
+        bad.faults.chance[SIM_DELETE] = seed % 2 ? 0.002 : 0;
         struct pair *p = new_pair(&small, &bad, seed);
         p->ends[0].size_max = p->ends[1].size_max = 300;
         p->ends[0].most = 40;
@@ -288,7 +289,7 @@ static void farewell_to_the_dead_ends_in_time(void **unused)
             step(p, 100);
         }
         if (cut) {
-            line_cut(&p->wire, true);
+            cut_pair(p, true);
         }
         uint64_t deadline = p->now_us + 300000;
         link_close(p->ends[0].link, deadline);
@@ -308,11 +309,11 @@ static void farewell_to_the_dead_ends_in_time(void **unused)
  * count is right. */
 static void what_is_unsent_is_forgotten(void **unused)
 {
-    struct line_quality slow = perfect;
+    struct host_sim_cube_options slow = perfect;
     struct link_message message;
     (void)unused;
-    slow.bytes_per_s = 100000;
-    slow.room = 100;
+    slow.wire.bytes_per_s = 100000;
+    slow.wire.room = 100;
     for (uint64_t seed = 0; seed < 40; seed++) {
         struct pair *p = new_pair(&small, &slow, seed);
         struct end *from = &p->ends[0], *to = &p->ends[1];

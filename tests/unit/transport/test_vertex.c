@@ -298,7 +298,7 @@ static void barrier_round(struct actor *a, unsigned round)
     unsigned *count = &a->stage->counts[round % 4];
     unsigned nodes = a->stage->machine->nodes;
     ++*count;
-    for (uint64_t i = line_draw(&a->random) % 30; i > 0; i--) {
+    for (uint64_t i = sim_draw(&a->random) % 30; i > 0; i--) {
         cube_poll(a->vertex.config.cube, a->stage->machine->now_us);
         stage_idle(a, 0);
     }
@@ -368,8 +368,8 @@ static void and_after_links_have_died(void **unused)
 {
     (void)unused;
     struct stage *s = new_stage(3, &narrow, 8, 2);
-    line_cut(s->machine->places[0].wires[1], true);
-    line_cut(s->machine->places[5].wires[1], true);
+    cut_wire(s->machine, 0, 1);
+    cut_wire(s->machine, 5, 1);
     perform(s, do_together_with_care, cut_and_renew);
     free_stage(s);
 }
@@ -408,8 +408,8 @@ static void a_dead_node_is_named_at_once(void **unused)
 {
     (void)unused;
     struct stage *s = new_stage(2, &narrow, 8, 2);
-    line_cut(s->machine->places[2].wires[0], true);
-    line_cut(s->machine->places[2].wires[1], true);
+    cut_wire(s->machine, 2, 0);
+    cut_wire(s->machine, 2, 1);
     perform(s, miss_a_node, lose_a_node);
     free_stage(s);
 }

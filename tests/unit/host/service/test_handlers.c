@@ -12,7 +12,7 @@
 #include "host/mesh/gen.h"
 #include "host/service/handlers.h"
 #include "node/result.h"
-#include "tests/unit/transport/line.h"
+#include "transport/drivers/sim.h"
 
 enum { NODES = 4 };
 
@@ -39,7 +39,7 @@ static void *open_cube(void)
 {
     struct cube_config config = {
         .self = CUBE_HOST, .dimension = 2, .window = 1, .epoch = 1};
-    config.pipes[0] = line_pipe(&nowhere);
+    config.pipes[0] = sim_pipe(&nowhere);
     void *arena = malloc(cube_arena_bytes(&config));
     assert_non_null(arena);
     service.cube = cube_init(arena, cube_arena_bytes(&config), &config);
