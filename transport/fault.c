@@ -1,55 +1,29 @@
 /* Wrong wires in words. */
 #include "cube_internal.h"
+#include "text.h"
 
-struct words {
-    char *text;
-    unsigned size;
-};
-
-static void say(struct words *w, const char *text)
+static void say_end(struct cube_text *t, const char *before, unsigned node)
 {
-    while (*text != '\0' && w->size + 1 < CUBE_FAULT_BYTES) {
-        w->text[w->size++] = *text++;
-    }
-    w->text[w->size] = '\0';
-}
-
-static void say_number(struct words *w, unsigned number)
-{
-    char digits[11];
-    unsigned at = sizeof digits - 1;
-    digits[at] = '\0';
-    do {
-        digits[--at] = (char)('0' + number % 10);
-        number /= 10;
-    } while (number > 0);
-    say(w, digits + at);
-}
-
-static void say_end(struct words *w, const char *before, unsigned node)
-{
-    say(w, before);
+    cube_text_put(t, before);
     if (node == CUBE_HOST) {
-        say(w, "the host");
+        cube_text_put(t, "the host");
     } else {
-        say(w, "node ");
-        say_number(w, node);
+        cube_text_put(t, "node ");
+        cube_text_number(t, node);
     }
 }
 
-static void say_link(struct words *w, const char *before, unsigned link)
+static void say_link(struct cube_text *t, const char *before, unsigned link)
 {
-    say(w, before);
-    say(w, "link ");
-    say_number(w, link);
+    cube_text_put(t, before);
+    cube_text_put(t, "link ");
+    cube_text_number(t, link);
 }
 
 void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
                      uint16_t spare_node, char text[CUBE_FAULT_BYTES])
 {
-    struct words w;
-    w.text = text;
-    w.size = 0;
+    struct cube_text t = cube_text_in(text, CUBE_FAULT_BYTES);
     bool host = wrong->node == CUBE_HOST;
     bool to_host = !host && wrong->link >= dimension;
     unsigned node =
@@ -57,22 +31,22 @@ void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
         : to_host ? CUBE_HOST
                   : wrong->node ^ 1u << wrong->link;
     unsigned link = host ? dimension : to_host ? wrong->node != 0 : wrong->link;
-    say_end(&w, "", wrong->node);
-    say_link(&w, " ", wrong->link);
+    say_end(&t, "", wrong->node);
+    say_link(&t, " ", wrong->link);
     if (wrong->refusal == LINK_WRONG_WIRE && wrong->peer_node != node) {
-        say_end(&w, " is wired to ", wrong->peer_node);
-        say_end(&w, ", expected ", node);
+        say_end(&t, " is wired to ", wrong->peer_node);
+        say_end(&t, ", expected ", node);
     } else if (wrong->refusal == LINK_WRONG_WIRE) {
-        say_end(&w, " is wired to ", wrong->peer_node);
-        say_link(&w, " ", wrong->peer_link);
-        say_link(&w, ", expected ", link);
+        say_end(&t, " is wired to ", wrong->peer_node);
+        say_link(&t, " ", wrong->peer_link);
+        say_link(&t, ", expected ", link);
     } else {
-        say_end(&w, ": ", wrong->peer_node);
-        say(&w, wrong->refusal == LINK_WRONG_VERSION
-                    ? " speaks another version of the protocol"
-                : wrong->refusal == LINK_WRONG_GREETING
-                    ? " is set to a cube of another dimension"
-                    : " has other sizes of frames or messages");
+        say_end(&t, ": ", wrong->peer_node);
+        cube_text_put(&t, wrong->refusal == LINK_WRONG_VERSION
+                              ? " speaks another version of the protocol"
+                          : wrong->refusal == LINK_WRONG_GREETING
+                              ? " is set to a cube of another dimension"
+                              : " has other sizes of frames or messages");
     }
 }
 

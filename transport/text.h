@@ -1,0 +1,28 @@
+/* Words and figures put together in a text of bounded size, for messages that
+ * a user reads: no stdio where there is no system.
+ *
+ * Memory: the caller's.  Work: a pass over what is put.
+ *
+ *     struct cube_text text = cube_text_in(room, sizeof room);
+ *     cube_text_put(&text, "node ");
+ *     cube_text_number(&text, 5);
+ */
+#ifndef TRANSPORT_TEXT_H
+#define TRANSPORT_TEXT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct cube_text {
+    char *data; /* ends with a 0 at data[size] */
+    size_t size, size_max;
+};
+
+/* An empty text in bytes_max bytes, at least 1, the final 0 included. */
+struct cube_text cube_text_in(char *data, size_t bytes_max);
+
+/* Appends as much as there is room for. */
+void cube_text_put(struct cube_text *text, const char *words);
+void cube_text_number(struct cube_text *text, uint32_t number);
+
+#endif
