@@ -19,10 +19,12 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 4,         /* both ends must agree */
-    NODE_PAGES_A_REQUEST = 64, /* page numbers in one NODE_PAGE_REQUEST */
-    NODE_FAULT_TEXT_MAX = 200,
-    NODE_FACES_A_MESSAGE = 128 /* faces in one NODE_SPILL or NODE_UNSPILL */
+    NODE_PROTOCOL = 4,              /* both ends must agree */
+    NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
+    NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got */
+    NODE_FAULT_TEXT_MAX = 200,      /* bytes */
+    NODE_FACES_A_MESSAGE = 128, /* faces in one NODE_SPILL or NODE_UNSPILL */
+    NODE_TABLES_MAX = 8         /* of a role, in its memory map */
 };
 
 enum node_message_type {
@@ -67,19 +69,44 @@ struct node_pong_message {
     uint32_t links;    /* bit d: link d has been up since this start */
 };
 
+/* Begins a node's role; sent once a generation to each node.  What no field
+ * says is unlimited within its type; reserved is 0. */
 struct node_setup_message {
+    /* NODE_PROTOCOL of the host: a node of another one reports a fault.  It is
+     * the first field in every version. */
     uint32_t protocol;
+
+    /* Nodes of the cube: a power of two, 1 .. 2^CUBE_DIMENSION_MAX. */
     uint16_t nodes;
-    uint16_t holders; /* nodes 1 .. holders keep pages for node 0; or 0 */
-    uint32_t credits; /* NODE_RESULT messages allowed at first */
-    uint8_t role;     /* enum node_role_number: of the node it is sent to */
+
+    /* Nodes that keep pages: nodes 1 .. holders do, page p is node
+     * 1 + p % holders's; less than `nodes`.  0: the host sends all pages. */
+    uint16_t holders;
+
+    /* NODE_RESULT messages that the node may send before the first NODE_CREDIT;
+     * at least 1.  The host chooses 8 and 128 / nodes. */
+    uint32_t credits;
+
+    /* What this node does: enum node_role_number.  Another number is a fault
+     * that the node reports. */
+    uint8_t role;
+
     uint8_t reserved[3];
+
+    /* The points and how to search them: incode/triangulator.h. */
     struct incode_setup setup;
 };
 
+/* A range of bricks, for a worker that has no other. */
 struct node_job_message {
-    uint32_t epoch; /* results of another epoch are not counted */
+    /* Of this job, 1 or more and of no other job of the run: results of another
+     * epoch are not counted. */
+    uint32_t epoch;
+
     uint32_t reserved;
+
+    /* Bricks [first, last), first <= last <= bricks of the setup, and the box
+     * of their points in the points' unit; an empty one is done at once. */
     struct incode_job job;
 };
 
@@ -99,19 +126,26 @@ struct node_spill_header {
     uint32_t sent;  /* NODE_UNSPILL and its request */
 };
 
-/* The memory map of a node, bytes: what its board holds outside the arena,
- * then the tables that fill the arena. */
+/* The memory map of a node, in bytes: all of it, what its board holds outside
+ * the arena, and what fills the arena.  `tables` are the role's: their names
+ * are in struct node_role. */
 struct node_map {
-    uint32_t memory, fixed, arena;
-    uint32_t cube, node, outbox;
-    uint32_t control, frames, frame_count, afl, afl_faces, bricks,
-        brick_entries, gather, tasks;
+    uint32_t memory; /* fixed and arena */
+    uint32_t fixed;  /* .data, .bss, stack and what else the board has */
+    uint32_t arena;  /* cube, node and the role's tables fit it */
+    uint32_t cube;   /* windows of the links */
+    uint32_t node;   /* the node program's own state */
     uint32_t window; /* frames a link and direction */
+    uint32_t pages;  /* that the role has room for */
+    uint32_t reserved;
+    struct {
+        uint32_t bytes, count; /* count: of what the table holds, or 0 */
+    } tables[NODE_TABLES_MAX];
 };
 
 struct node_ready_message {
-    uint32_t protocol;
-    uint32_t role;
+    uint32_t protocol; /* NODE_PROTOCOL of the node; first in every version */
+    uint32_t role;     /* as in the setup */
     struct node_map map;
 };
 
@@ -124,9 +158,10 @@ struct node_finished_message {
     uint64_t wall_us; /* from each job's arrival to its last result */
     uint64_t busy_us; /* processor time of the node */
     uint64_t bytes_in, bytes_out; /* payload of messages, at this node */
-    uint64_t pages_held, pages_forwarded; /* as a holder of pages */
-    uint64_t retransmitted;               /* frames on all links */
-    uint64_t memory_high_water;
+    uint64_t pages_held;          /* as a holder: sent from its frames, */
+    uint64_t pages_forwarded;     /* and asked for at the host */
+    uint64_t retransmitted;       /* frames on all links */
+    uint64_t memory_high_water;   /* bytes ever in use, `fixed` included */
     struct incode_statistics statistics;
 };
 

@@ -3,28 +3,27 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "node/roles/holder.h"
+#include "node/roles/roles.h"
 #include "totals.h"
-#include "node/roles/worker.h"
 
 enum { IDLE_MAX_US = 1000000, FAREWELL_US = 500000 };
 
 struct node {
     const struct node_board *board;
     struct cube *cube;
-    uint8_t *role_memory;
-    size_t role_bytes, cube_bytes;
+    size_t cube_bytes;
     uint16_t window;
-    bool set_up, stopping, closing;
-    uint8_t role; /* enum node_role_number */
-    struct node_worker worker;
-    struct node_holder holder;
+    const struct node_role *role; /* NULL: no setup in this generation */
+    uint8_t role_number;
+    void *role_arena;
+    size_t role_bytes;
+    bool stopping, closing;
     uint32_t generation; /* of the wiring that this node has followed */
     struct node_counted counted;
     struct node_pong_message pong; /* the answer that is owed */
     bool owes_pong, owes_ready, owes_report;
-    struct node_finished_message before; /* of roles of older generations */
-    const char *fault;
+    struct node_finished_message before; /* of roles before this one */
+    struct node_fault fault;
     bool fault_sent;
     uint64_t now_us, stop_us;
 };
@@ -34,11 +33,6 @@ struct node {
 static uint16_t window_for(size_t bytes)
 {
     return bytes >= 2u << 20 ? 8 : bytes >= 1u << 20 ? 4 : 2;
-}
-
-static size_t up64(size_t bytes)
-{
-    return (bytes + 63) / 64 * 64;
 }
 
 /* The cube as this node's straps and memory make it. */
@@ -74,20 +68,23 @@ static int nothing(void *context, uint8_t *bytes, size_t size)
 }
 
 size_t node_arena_needed(const struct node_identity *identity, size_t memory,
-                         const struct incode_setup *setup)
+                         const struct node_setup_message *setup)
 {
     struct cube_config config = configure(identity, memory);
+    const struct node_role *role = node_role_named(setup->role);
+    INCODE_ASSERT(role != NULL);
     for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
         config.pipes[d] = (struct link_pipe){NULL, nowhere, nothing};
     }
-    return up64(sizeof(struct node)) + up64(cube_arena_bytes(&config)) +
-           node_worker_outbox_bytes(memory) + incode_arena_min(setup);
+    return node_aligned(sizeof(struct node)) +
+           node_aligned(cube_arena_bytes(&config)) +
+           role->arena_min(memory, setup);
 }
 
 struct node *node_start(const struct node_board *board, const char **why)
 {
     uint8_t *memory = board->arena;
-    size_t own = up64(sizeof(struct node));
+    size_t own = node_aligned(sizeof(struct node));
     struct cube_config config =
         configure(&board->identity, board->arena_bytes + board->fixed_bytes);
     memcpy(config.pipes, board->pipes, sizeof config.pipes);
@@ -95,7 +92,7 @@ struct node *node_start(const struct node_board *board, const char **why)
     if (*why != NULL) {
         return NULL;
     }
-    size_t cube = up64(cube_arena_bytes(&config));
+    size_t cube = node_aligned(cube_arena_bytes(&config));
     if (board->arena_bytes < own + cube) {
         *why = "the memory does not hold the links' windows";
         return NULL;
@@ -105,7 +102,7 @@ struct node *node_start(const struct node_board *board, const char **why)
     node->board = board;
     node->cube_bytes = cube;
     node->window = config.window;
-    node->role_memory = memory + own + cube;
+    node->role_arena = memory + own + cube;
     node->role_bytes = board->arena_bytes - own - cube;
     node->cube = cube_init(memory + own, cube, &config);
     if (node->cube == NULL) {
@@ -116,53 +113,64 @@ struct node *node_start(const struct node_board *board, const char **why)
     return node;
 }
 
+/* Adds what the role has done. */
+static void role_totals(const struct node *n, struct node_finished_message *sum)
+{
+    struct node_finished_message totals;
+    memset(&totals, 0, sizeof totals);
+    if (n->role != NULL) {
+        n->role->totals(n->role_arena, &totals, n->now_us);
+    }
+    totals.memory_high_water +=
+        n->board->fixed_bytes + node_aligned(sizeof *n) + n->cube_bytes;
+    node_totals_add(sum, &totals);
+}
+
+/* What the role did stays counted; what it has is of no use any more. */
+static void end_role(struct node *n)
+{
+    if (n->role != NULL) {
+        role_totals(n, &n->before);
+        n->role = NULL;
+    }
+}
+
+static bool setup_is_sound(struct node *n, const struct cube_message *message)
+{
+    uint32_t protocol = NODE_PROTOCOL;
+    if (message->size >= sizeof protocol) {
+        memcpy(&protocol, message->data, sizeof protocol);
+    }
+    if (protocol != NODE_PROTOCOL) {
+        node_fault_set(&n->fault, "protocol version #, expected #", protocol,
+                       NODE_PROTOCOL);
+    } else if (message->size != sizeof(struct node_setup_message)) {
+        node_fault_set(&n->fault, "setup in # bytes, expected #", message->size,
+                       sizeof(struct node_setup_message));
+    }
+    return !node_fault_is_set(&n->fault);
+}
+
 static void take_setup(struct node *n, const struct cube_message *message)
 {
     struct node_setup_message setup;
-    const char *why = NULL;
-    int status;
-    if (message->size != sizeof setup) {
-        n->fault = "host and node are of different versions";
+    if (!setup_is_sound(n, message)) {
         return;
     }
     memcpy(&setup, message->data, sizeof setup);
-    if (setup.protocol != NODE_PROTOCOL) {
-        n->fault = "host and node are of different versions";
+    const struct node_role *role = node_role_named(setup.role);
+    if (role == NULL) {
+        node_fault_set(&n->fault, "role # is not known to its program",
+                       setup.role, 0);
         return;
     }
-    n->role = setup.role;
-    if (n->role != NODE_WORKER && n->role != NODE_HOLDER) {
-        n->fault = "a role that is not known; are host and node of one version";
-        return;
+    end_role(n);
+    if (role->start(n->role_arena, n->role_bytes, &setup, &n->counted,
+                    &n->fault)) {
+        n->role = role;
+        n->role_number = setup.role;
+        n->owes_ready = true;
     }
-    if (n->role == NODE_HOLDER) {
-        status = node_holder_start(&n->holder, n->role_memory, n->role_bytes,
-                                   &n->counted, &setup, &why);
-    } else {
-        status = node_worker_start(&n->worker, n->role_memory, n->role_bytes,
-                                   &n->counted, &setup, &why);
-    }
-    if (status != 0) {
-        n->fault = why;
-        return;
-    }
-    n->set_up = true;
-    n->owes_ready = true;
-}
-
-static void take_job(struct node *n, const struct cube_message *message)
-{
-    struct node_job_message job;
-    /* After a fresh start: a message that was sent to the one before. */
-    if (n->fault != NULL || !n->set_up) {
-        return;
-    }
-    if (n->role != NODE_WORKER || message->size != sizeof job) {
-        n->fault = "a job that is none";
-        return;
-    }
-    memcpy(&job, message->data, sizeof job);
-    node_worker_job(&n->worker, &job, n->now_us);
 }
 
 static void take_ping(struct node *n, const struct cube_message *message)
@@ -182,9 +190,6 @@ static void take_message(struct node *n, const struct cube_message *message)
     case NODE_SETUP:
         take_setup(n, message);
         break;
-    case NODE_JOB:
-        take_job(n, message);
-        break;
     case NODE_REPORT:
         n->owes_report = true;
         break;
@@ -196,10 +201,9 @@ static void take_message(struct node *n, const struct cube_message *message)
         n->stop_us = n->now_us;
         break;
     default:
-        if (n->set_up && n->role == NODE_HOLDER) {
-            node_holder_message(&n->holder, message);
-        } else if (n->set_up) {
-            node_worker_message(&n->worker, message);
+        /* After a fresh start: a message that was sent to the one before. */
+        if (n->role != NULL) {
+            n->role->message(n->role_arena, message, n->now_us);
         }
     }
     n->counted.received +=
@@ -214,24 +218,8 @@ static void fill_map(const struct node *n, struct node_map *map)
     map->memory = map->fixed + map->arena;
     map->cube = (uint32_t)n->cube_bytes;
     map->window = n->window;
-    map->node = (uint32_t)up64(sizeof *n);
-    if (n->role == NODE_HOLDER) {
-        map->frame_count = n->holder.frame_count;
-        map->frames = (uint32_t)n->role_bytes;
-        return;
-    }
-    const struct incode_map *t =
-        incode_triangulator_map(n->worker.triangulator);
-    map->outbox = n->worker.outbox_bytes;
-    map->control = (uint32_t)t->control;
-    map->frames = (uint32_t)t->frames;
-    map->frame_count = (uint32_t)t->frame_count;
-    map->afl = (uint32_t)t->afl;
-    map->afl_faces = (uint32_t)t->afl_faces;
-    map->bricks = (uint32_t)t->bricks;
-    map->brick_entries = (uint32_t)t->brick_entries;
-    map->gather = (uint32_t)t->local_points;
-    map->tasks = (uint32_t)t->tasks;
+    map->node = (uint32_t)node_aligned(sizeof *n);
+    n->role->map(n->role_arena, map);
 }
 
 static bool send_ready(struct node *n)
@@ -239,7 +227,7 @@ static bool send_ready(struct node *n)
     struct node_ready_message ready;
     memset(&ready, 0, sizeof ready);
     ready.protocol = NODE_PROTOCOL;
-    ready.role = n->role;
+    ready.role = n->role_number;
     fill_map(n, &ready.map);
     return node_counted_write(&n->counted, CUBE_HOST, NODE_READY, &ready,
                               sizeof ready) == 0;
@@ -274,27 +262,6 @@ static void link_totals(const struct node *n,
     }
 }
 
-/* Adds what the role has done. */
-static void role_totals(const struct node *n, struct node_finished_message *sum)
-{
-    struct node_finished_message totals;
-    size_t used = n->board->fixed_bytes + up64(sizeof *n) + n->cube_bytes;
-    memset(&totals, 0, sizeof totals);
-    if (n->role == NODE_HOLDER) {
-        totals.pages_held = n->holder.hits;
-        totals.pages_forwarded = n->holder.misses;
-        totals.bytes_in = n->holder.bytes_in;
-        totals.bytes_out = n->holder.bytes_out;
-        used += n->holder.frames_used * sizeof n->holder.frames[0];
-    } else {
-        node_worker_totals(&n->worker, &totals, n->now_us);
-        used += n->worker.outbox_bytes +
-                (size_t)totals.statistics.memory_high_water;
-    }
-    totals.memory_high_water = used;
-    node_totals_add(sum, &totals);
-}
-
 /* The statistics, where there is room for them on the link.  epoch: of the job
  * that is done, or 0. */
 static bool send_finished(struct node *n, uint32_t epoch)
@@ -323,13 +290,10 @@ static void follow_wiring(struct node *n)
     if (generation == n->generation) {
         return;
     }
-    if (n->set_up) {
-        role_totals(n, &n->before);
-    }
+    end_role(n);
     n->generation = generation;
-    n->set_up = false;
     n->owes_pong = n->owes_ready = n->owes_report = false;
-    n->fault = NULL;
+    n->fault.size = 0;
     n->fault_sent = false;
     n->counted.received = n->counted.sent = 0;
 }
@@ -338,29 +302,19 @@ static void follow_wiring(struct node *n)
  * others, so that the host hears of them too. */
 static void send_fault(struct node *n)
 {
-    size_t size = 0;
-    while (size < NODE_FAULT_TEXT_MAX && n->fault[size] != '\0') {
-        size++;
-    }
     n->fault_sent = node_counted_write(&n->counted, CUBE_HOST, NODE_FAULT,
-                                       n->fault, size) == 0;
+                                       n->fault.text, n->fault.size) == 0;
 }
 
 static unsigned serve_role(struct node *n)
 {
-    unsigned moved = 0;
-    if (n->role == NODE_HOLDER) {
-        moved += node_holder_send(&n->holder);
-        n->fault = n->holder.fault;
-    } else {
-        moved += node_worker_work(&n->worker);
-        moved += node_worker_send(&n->worker);
-        n->fault = n->worker.fault;
-        if (n->fault == NULL && node_worker_done(&n->worker) &&
-            send_finished(n, n->worker.epoch)) {
-            node_worker_end(&n->worker, n->now_us);
-            moved++;
-        }
+    const struct node_role *role = n->role;
+    unsigned moved = role->work(n->role_arena) + role->send(n->role_arena);
+    uint32_t epoch = role->done(n->role_arena);
+    if (!node_fault_is_set(&n->fault) && epoch != 0 &&
+        send_finished(n, epoch)) {
+        role->end(n->role_arena, n->now_us);
+        moved++;
     }
     if (n->owes_report && send_finished(n, 0)) {
         n->owes_report = false;
@@ -408,15 +362,15 @@ enum node_event node_step(struct node *node)
         cube_release(node->cube);
         moved++;
     }
-    if (node->fault != NULL) {
+    if (node_fault_is_set(&node->fault)) {
         if (!node->fault_sent) {
             send_fault(node);
         }
     } else if (node->owes_pong) {
         node->owes_pong = !send_pong(node);
-    } else if (node->set_up && node->owes_ready) {
+    } else if (node->role != NULL && node->owes_ready) {
         node->owes_ready = !send_ready(node);
-    } else if (node->set_up) {
+    } else if (node->role != NULL) {
         moved += serve_role(node);
     }
     if (may_stop(node)) {
@@ -436,11 +390,7 @@ uint64_t node_wait_us(const struct node *node)
 
 uint32_t node_held(const struct node *node)
 {
-    if (!node->set_up) {
-        return 0;
-    }
-    return node->role == NODE_HOLDER ? node->holder.queued
-                                     : node_worker_held(&node->worker);
+    return node->role == NULL ? 0 : node->role->held(node->role_arena);
 }
 
 void node_run(struct node *node)

@@ -1,10 +1,10 @@
 /* The node program: divides its arena between the cube's windows and its role
- * (worker or holder of pages), and moves messages between them.  Nothing here
- * waits; the board sleeps when a step had nothing to do.
+ * (roles/roles.h), and moves messages between them.  Nothing here waits; the
+ * board sleeps when a step had nothing to do.
  *
  * Memory: the board's arena, filled as struct node_map of message.h states.
- * Work: a step handles the frames that links hold, then at most NODE_STEPS
- * steps of the triangulator.
+ * Work: a step handles the frames that links hold, then lets the role
+ * compute for a bounded while and send what may leave.
  *
  *     node = node_start(&board, &why);
  *     while ((event = node_step(node)) != NODE_STOPPED)
@@ -27,10 +27,10 @@ struct node; /* opaque: lives at the start of the arena */
 /* NULL where the arena does not suffice or the arithmetic is unsound: *why. */
 struct node *node_start(const struct node_board *board, const char **why);
 
-/* Bytes of arena that a node of this identity needs for this setup, where its
- * memory (arena and fixed) is `memory` in all. */
+/* Bytes of arena that a node of this identity needs for this setup, its role
+ * included, where its memory (arena and fixed) is `memory` in all. */
 size_t node_arena_needed(const struct node_identity *identity, size_t memory,
-                         const struct incode_setup *setup);
+                         const struct node_setup_message *setup);
 
 enum node_event node_step(struct node *node);
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "host/mesh/gen.h"
+#include "node/roles/roles.h"
 
 /* The processor time of the busiest node: what t_max would be if every node
  * had a processor to itself. */
@@ -94,6 +95,7 @@ static void map_line(FILE *file, uint64_t bytes, const char *what,
 void host_report_map(FILE *file, const struct host_run_result *result)
 {
     const struct node_map *m = &result->node[0].map.map;
+    const struct node_role *role = node_role_named(result->node[0].map.role);
     unsigned links = 1;
     while (1u << (links - 1) < result->nodes) {
         links++;
@@ -105,16 +107,15 @@ void host_report_map(FILE *file, const struct host_run_result *result)
     map_line(file, m->node, "node program", 0, "");
     map_line(file, m->cube, "windows of links", links * m->window,
              "frames each way");
-    map_line(file, m->outbox, "results and spilled faces on their way out", 0,
-             "");
-    map_line(file, m->control, "triangulator, its gathered points and tasks", 0,
-             "");
-    map_line(file, m->afl, "active face list", m->afl_faces, "faces");
-    map_line(file, m->bricks, "open bricks", m->brick_entries, "entries");
-    map_line(file, m->frames, "page frames", m->frame_count,
-             "pages of 1536 bytes and their boxes");
-    uint64_t used = m->fixed + m->node + m->cube + m->outbox + m->control +
-                    m->afl + m->bricks + m->frames;
+    uint64_t used = m->fixed + m->node + m->cube;
+    for (unsigned i = 0; role != NULL && i < NODE_TABLES_MAX; i++) {
+        if (role->tables[i].name != NULL) {
+            map_line(file, m->tables[i].bytes, role->tables[i].name,
+                     role->tables[i].unit == NULL ? 0 : m->tables[i].count,
+                     role->tables[i].unit);
+        }
+        used += m->tables[i].bytes;
+    }
     map_line(file, result->memory - used, "left over", 0, "");
     fprintf(file,
             "Outside it, in the kernel: %d and %d bytes of buffers for each "

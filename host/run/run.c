@@ -141,7 +141,7 @@ static unsigned cube_dimension(unsigned nodes)
 /* The least memory that node 0, which has the most links, does with. */
 static uint64_t memory_needed(const struct host_run_options *options,
                               unsigned dimension,
-                              const struct incode_setup *setup)
+                              const struct node_setup_message *setup)
 {
     struct node_identity identity = {.dimension = (uint8_t)dimension,
                                      .window = (uint8_t)options->window,
@@ -158,7 +158,7 @@ static uint64_t memory_needed(const struct host_run_options *options,
 /* What can be done where a cube needs more memory than its nodes have. */
 static const char *memory_advice(const struct host_run_options *options,
                                  unsigned nodes,
-                                 const struct incode_setup *setup)
+                                 const struct node_setup_message *setup)
 {
     struct host_run_options narrow = *options;
     narrow.window = 0;
@@ -179,10 +179,10 @@ static int check_memory(const struct host_run_options *options, unsigned nodes,
                         uint32_t bricks, const uint32_t cells[3],
                         struct host_error *error)
 {
-    struct incode_setup setup = {0};
-    setup.bricks = bricks;
-    setup.index = (uint8_t)options->index;
-    memcpy(setup.cells, cells, sizeof setup.cells);
+    struct node_setup_message setup = {.role = NODE_WORKER};
+    setup.setup.bricks = bricks;
+    setup.setup.index = (uint8_t)options->index;
+    memcpy(setup.setup.cells, cells, sizeof setup.setup.cells);
     uint64_t needed = memory_needed(options, cube_dimension(nodes), &setup);
     return needed <= options->memory
                ? 0

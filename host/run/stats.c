@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "host/files/output.h"
+#include "node/roles/roles.h"
 
 double host_candidates_mean(const struct host_run_result *result)
 {
@@ -48,9 +49,10 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     const struct host_node_report *report = &r->node[i];
     const struct node_finished_message *f = &report->statistics;
     const struct incode_statistics *s = &f->statistics;
+    const struct node_role *role = node_role_named(report->map.role);
     json_t *o = json_object();
     put(o, "node", i);
-    put_text(o, "role", report->map.role == NODE_HOLDER ? "holder" : "worker");
+    put_text(o, "role", role == NULL ? "none" : role->name);
     put(o, "tetrahedra_built", s->tetrahedra_built);
     put(o, "tetrahedra_kept", s->tetrahedra_kept);
     put(o, "make_tetra_calls", s->make_tetra_calls);
@@ -74,7 +76,7 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     put(o, "bytes_out", f->bytes_out);
     put(o, "retransmitted_frames", f->retransmitted);
     put(o, "memory_high_water_bytes", f->memory_high_water);
-    put(o, "memory_frames", report->map.map.frame_count);
+    put(o, "memory_frames", report->map.map.pages);
     return o;
 }
 

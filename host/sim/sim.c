@@ -18,13 +18,14 @@ enum {
 static uint64_t memory_of(const struct host_sim_run *r)
 {
     const struct host_sim_plan *p = r->plan;
-    struct incode_setup setup = {.bricks = r->order.bricks,
-                                 .index = (uint8_t)p->index};
+    struct node_setup_message setup = {
+        .role = NODE_WORKER,
+        .setup = {.bricks = r->order.bricks, .index = (uint8_t)p->index}};
     unsigned dimension = (unsigned)__builtin_ctz(p->nodes);
     struct node_identity identity = {.dimension = (uint8_t)dimension,
                                      .window = (uint8_t)p->window,
                                      .epoch = 1};
-    memcpy(setup.cells, r->order.cells, sizeof setup.cells);
+    memcpy(setup.setup.cells, r->order.cells, sizeof setup.setup.cells);
     uint64_t memory = 0, needed = 1;
     while (needed > memory) {
         memory += 4096;

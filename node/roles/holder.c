@@ -2,54 +2,87 @@
 
 #include <string.h>
 
-#include "incode/predicates/check.h"
+enum { PAGE_MESSAGE_MAX = sizeof(uint32_t) + INCODE_PAGE_BYTES };
 
-int node_holder_start(struct node_holder *holder, void *arena, size_t bytes,
-                      struct node_counted *counted,
-                      const struct node_setup_message *setup, const char **why)
+struct frame {
+    uint32_t page; /* then the page itself: the body of a NODE_PAGE */
+    uint8_t data[INCODE_PAGE_BYTES];
+    uint16_t size; /* of data; 0: nothing here */
+    bool loading;  /* the host has been asked */
+    bool fresh;    /* there, but not yet passed on to whom it was got for */
+};
+
+struct holder {
+    struct node_counted *counted;
+    struct node_fault *fault;
+    uint32_t holders;
+    struct frame *frames;
+    uint32_t frame_count, frames_used;
+    uint32_t queue[NODE_PAGES_IN_FLIGHT_MAX]; /* pages that node 0 waits for */
+    uint32_t queued;
+    uint64_t hits, misses, bytes_in, bytes_out;
+};
+
+static size_t holder_arena_min(size_t memory,
+                               const struct node_setup_message *setup)
 {
-    memset(holder, 0, sizeof *holder);
-    holder->counted = counted;
-    holder->holders = setup->holders;
-    holder->frames = arena;
-    holder->frame_count = (uint32_t)(bytes / sizeof holder->frames[0]);
-    if (holder->frame_count == 0) {
-        *why = "the node's memory does not hold a page";
-        return -1;
-    }
-    memset(arena, 0, holder->frame_count * sizeof holder->frames[0]);
-    return 0;
+    (void)memory, (void)setup;
+    return node_aligned(sizeof(struct holder)) + sizeof(struct frame);
 }
 
-static struct node_holder_frame *frame_of(const struct node_holder *h,
-                                          uint32_t page)
+static bool holder_start(void *self, size_t bytes,
+                         const struct node_setup_message *setup,
+                         struct node_counted *counted, struct node_fault *fault)
+{
+    struct holder *h = self;
+    size_t own = node_aligned(sizeof *h);
+    if (bytes < holder_arena_min(bytes, setup)) {
+        node_fault_set(fault, "the node's memory does not hold a page", 0, 0);
+        return false;
+    }
+    if (setup->holders == 0) {
+        node_fault_set(fault, "invalid setup: a holder among # holders", 0, 0);
+        return false;
+    }
+    memset(h, 0, sizeof *h);
+    h->counted = counted;
+    h->fault = fault;
+    h->holders = setup->holders;
+    h->frames = (void *)((uint8_t *)self + own);
+    h->frame_count = (uint32_t)((bytes - own) / sizeof h->frames[0]);
+    memset(h->frames, 0, h->frame_count * sizeof h->frames[0]);
+    return true;
+}
+
+static struct frame *frame_of(const struct holder *h, uint32_t page)
 {
     return &h->frames[page / h->holders % h->frame_count];
 }
 
-static void take_request(struct node_holder *h, const uint8_t *data,
-                         size_t size)
+static void take_request(struct holder *h, const uint8_t *data, size_t size)
 {
     for (size_t at = 0; at + 4 <= size; at += 4) {
-        if (h->queued == NODE_HOLDER_QUEUE) {
-            h->fault = "more pages asked for than were agreed";
+        if (h->queued == NODE_PAGES_IN_FLIGHT_MAX) {
+            node_fault_set(h->fault, "more than # pages requested at a time",
+                           NODE_PAGES_IN_FLIGHT_MAX, 0);
             return;
         }
         memcpy(&h->queue[h->queued++], data + at, 4);
     }
 }
 
-static void take_page(struct node_holder *h, const uint8_t *data, size_t size)
+static void take_page(struct holder *h, const uint8_t *data, size_t size)
 {
     uint32_t page;
-    if (size <= sizeof page || size > sizeof page + INCODE_PAGE_BYTES) {
-        h->fault = "a page of a wrong size";
+    if (size <= sizeof page || size > PAGE_MESSAGE_MAX) {
+        node_fault_set(h->fault, "page in # bytes, expected # at most",
+                       (uint32_t)size, PAGE_MESSAGE_MAX);
         return;
     }
     memcpy(&page, data, sizeof page);
-    struct node_holder_frame *frame = frame_of(h, page);
+    struct frame *frame = frame_of(h, page);
     if (!frame->loading || frame->page != page) {
-        h->fault = "a page that was not asked for";
+        node_fault_set(h->fault, "page # was not requested", page, 0);
         return;
     }
     memcpy(frame->data, data + sizeof page, size - sizeof page);
@@ -58,22 +91,25 @@ static void take_page(struct node_holder *h, const uint8_t *data, size_t size)
     frame->fresh = true;
 }
 
-void node_holder_message(struct node_holder *holder,
-                         const struct cube_message *message)
+static void holder_message(void *self, const struct cube_message *message,
+                           uint64_t now_us)
 {
-    holder->bytes_in += message->size;
+    struct holder *h = self;
+    (void)now_us;
+    h->bytes_in += message->size;
     if (message->type == NODE_PAGE_REQUEST) {
-        take_request(holder, message->data, message->size);
+        take_request(h, message->data, message->size);
     } else if (message->type == NODE_PAGE) {
-        take_page(holder, message->data, message->size);
+        take_page(h, message->data, message->size);
+    } else if (message->type == NODE_JOB) {
+        node_fault_set(h->fault, "a job for a node that holds pages", 0, 0);
     }
 }
 
 /* Takes a frame for a page and notes it as wanted.  A page that has just come
  * goes to node 0 first: otherwise two pages of one frame could displace each
  * other for ever. */
-static bool claim(struct node_holder *h, struct node_holder_frame *frame,
-                  uint32_t page)
+static bool claim(struct holder *h, struct frame *frame, uint32_t page)
 {
     if (frame->loading || frame->fresh) {
         return false;
@@ -86,43 +122,106 @@ static bool claim(struct node_holder *h, struct node_holder_frame *frame,
     return true;
 }
 
-unsigned node_holder_send(struct node_holder *holder)
+static unsigned holder_send(void *self)
 {
+    struct holder *h = self;
     uint32_t wanted[NODE_PAGES_A_REQUEST];
     uint32_t wanted_count = 0, i = 0;
     unsigned sent = 0;
-    bool may_ask = cube_room(holder->counted->cube, CUBE_HOST) > 0;
-    while (i < holder->queued) {
-        uint32_t page = holder->queue[i];
-        struct node_holder_frame *frame = frame_of(holder, page);
+    bool may_ask = cube_room(h->counted->cube, CUBE_HOST) > 0;
+    while (i < h->queued) {
+        uint32_t page = h->queue[i];
+        struct frame *frame = frame_of(h, page);
         size_t size = sizeof page + frame->size;
         if (frame->page == page && frame->size > 0 &&
-            cube_write(holder->counted->cube, 0, NODE_PAGE, frame, size) == 0) {
-            holder->hits += !frame->fresh;
+            cube_write(h->counted->cube, 0, NODE_PAGE, frame, size) == 0) {
+            h->hits += !frame->fresh;
             frame->fresh = false;
-            holder->queue[i] = holder->queue[--holder->queued];
-            holder->bytes_out += size;
+            h->queue[i] = h->queue[--h->queued];
+            h->bytes_out += size;
             sent++;
             continue;
         }
         if (may_ask && wanted_count < NODE_PAGES_A_REQUEST &&
             (frame->page != page || frame->size == 0) &&
-            claim(holder, frame, page)) {
+            claim(h, frame, page)) {
             wanted[wanted_count++] = page;
         }
         i++;
     }
     if (wanted_count > 0) {
         /* Pages for node 0 may have taken the room on the same link. */
-        if (node_counted_write(holder->counted, CUBE_HOST, NODE_PAGE_REQUEST,
-                               wanted, wanted_count * sizeof wanted[0]) != 0) {
+        if (node_counted_write(h->counted, CUBE_HOST, NODE_PAGE_REQUEST, wanted,
+                               wanted_count * sizeof wanted[0]) != 0) {
             for (i = 0; i < wanted_count; i++) {
-                frame_of(holder, wanted[i])->loading = false;
+                frame_of(h, wanted[i])->loading = false;
             }
             return sent;
         }
-        holder->bytes_out += wanted_count * sizeof wanted[0];
+        h->bytes_out += wanted_count * sizeof wanted[0];
         sent++;
     }
     return sent;
 }
+
+static unsigned holder_work(void *self)
+{
+    (void)self;
+    return 0;
+}
+
+static uint32_t holder_done(const void *self)
+{
+    (void)self;
+    return 0; /* there are no jobs */
+}
+
+static void holder_end(void *self, uint64_t now_us)
+{
+    (void)self, (void)now_us;
+}
+
+static uint32_t holder_held(const void *self)
+{
+    const struct holder *h = self;
+    return h->queued;
+}
+
+static void holder_totals(const void *self,
+                          struct node_finished_message *totals, uint64_t now_us)
+{
+    const struct holder *h = self;
+    (void)now_us;
+    totals->pages_held = h->hits;
+    totals->pages_forwarded = h->misses;
+    totals->bytes_in = h->bytes_in;
+    totals->bytes_out = h->bytes_out;
+    totals->memory_high_water =
+        node_aligned(sizeof *h) + h->frames_used * sizeof h->frames[0];
+}
+
+static void holder_map(const void *self, struct node_map *map)
+{
+    const struct holder *h = self;
+    map->pages = h->frame_count;
+    map->tables[0].bytes = (uint32_t)node_aligned(sizeof *h);
+    map->tables[0].count = NODE_PAGES_IN_FLIGHT_MAX;
+    map->tables[1].bytes = (uint32_t)(h->frame_count * sizeof h->frames[0]);
+    map->tables[1].count = h->frame_count;
+}
+
+const struct node_role node_holder_role = {
+    .name = "holder",
+    .tables = {{"queue of requests", "pages"},
+               {"page frames", "pages of 1536 bytes"}},
+    .arena_min = holder_arena_min,
+    .start = holder_start,
+    .message = holder_message,
+    .work = holder_work,
+    .send = holder_send,
+    .done = holder_done,
+    .end = holder_end,
+    .held = holder_held,
+    .totals = holder_totals,
+    .map = holder_map,
+};

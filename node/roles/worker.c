@@ -3,6 +3,8 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
+#include "node/outbox.h"
+#include "node/result.h"
 
 enum {
     HEADER_BYTES = sizeof(struct node_result_header),
@@ -14,32 +16,55 @@ enum {
     BATCHES_RESERVED = 2
 };
 
-static void send_wanted(struct node_worker *w);
+struct worker {
+    struct node_counted *counted;
+    struct node_fault *fault;
+    struct incode_triangulator *triangulator;
+    uint32_t bricks, holders; /* as in the setup */
+    uint32_t epoch;           /* of the job */
+    bool working;             /* a job is open */
+    bool drained;      /* the triangulator is done, results still leave */
+    uint64_t start_us; /* of the job */
+    uint64_t wall_us;  /* of the jobs before */
+    uint32_t wanted[NODE_WANTED_MAX];
+    uint32_t wanted_count, in_flight;
+    struct node_outbox results; /* leave under credit */
+    uint32_t credit, sent;      /* results allowed, results sent */
+    struct node_result_writer writer;
+    bool open;                 /* writer fills a slot of results */
+    struct node_outbox spills; /* leave as the link takes them */
+    uint32_t spill_count;      /* faces in the open message of spills */
+    size_t outbox_bytes;
+    uint64_t bytes_in, bytes_out;
+};
 
-static bool port_request(void *context, uint32_t page)
+static unsigned worker_send(void *self);
+static void send_wanted(struct worker *w);
+
+static bool outside_request(void *context, uint32_t page)
 {
-    struct node_worker *w = context;
+    struct worker *w = context;
     if (w->wanted_count == NODE_WANTED_MAX) {
         send_wanted(w);
     }
     if (w->wanted_count == NODE_WANTED_MAX ||
-        w->wanted_count + w->in_flight >= NODE_IN_FLIGHT_MAX) {
+        w->wanted_count + w->in_flight >= NODE_PAGES_IN_FLIGHT_MAX) {
         return false;
     }
     w->wanted[w->wanted_count++] = page;
     return true;
 }
 
-static size_t port_emit_room(void *context)
+static size_t outside_emit_room(void *context)
 {
-    const struct node_worker *w = context;
+    const struct worker *w = context;
     uint32_t batches = node_outbox_free(&w->results);
     return batches <= BATCHES_RESERVED
                ? 0
                : (size_t)(batches - BATCHES_RESERVED) * BATCH_TETRAHEDRA;
 }
 
-static void open_batch(struct node_worker *w)
+static void open_batch(struct worker *w)
 {
     uint8_t *data = node_outbox_open(&w->results);
     struct node_result_header header = {w->epoch, 0};
@@ -48,7 +73,7 @@ static void open_batch(struct node_worker *w)
     w->open = true;
 }
 
-static void close_batch(struct node_worker *w)
+static void close_batch(struct worker *w)
 {
     if (w->open) {
         node_outbox_close(&w->results, NODE_RESULT,
@@ -58,18 +83,19 @@ static void close_batch(struct node_worker *w)
 }
 
 /* The outbox is full although the triangulator was told how much it takes. */
-static bool overrun(struct node_worker *w)
+static bool overrun(struct worker *w)
 {
     if (!w->open && node_outbox_free(&w->results) == 0) {
-        w->fault = "more results than were agreed";
+        node_fault_set(w->fault, "more results than # messages hold",
+                       w->results.slot_count, 0);
     }
-    return w->fault != NULL;
+    return node_fault_is_set(w->fault);
 }
 
-static void port_emit(void *context, uint32_t vertex,
-                      const uint32_t (*apexes)[3], size_t count)
+static void outside_emit(void *context, uint32_t vertex,
+                         const uint32_t (*apexes)[3], size_t count)
 {
-    struct node_worker *w = context;
+    struct worker *w = context;
     while (count > 0 && !overrun(w)) {
         if (!w->open) {
             open_batch(w);
@@ -83,9 +109,9 @@ static void port_emit(void *context, uint32_t vertex,
     }
 }
 
-static void port_commit(void *context, uint32_t brick)
+static void outside_commit(void *context, uint32_t brick)
 {
-    struct node_worker *w = context;
+    struct worker *w = context;
     while (!overrun(w)) {
         if (!w->open) {
             open_batch(w);
@@ -97,7 +123,7 @@ static void port_commit(void *context, uint32_t brick)
     }
 }
 
-static void close_spill(struct node_worker *w)
+static void close_spill(struct worker *w)
 {
     if (w->spill_count > 0) {
         struct node_spill_header header = {w->epoch, 0, w->spill_count, 0, 0};
@@ -110,7 +136,7 @@ static void close_spill(struct node_worker *w)
 }
 
 /* Faces that the outbox takes now, the open message's included. */
-static size_t spill_room(const struct node_worker *w)
+static size_t spill_room(const struct worker *w)
 {
     return (size_t)node_outbox_free(&w->spills) * NODE_FACES_A_MESSAGE -
            w->spill_count;
@@ -118,12 +144,12 @@ static size_t spill_room(const struct node_worker *w)
 
 /* Faces come in small numbers: they gather in one message until it is full or
  * the link has nothing else to do. */
-static bool port_spill(void *context, const struct incode_face *faces,
-                       size_t count)
+static bool outside_spill(void *context, const struct incode_face *faces,
+                          size_t count)
 {
-    struct node_worker *w = context;
+    struct worker *w = context;
     if (spill_room(w) < count) {
-        (void)node_worker_send(w);
+        (void)worker_send(w);
     }
     if (spill_room(w) < count) {
         return false;
@@ -140,9 +166,9 @@ static bool port_spill(void *context, const struct incode_face *faces,
     return true;
 }
 
-static bool port_unspill(void *context, uint32_t brick)
+static bool outside_unspill(void *context, uint32_t brick)
 {
-    struct node_worker *w = context;
+    struct worker *w = context;
     if (node_outbox_free(&w->spills) < 2) {
         return false;
     }
@@ -160,88 +186,134 @@ static uint32_t slots(size_t bytes, uint32_t min, uint32_t max)
     return count < min ? min : count > max ? max : (uint32_t)count;
 }
 
-size_t node_worker_outbox_bytes(size_t memory)
+static uint32_t result_slots(size_t bytes)
 {
-    uint32_t results =
-        slots(memory, NODE_RESULT_SLOTS_MIN, NODE_RESULT_SLOTS_MAX);
-    uint32_t spills = slots(memory, NODE_SPILL_SLOTS_MIN, NODE_SPILL_SLOTS_MAX);
-    return (NODE_OUTBOX_BYTES(results + spills) + 63) / 64 * 64;
+    return slots(bytes, NODE_RESULT_SLOTS_MIN, NODE_RESULT_SLOTS_MAX);
 }
 
-int node_worker_start(struct node_worker *worker, void *arena, size_t bytes,
-                      struct node_counted *counted,
-                      const struct node_setup_message *setup, const char **why)
+static uint32_t spill_slots(size_t bytes)
 {
-    const struct incode_outside outside = {
-        worker,      port_request, port_emit_room, port_emit,
-        port_commit, port_spill,   port_unspill};
-    uint32_t results =
-        slots(bytes, NODE_RESULT_SLOTS_MIN, NODE_RESULT_SLOTS_MAX);
-    uint32_t spills = slots(bytes, NODE_SPILL_SLOTS_MIN, NODE_SPILL_SLOTS_MAX);
-    size_t boxes = (NODE_OUTBOX_BYTES(results + spills) + 63) / 64 * 64;
-    uint8_t *memory = arena;
-    memset(worker, 0, sizeof *worker);
-    if (bytes < boxes) {
-        *why = "the node's memory does not hold its outboxes";
-        return -1;
+    return slots(bytes, NODE_SPILL_SLOTS_MIN, NODE_SPILL_SLOTS_MAX);
+}
+
+static size_t outbox_bytes(size_t bytes)
+{
+    return node_aligned(
+        NODE_OUTBOX_BYTES(result_slots(bytes) + spill_slots(bytes)));
+}
+
+static size_t worker_arena_min(size_t memory,
+                               const struct node_setup_message *setup)
+{
+    return node_aligned(sizeof(struct worker)) + outbox_bytes(memory) +
+           incode_arena_min(&setup->setup);
+}
+
+static bool worker_start(void *self, size_t bytes,
+                         const struct node_setup_message *setup,
+                         struct node_counted *counted, struct node_fault *fault)
+{
+    struct worker *w = self;
+    const struct incode_outside outside = {w,
+                                           outside_request,
+                                           outside_emit_room,
+                                           outside_emit,
+                                           outside_commit,
+                                           outside_spill,
+                                           outside_unspill};
+    uint8_t *memory = self;
+    size_t own = node_aligned(sizeof *w), boxes = outbox_bytes(bytes);
+    const char *why = NULL;
+    if (bytes < own + boxes) {
+        node_fault_set(fault, "the node's memory does not hold its outboxes", 0,
+                       0);
+        return false;
     }
-    worker->counted = counted;
-    worker->setup = *setup;
-    worker->credit = setup->credits;
-    worker->outbox_bytes = (uint32_t)boxes;
-    node_outbox_init(&worker->results, memory, results);
-    node_outbox_init(&worker->spills, memory + NODE_OUTBOX_BYTES(results),
-                     spills);
-    worker->triangulator = incode_triangulator_init(
-        memory + boxes, bytes - boxes, &setup->setup, &outside, why);
-    return worker->triangulator == NULL ? -1 : 0;
+    memset(w, 0, sizeof *w);
+    w->counted = counted;
+    w->fault = fault;
+    w->bricks = setup->setup.bricks;
+    w->holders = setup->holders;
+    w->credit = setup->credits;
+    w->outbox_bytes = boxes;
+    uint32_t results = result_slots(bytes);
+    node_outbox_init(&w->results, memory + own, results);
+    node_outbox_init(&w->spills, memory + own + NODE_OUTBOX_BYTES(results),
+                     spill_slots(bytes));
+    w->triangulator =
+        incode_triangulator_init(memory + own + boxes, bytes - own - boxes,
+                                 &setup->setup, &outside, &why);
+    if (w->triangulator == NULL) {
+        node_fault_set(fault, why, 0, 0);
+    }
+    return w->triangulator != NULL;
 }
 
-void node_worker_job(struct node_worker *worker,
-                     const struct node_job_message *job, uint64_t now_us)
+static void take_job(struct worker *w, const struct cube_message *message,
+                     uint64_t now_us)
 {
-    if (worker->working) {
-        worker->fault = "a second job before the first was done";
+    struct node_job_message job;
+    if (message->size != sizeof job) {
+        node_fault_set(w->fault, "job in # bytes, expected #", message->size,
+                       sizeof job);
         return;
     }
-    worker->epoch = job->epoch;
-    worker->working = true;
-    worker->start_us = now_us;
+    memcpy(&job, message->data, sizeof job);
+    if (w->working) {
+        node_fault_set(w->fault, "job # before job # is done", job.epoch,
+                       w->epoch);
+        return;
+    }
+    if (job.job.first > job.job.last || job.job.last > w->bricks) {
+        node_fault_set(w->fault, "invalid job: bricks #..#", job.job.first,
+                       job.job.last);
+        return;
+    }
+    w->epoch = job.epoch;
+    w->working = true;
+    w->start_us = now_us;
     /* A region without points has nothing to be worked on. */
-    worker->drained = job->job.first >= job->job.last;
-    if (!worker->drained) {
-        incode_triangulator_start(worker->triangulator, &job->job);
+    w->drained = job.job.first == job.job.last;
+    if (!w->drained) {
+        incode_triangulator_start(w->triangulator, &job.job);
     }
 }
 
-static void take_page(struct node_worker *w, const uint8_t *data, size_t size)
+static void take_page(struct worker *w, const uint8_t *data, size_t size)
 {
     uint32_t page;
-    if (size < sizeof page || w->in_flight == 0) {
-        w->fault = "a page that was not asked for";
+    if (size < sizeof page) {
+        node_fault_set(w->fault, "page in # bytes, expected # at least",
+                       (uint32_t)size, sizeof page);
         return;
     }
     memcpy(&page, data, sizeof page);
+    if (w->in_flight == 0) {
+        node_fault_set(w->fault, "page # was not requested", page, 0);
+        return;
+    }
     w->in_flight--;
     if (incode_triangulator_page(w->triangulator, page, data + sizeof page,
                                  size - sizeof page) != 0) {
-        w->fault = "a page that was not asked for, or of a wrong size";
+        node_fault_set(w->fault, "page # of # bytes was not requested", page,
+                       (uint32_t)(size - sizeof page));
     }
 }
 
-static void take_unspill(struct node_worker *w, const uint8_t *data,
-                         size_t size)
+static void take_unspill(struct worker *w, const uint8_t *data, size_t size)
 {
     struct node_spill_header header;
     struct incode_face faces[NODE_FACES_A_MESSAGE];
     if (size < sizeof header) {
-        w->fault = "a spilled list without a header";
+        node_fault_set(w->fault, "spilled faces in # bytes, header takes #",
+                       (uint32_t)size, sizeof header);
         return;
     }
     memcpy(&header, data, sizeof header);
     if (header.count > NODE_FACES_A_MESSAGE ||
         size != sizeof header + header.count * sizeof faces[0]) {
-        w->fault = "a spilled list of a wrong size";
+        node_fault_set(w->fault, "# spilled faces in # bytes", header.count,
+                       (uint32_t)size);
         return;
     }
     if (header.epoch != w->epoch || header.sent != w->counted->received) {
@@ -250,58 +322,66 @@ static void take_unspill(struct node_worker *w, const uint8_t *data,
     memcpy(faces, data + sizeof header, header.count * sizeof faces[0]);
     if (incode_triangulator_unspill(w->triangulator, header.brick, faces,
                                     header.count, header.last != 0) != 0) {
-        w->fault = "a spilled list that was not asked for";
+        node_fault_set(w->fault, "spilled faces of brick # not requested",
+                       header.brick, 0);
     }
 }
 
-void node_worker_message(struct node_worker *worker,
-                         const struct cube_message *message)
+static void worker_message(void *self, const struct cube_message *message,
+                           uint64_t now_us)
 {
-    worker->bytes_in += message->size;
+    struct worker *w = self;
+    if (message->type == NODE_JOB) {
+        take_job(w, message, now_us);
+        return;
+    }
+    w->bytes_in += message->size;
     if (message->type == NODE_PAGE) {
-        take_page(worker, message->data, message->size);
+        take_page(w, message->data, message->size);
     } else if (message->type == NODE_UNSPILL) {
-        take_unspill(worker, message->data, message->size);
+        take_unspill(w, message->data, message->size);
     } else if (message->type == NODE_CREDIT &&
-               message->size == sizeof worker->credit) {
-        memcpy(&worker->credit, message->data, sizeof worker->credit);
+               message->size == sizeof w->credit) {
+        memcpy(&w->credit, message->data, sizeof w->credit);
     }
 }
 
-unsigned node_worker_work(struct node_worker *worker)
+static unsigned worker_work(void *self)
 {
+    struct worker *w = self;
     unsigned worked = 0;
-    while (worker->working && !worker->drained && worked < NODE_STEPS &&
-           worker->fault == NULL &&
-           node_outbox_free(&worker->results) > BATCHES_RESERVED) {
-        enum incode_step step = incode_triangulator_step(worker->triangulator);
+    while (w->working && !w->drained && worked < NODE_STEPS &&
+           !node_fault_is_set(w->fault) &&
+           node_outbox_free(&w->results) > BATCHES_RESERVED) {
+        enum incode_step step = incode_triangulator_step(w->triangulator);
         if (step == INCODE_BROKEN) {
-            worker->fault = incode_triangulator_fault(worker->triangulator);
+            node_fault_set(w->fault, incode_triangulator_fault(w->triangulator),
+                           0, 0);
             break;
         }
-        worker->drained = step == INCODE_FINISHED;
+        w->drained = step == INCODE_FINISHED;
         if (step == INCODE_WAITING) {
             break;
         }
         worked++;
     }
-    if (worker->drained) {
-        close_batch(worker);
+    if (w->drained) {
+        close_batch(w);
     }
     return worked;
 }
 
 /* Who has the page. */
-static uint16_t keeper(const struct node_worker *w, uint32_t page)
+static uint16_t keeper(const struct worker *w, uint32_t page)
 {
-    if (w->setup.holders == 0) {
+    if (w->holders == 0) {
         return CUBE_HOST;
     }
-    return (uint16_t)(1 + page % w->setup.holders);
+    return (uint16_t)(1 + page % w->holders);
 }
 
 /* Sends for wanted pages, one message for each node that has some. */
-static void send_wanted(struct node_worker *w)
+static void send_wanted(struct worker *w)
 {
     while (w->wanted_count > 0) {
         uint32_t batch[NODE_PAGES_A_REQUEST];
@@ -326,7 +406,7 @@ static void send_wanted(struct node_worker *w)
 }
 
 /* Sends the first message of an outbox; false where the link has no room. */
-static bool send_first(struct node_worker *w, struct node_outbox *box)
+static bool send_first(struct worker *w, struct node_outbox *box)
 {
     struct node_outbox_slot *slot = node_outbox_first(box);
     if (slot == NULL) {
@@ -347,51 +427,93 @@ static bool send_first(struct node_worker *w, struct node_outbox *box)
     return true;
 }
 
-unsigned node_worker_send(struct node_worker *worker)
+static unsigned worker_send(void *self)
 {
-    unsigned sent = worker->wanted_count;
-    send_wanted(worker);
-    sent -= worker->wanted_count;
-    if (worker->spills.used == 0) {
-        close_spill(worker);
+    struct worker *w = self;
+    unsigned sent = w->wanted_count;
+    send_wanted(w);
+    sent -= w->wanted_count;
+    if (w->spills.used == 0) {
+        close_spill(w);
     }
-    while (send_first(worker, &worker->spills)) {
+    while (send_first(w, &w->spills)) {
         sent++;
     }
-    while (worker->sent != worker->credit &&
-           send_first(worker, &worker->results)) {
-        worker->sent++;
+    while (w->sent != w->credit && send_first(w, &w->results)) {
+        w->sent++;
         sent++;
     }
     return sent;
 }
 
-uint32_t node_worker_held(const struct node_worker *worker)
+static uint32_t worker_held(const void *self)
 {
-    return worker->open + worker->results.used + worker->spills.used +
-           worker->spill_count + worker->wanted_count + worker->in_flight;
+    const struct worker *w = self;
+    return w->open + w->results.used + w->spills.used + w->spill_count +
+           w->wanted_count + w->in_flight;
 }
 
-bool node_worker_done(const struct node_worker *worker)
+static uint32_t worker_done(const void *self)
 {
-    return worker->working && worker->drained && node_worker_held(worker) == 0;
+    const struct worker *w = self;
+    return w->working && w->drained && worker_held(w) == 0 ? w->epoch : 0;
 }
 
-void node_worker_end(struct node_worker *worker, uint64_t now_us)
+static void worker_end(void *self, uint64_t now_us)
 {
-    worker->wall_us += now_us - worker->start_us;
-    worker->working = false;
-    worker->drained = false;
+    struct worker *w = self;
+    w->wall_us += now_us - w->start_us;
+    w->working = false;
+    w->drained = false;
 }
 
-void node_worker_totals(const struct node_worker *worker,
-                        struct node_finished_message *totals, uint64_t now_us)
+static void worker_totals(const void *self,
+                          struct node_finished_message *totals, uint64_t now_us)
 {
-    totals->wall_us = worker->wall_us;
-    if (worker->working) {
-        totals->wall_us += now_us - worker->start_us;
+    const struct worker *w = self;
+    totals->wall_us = w->wall_us;
+    if (w->working) {
+        totals->wall_us += now_us - w->start_us;
     }
-    totals->bytes_in = worker->bytes_in;
-    totals->bytes_out = worker->bytes_out;
-    totals->statistics = *incode_triangulator_statistics(worker->triangulator);
+    totals->bytes_in = w->bytes_in;
+    totals->bytes_out = w->bytes_out;
+    totals->statistics = *incode_triangulator_statistics(w->triangulator);
+    totals->memory_high_water = node_aligned(sizeof *w) + w->outbox_bytes +
+                                totals->statistics.memory_high_water;
 }
+
+static void worker_map(const void *self, struct node_map *map)
+{
+    const struct worker *w = self;
+    const struct incode_map *t = incode_triangulator_map(w->triangulator);
+    const size_t bytes[][2] = {{node_aligned(sizeof *w) + w->outbox_bytes,
+                                w->results.slot_count + w->spills.slot_count},
+                               {t->control, 0},
+                               {t->afl, t->afl_faces},
+                               {t->bricks, t->brick_entries},
+                               {t->frames, t->frame_count}};
+    for (unsigned i = 0; i < sizeof bytes / sizeof bytes[0]; i++) {
+        map->tables[i].bytes = (uint32_t)bytes[i][0];
+        map->tables[i].count = (uint32_t)bytes[i][1];
+    }
+    map->pages = (uint32_t)t->frame_count;
+}
+
+const struct node_role node_worker_role = {
+    .name = "worker",
+    .tables = {{"results and spilled faces on their way out", NULL},
+               {"triangulator, its local points and tasks", NULL},
+               {"active face list", "faces"},
+               {"open bricks", "entries"},
+               {"page frames", "pages of 1536 bytes and their boxes"}},
+    .arena_min = worker_arena_min,
+    .start = worker_start,
+    .message = worker_message,
+    .work = worker_work,
+    .send = worker_send,
+    .done = worker_done,
+    .end = worker_end,
+    .held = worker_held,
+    .totals = worker_totals,
+    .map = worker_map,
+};

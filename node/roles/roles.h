@@ -1,0 +1,86 @@
+/* Roles: what a node does in a generation of the wiring.  A role is a struct
+ * of functions; the setup names it by its number, and the node calls nothing
+ * else of it.  A new role is a file beside this one, a number in message.h and
+ * a row in roles.c.
+ *
+ * Memory: a role has the node's arena, but for the cube's windows and the node
+ * itself; its own state lies at the arena's start, and is what `self` points
+ * at.  Roles take turns in it.  Work: every function returns at once; `work`
+ * after a bounded amount of computing.
+ *
+ *     const struct node_role *role = node_role_named(setup.role);
+ *     if (role != NULL && role->start(arena, bytes, &setup, &counted, &fault))
+ *         moved = role->work(arena) + role->send(arena);
+ */
+#ifndef NODE_ROLES_H
+#define NODE_ROLES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "node/counted.h"
+#include "node/fault.h"
+#include "node/message.h"
+
+struct node_role {
+    /* As statistics name it. */
+    const char *name;
+
+    /* The tables that fill its arena, as the memory map names them, in the
+     * order in which `map` states their sizes; unit: of `count`, or NULL. */
+    struct {
+        const char *name, *unit;
+    } tables[NODE_TABLES_MAX];
+
+    /* Bytes of arena that suffice for this setup, in a node whose memory is
+     * `memory` bytes in all. */
+    size_t (*arena_min)(size_t memory, const struct node_setup_message *setup);
+
+    /* Begins anew, in an arena aligned to 64 bytes with anything in it. counted
+     * and fault stay: the one sends its messages, the other takes what keeps
+     * it from going on, now or later.  False: it has told so. */
+    bool (*start)(void *self, size_t bytes,
+                  const struct node_setup_message *setup,
+                  struct node_counted *counted, struct node_fault *fault);
+
+    /* Takes a message of any type that the node does not answer itself: it must
+     * not hold back what it cannot serve yet. */
+    void (*message)(void *self, const struct cube_message *message,
+                    uint64_t now_us);
+
+    /* Computes for a while; the number of steps that did something. */
+    unsigned (*work)(void *self);
+
+    /* Sends what may leave; the number of messages. */
+    unsigned (*send)(void *self);
+
+    /* The epoch of the job whose last result has left, so that its statistics
+     * are due; 0: there is none. */
+    uint32_t (*done)(const void *self);
+
+    /* The statistics of that job have left. */
+    void (*end)(void *self, uint64_t now_us);
+
+    /* Slots of its queues in use; 0 when no job is open. */
+    uint32_t (*held)(const void *self);
+
+    /* Fills in what it knows of the statistics since its start;
+     * memory_high_water: bytes of its arena ever in use. */
+    void (*totals)(const void *self, struct node_finished_message *totals,
+                   uint64_t now_us);
+
+    /* Fills in `tables` and `pages` of the memory map. */
+    void (*map)(const void *self, struct node_map *map);
+};
+
+/* The role of that number (enum node_role_number), or NULL: no such role. */
+const struct node_role *node_role_named(uint32_t number);
+
+/* Bytes, rounded up so that what follows is aligned for anything. */
+static inline size_t node_aligned(size_t bytes)
+{
+    return (bytes + 63) / 64 * 64;
+}
+
+#endif
