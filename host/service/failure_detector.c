@@ -126,10 +126,11 @@ int host_detector_pong(struct host_service *service,
     struct node_pong_message pong;
     if (message->size != sizeof pong) {
         return host_fail(error, HOST_CUBE,
-                         "node %u link %u: is here in another language; are "
+                         "node %u link %u: pong in %u bytes, expected %zu; are "
                          "host and node of one version? run make",
                          message->source,
-                         host_detector_link(service, message->source));
+                         host_detector_link(service, message->source),
+                         message->size, sizeof pong);
     }
     memcpy(&pong, message->data, sizeof pong);
     if (node->start != 0 && node->start != pong.start) {

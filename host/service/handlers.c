@@ -1,5 +1,7 @@
 #include "handlers.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "node/result.h"
@@ -7,14 +9,28 @@
 #include "missing_links.h"
 #include "failure_detector.h"
 
-/* A message that no sound node sends. */
-static int unsound(const struct cube_message *message, const char *what,
-                   struct host_error *error)
+/* A message that no sound node sends: what is wrong with it, as printf. */
+__attribute__((format(printf, 3, 4))) static int
+unsound(const struct cube_message *message, struct host_error *error,
+        const char *format, ...)
 {
+    char what[160];
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(what, sizeof what, format, arguments);
+    va_end(arguments);
     return host_fail(error, HOST_CUBE,
                      "node %u: %s (message %u of %u bytes); are host and node "
                      "of one version? run make",
                      message->source, what, message->type, message->size);
+}
+
+/* A message whose layout another version may have changed. */
+static int wrong_size(const struct cube_message *message, const char *what,
+                      size_t expected, struct host_error *error)
+{
+    return unsound(message, error, "%s in %u bytes, expected %zu", what,
+                   message->size, expected);
 }
 
 /* Whether messages of that node have been lost before this one: then what it
@@ -37,13 +53,15 @@ static int take_requests(struct host_service *s,
     uint32_t count = message->size / 4u;
     if (message->size % 4 != 0 ||
         node->pages_count + count > HOST_PAGES_QUEUED_MAX) {
-        return unsound(message, "asked for more pages than agreed", error);
+        return unsound(message, error, "more than %d pages requested",
+                       HOST_PAGES_QUEUED_MAX);
     }
     for (uint32_t i = 0; i < count; i++) {
         uint32_t page;
         memcpy(&page, message->data + 4 * i, 4);
         if (page >= s->order->tree.pages) {
-            return unsound(message, "asked for a page that is not", error);
+            return unsound(message, error, "page %u out of range 0..%u", page,
+                           s->order->tree.pages - 1);
         }
         node->pages[(node->pages_first + node->pages_count++) %
                     HOST_PAGES_QUEUED_MAX] = page;
@@ -60,7 +78,7 @@ static int take_results(struct host_service *s,
     enum node_result_event event;
     struct node_result_header header;
     if (message->size < sizeof header) {
-        return unsound(message, "sent results without a header", error);
+        return wrong_size(message, "results", sizeof header, error);
     }
     memcpy(&header, message->data, sizeof header);
     struct host_node *node = &s->node[message->source];
@@ -87,15 +105,15 @@ static int take_results(struct host_service *s,
         }
         event = node_result_read(&reader, rows, room, &count);
         if (event == NODE_RESULT_GARBAGE) {
-            return unsound(message, "sent results that cannot be", error);
+            return unsound(message, error, "invalid results");
         }
         host_tetrahedra_keep(s->tets, count);
         node->unreported += count;
         if (event == NODE_RESULT_COMMIT &&
             host_ledger_commit(&s->ledger, message->source, reader.brick) !=
                 0) {
-            return unsound(message, "committed a brick that is not its own",
-                           error);
+            return unsound(message, error, "committed brick %u, not of its job",
+                           reader.brick);
         }
     } while (event != NODE_RESULT_END);
     return 0;
@@ -108,12 +126,12 @@ static int take_spill(struct host_service *s,
     struct node_spill_header header;
     struct incode_face faces[NODE_FACES_A_MESSAGE];
     if (message->size < sizeof header) {
-        return unsound(message, "spilled without a header", error);
+        return wrong_size(message, "spilled faces", sizeof header, error);
     }
     memcpy(&header, message->data, sizeof header);
     if (header.count > NODE_FACES_A_MESSAGE ||
         message->size != sizeof header + header.count * sizeof faces[0]) {
-        return unsound(message, "spilled a list of a wrong size", error);
+        return unsound(message, error, "%u spilled faces", header.count);
     }
     if (!host_ledger_current(&s->ledger, message->source, header.epoch)) {
         return 0;
@@ -132,8 +150,8 @@ static int take_unspill_request(struct host_service *s,
     struct node_spill_header header;
     if (message->size != sizeof header ||
         node->unspills_count == HOST_UNSPILLS_MAX) {
-        return unsound(message, "asked for more spilled lists than agreed",
-                       error);
+        return unsound(message, error, "more than %d spilled lists requested",
+                       HOST_UNSPILLS_MAX);
     }
     memcpy(&header, message->data, sizeof header);
     if (missing(s, node, header.sent)) {
@@ -157,7 +175,7 @@ static int take_finished(struct host_service *s,
     struct host_node *node = &s->node[message->source];
     struct node_finished_message finished;
     if (message->size != sizeof finished) {
-        return unsound(message, "sent statistics in another language", error);
+        return wrong_size(message, "statistics", sizeof finished, error);
     }
     memcpy(&finished, message->data, sizeof finished);
     if (missing(s, node, finished.sent)) {
@@ -165,7 +183,9 @@ static int take_finished(struct host_service *s,
     }
     if (finished.epoch != 0 &&
         !host_ledger_current(&s->ledger, message->source, finished.epoch)) {
-        return unsound(message, "sent statistics out of turn", error);
+        return unsound(message, error,
+                       "statistics of job %u, which it does not have",
+                       finished.epoch);
     }
     if (finished.epoch != 0 &&
         host_ledger_finish(&s->ledger, message->source) != 0) {
@@ -188,6 +208,43 @@ static int take_finished(struct host_service *s,
     return 0;
 }
 
+static int take_ready(struct host_service *s,
+                      const struct cube_message *message,
+                      struct host_error *error)
+{
+    struct host_node_report *report = &s->report[message->source];
+    uint32_t protocol = NODE_PROTOCOL;
+    if (message->size >= sizeof protocol) {
+        memcpy(&protocol, message->data, sizeof protocol);
+    }
+    if (protocol != NODE_PROTOCOL) {
+        return unsound(message, error, "protocol version %u, expected %d",
+                       protocol, NODE_PROTOCOL);
+    }
+    if (message->size != sizeof report->map) {
+        return wrong_size(message, "memory map", sizeof report->map, error);
+    }
+    memcpy(&report->map, message->data, sizeof report->map);
+    s->ready += !report->ready;
+    report->ready = true;
+    return 0;
+}
+
+/* What to do about a fault that a node reports, by a word of its text. */
+static const char *advice(const char *text)
+{
+    static const char *const known[][2] = {
+        {"memory", "give the nodes more memory"},
+        {"protocol version", "run the same version of the program everywhere"},
+        {"role", "run the same version of the program everywhere"}};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        if (strstr(text, known[i][0]) != NULL) {
+            return known[i][1];
+        }
+    }
+    return "please report this with the points";
+}
+
 static int take_fault(const struct cube_message *message,
                       struct host_error *error)
 {
@@ -197,24 +254,15 @@ static int take_fault(const struct cube_message *message,
     memcpy(text, message->data, size);
     text[size] = '\0';
     return host_fail(error, HOST_CUBE, "node %u: %s; %s", message->source, text,
-                     strstr(text, "memory") != NULL
-                         ? "give the nodes more memory"
-                         : "please report this with the points");
+                     advice(text));
 }
 
 static int take(struct host_service *service,
                 const struct cube_message *message, struct host_error *error)
 {
-    struct host_node_report *report = &service->report[message->source];
     switch (message->type) {
     case NODE_READY:
-        if (message->size != sizeof report->map) {
-            return unsound(message, "is ready in another language", error);
-        }
-        memcpy(&report->map, message->data, sizeof report->map);
-        service->ready += !report->ready;
-        report->ready = true;
-        return 0;
+        return take_ready(service, message, error);
     case NODE_PONG:
         return host_detector_pong(service, message, error);
     case NODE_PAGE_REQUEST:
@@ -230,7 +278,7 @@ static int take(struct host_service *service,
     case NODE_FAULT:
         return take_fault(message, error);
     default:
-        return unsound(message, "sent what the host does not know", error);
+        return unsound(message, error, "unknown type of message");
     }
 }
 
@@ -238,7 +286,7 @@ int host_handle(struct host_service *service,
                 const struct cube_message *message, struct host_error *error)
 {
     if (message->source >= service->machine->nodes) {
-        return unsound(message, "is not of this cube", error);
+        return unsound(message, error, "not in this cube");
     }
     struct host_node *node = &service->node[message->source];
     bool expected = message->type == NODE_PONG || message->type == NODE_FAULT ||
