@@ -19,6 +19,8 @@
 #include "host/run/report.h"
 #include "host/run/run.h"
 #include "host/sim/sim.h"
+#include "host/formats/read.h"
+#include "host/formats/write.h"
 #include "host/mesh/tetrahedra.h"
 #include "host/check/verify.h"
 

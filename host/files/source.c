@@ -10,48 +10,10 @@
 
 #include "host/base/memory.h"
 
-static const struct {
-    const char *extension;
-    enum host_format format;
-} formats[] = {
-    {".xyz", HOST_XYZ},    {".txt", HOST_XYZ},    {".csv", HOST_XYZ},
-    {".node", HOST_NODE},  {".ply", HOST_PLY},    {".off", HOST_OFF},
-    {".npy", HOST_NPY},    {".vtk", HOST_VTK},    {".vtu", HOST_VTU},
-    {".vtp", HOST_VTP},    {".vts", HOST_VTS},    {".x", HOST_PLOT3D},
-    {".p3d", HOST_PLOT3D}, {".bin", HOST_PLOT3D}, {".ele", HOST_ELE},
-    {".msh", HOST_MSH},    {".mesh", HOST_MESH},
-};
-
-static bool ends_in(const char *path, size_t length, const char *extension)
-{
-    size_t n = strlen(extension);
-    return length > n && strncasecmp(path + length - n, extension, n) == 0;
-}
-
 bool host_is_packed(const char *path)
 {
-    return ends_in(path, strlen(path), ".gz");
-}
-
-static size_t plain_length(const char *path)
-{
-    return strlen(path) - (host_is_packed(path) ? 3 : 0);
-}
-
-enum host_format host_format_of(const char *path)
-{
-    size_t length = plain_length(path);
-    for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
-        if (ends_in(path, length, formats[i].extension)) {
-            return formats[i].format;
-        }
-    }
-    return HOST_UNKNOWN;
-}
-
-bool host_is_csv(const char *path)
-{
-    return ends_in(path, plain_length(path), ".csv");
+    size_t length = strlen(path), n = strlen(".gz");
+    return length > n && strcasecmp(path + length - n, ".gz") == 0;
 }
 
 int host_source_fail(const struct host_source *source, struct host_error *error,

@@ -1,4 +1,4 @@
-/* A file as bytes in memory, and what its name says about it.
+/* A file as bytes in memory.
  *
  * Memory: the bytes (of a .gz, those packed and those unpacked).  Work: one
  * pass.
@@ -24,32 +24,8 @@ struct host_source {
     size_t capacity;
 };
 
-enum host_format {
-    HOST_XYZ, /* .xyz .txt .csv, and "-" for points */
-    HOST_NODE,
-    HOST_PLY,
-    HOST_OFF,
-    HOST_NPY,
-    HOST_VTK,
-    HOST_VTU, /* .vtu .vtp .vts */
-    HOST_VTP,
-    HOST_VTS,
-    HOST_PLOT3D, /* .x .p3d .bin */
-    HOST_ELE,    /* and "-" for tetrahedra */
-    HOST_MSH,
-    HOST_MESH,
-    HOST_UNKNOWN
-};
-
-/* Whether it ends in .gz, in letters of either case. */
+/* Whether a name ends in .gz, in letters of either case. */
 bool host_is_packed(const char *path);
-
-/* By the extension, .gz apart; "-" is HOST_UNKNOWN. */
-enum host_format host_format_of(const char *path);
-
-/* Whether the extension is .csv (.gz apart): its first line may name the
- * columns. */
-bool host_is_csv(const char *path);
 
 /* Reads it whole ("-": standard input), unpacks .gz.  A missing, unreadable,
  * empty or damaged file: HOST_INPUT. */

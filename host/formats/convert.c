@@ -6,10 +6,9 @@
 #include <unistd.h>
 
 #include "claims.h"
+#include "formats.h"
 #include "host/files/output.h"
-#include "host/mesh/points.h"
-#include "host/files/source.h"
-#include "host/mesh/tetrahedra.h"
+#include "read.h"
 #include "write.h"
 
 /* Whether `out` leaves `in`, which is read, as it is. */
@@ -71,6 +70,14 @@ static int check_rows(const char *in, const struct host_tetrahedra *tets,
     return 0;
 }
 
+/* Whether writing it takes no points: a file of rows with none beside it. */
+static bool holds_rows_only(const char *path)
+{
+    const struct host_format *f = host_format_named(path);
+    return strcmp(path, "-") == 0 ||
+           (f != NULL && f->rows_only && f->beside[0] == NULL);
+}
+
 static int convert_tetrahedra(const char *in, const char *out,
                               struct host_error *error)
 {
@@ -79,7 +86,7 @@ static int convert_tetrahedra(const char *in, const char *out,
     if (host_tetrahedra_read(in, &tets, &points, error) != 0) {
         return error->code;
     }
-    bool needed = host_format_of(out) != HOST_NPY && strcmp(out, "-") != 0;
+    bool needed = !holds_rows_only(out);
     if (needed && points.count == 0) {
         points_beside(in, out, &points, error);
     }
@@ -96,15 +103,15 @@ static int convert_tetrahedra(const char *in, const char *out,
 /* Formats that hold nothing but tetrahedra, on either side, decide. */
 static bool holds_tetrahedra(const char *path)
 {
-    enum host_format format = host_format_of(path);
-    return format == HOST_ELE || format == HOST_MSH || format == HOST_MESH;
+    const struct host_format *f = host_format_named(path);
+    return f != NULL && f->read_points == NULL && f->write_points == NULL;
 }
 
-/* .vtu, .vtk and .npy may hold either. */
+/* Others may hold either. */
 static bool has_tetrahedra(const char *path)
 {
-    enum host_format format = host_format_of(path);
-    if (format != HOST_VTU && format != HOST_VTK && format != HOST_NPY) {
+    const struct host_format *f = host_format_named(path);
+    if (f == NULL || f->read_tetrahedra == NULL) {
         return false;
     }
     struct host_tetrahedra tets;
@@ -117,8 +124,9 @@ static bool has_tetrahedra(const char *path)
 
 static int convert(const char *in, const char *out, struct host_error *error)
 {
-    enum host_format to = host_format_of(out);
-    bool either = to == HOST_VTU || to == HOST_VTK || to == HOST_NPY;
+    const struct host_format *to = host_format_named(out);
+    bool either =
+        to != NULL && to->write_points != NULL && to->write_tetrahedra != NULL;
     if (check_claims(in, out, error) != 0) {
         return error->code;
     }

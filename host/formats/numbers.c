@@ -1,7 +1,7 @@
+#include "numbers.h"
+
 #include <string.h>
 #include <strings.h>
-
-#include "readers.h"
 
 static const struct {
     const char *name;
@@ -148,4 +148,21 @@ int host_append_tetrahedron(struct host_tetrahedra *tets,
     }
     host_tetrahedra_keep(tets, 1);
     return 0;
+}
+
+void host_put_whole(struct host_output *out, uint64_t value, size_t bytes,
+                    bool big)
+{
+    uint8_t byte[8];
+    for (size_t i = 0; i < bytes; i++) {
+        byte[i] = (uint8_t)(value >> 8 * (big ? bytes - 1 - i : i));
+    }
+    host_output_bytes(out, byte, bytes);
+}
+
+void host_put_double(struct host_output *out, double value, bool big)
+{
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    host_put_whole(out, bits, sizeof bits, big);
 }

@@ -9,7 +9,7 @@
 #ifndef HOST_STREAM_H
 #define HOST_STREAM_H
 
-#include "readers.h"
+#include "numbers.h"
 #include "scan.h"
 
 struct host_stream {

@@ -1,13 +1,13 @@
-/* Tetrahedra out to files: .ele (with .node, .neigh and .face beside it), .vtu,
- * .vtk, .msh (Gmsh 2.2), .mesh (Medit), .npy (m,4); "-" is .ele on standard
- * output.  A file has its name when host_output_commit gives it.
+/* Points and tetrahedra out to files, in the format that the extension says.
+ * A file has its name when host_output_commit gives it.
  *
  * Memory: 1 MiB of buffer a file; for .neigh and .face also 8 bytes a
  * tetrahedron and 8 a point.  Work: one pass, about 100 ns a tetrahedron as
  * text.
  *
  *     host_tetrahedra_map(&tets, order.row); host_tetrahedra_sort(&tets);
- *     if (host_write("out.vtu", &points, &tets, &error) != 0) ...
+ *     if (host_write("out.vtu", &points, &tets, &error) != 0)
+ *         return error.code;
  *     return host_output_commit(&error);
  */
 #ifndef HOST_WRITE_H
@@ -16,11 +16,21 @@
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
 
+enum { HOST_PATH_MAX = 4096 }; /* bytes of a file's name, by the kernel */
+
+/* Writes points, so that reading gives the same doubles; "-" is .xyz on
+ * standard output. */
+int host_points_write(const char *path, const struct host_points *points,
+                      struct host_error *error);
+
+/* Writes the tetrahedra (sorted, vertices = rows of points), and what belongs
+ * beside them; "-" is .ele on standard output. */
+int host_write(const char *path, const struct host_points *points,
+               const struct host_tetrahedra *tets, struct host_error *error);
+
 /* 0 where `path` has an extension that host_write knows, else HOST_USAGE with
  * the list of those that are allowed.  For checking before the work starts. */
 int host_write_check(const char *path, struct host_error *error);
-
-enum { HOST_PATH_MAX = 4096 }; /* bytes of a file's name, by the kernel */
 
 /* File k of those that the output `path` makes, 0 being itself; NULL: there is
  * none, or its name is too long for `size` bytes.  "-" makes none. */
@@ -29,9 +39,5 @@ const char *host_write_file(const char *path, unsigned k, char *name,
 
 /* 0 where a file can be made beside `path`, else HOST_INPUT. */
 int host_write_probe(const char *path, struct host_error *error);
-
-/* Writes the tetrahedra (sorted, vertices = rows of points). */
-int host_write(const char *path, const struct host_points *points,
-               const struct host_tetrahedra *tets, struct host_error *error);
 
 #endif

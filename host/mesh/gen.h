@@ -3,8 +3,9 @@
  *
  * Memory: the points.  Work: O(n).
  *
- *     host_gen("uniform", 20000, 1, &points, &error);
- *     host_points_write("u.npy", &points, &error); host_output_commit(&error);
+ *     struct host_points points = {0};
+ *     if (host_gen("uniform", 20000, 1, &points, &error) != 0)
+ *         return error.code;
  *     host_points_free(&points);
  */
 #ifndef HOST_GEN_H

@@ -52,17 +52,6 @@ void host_tetrahedra_sort(struct host_tetrahedra *tets);
 void host_digest(const struct host_tetrahedra *tets,
                  struct host_digest *digest);
 
-/* Reads .ele, .vtu, .vtk, .msh, .mesh, .npy (.gz allowed, "-" is .ele), rows
- * numbered from 0; rows are as in the file, neither sorted nor checked.
- * `points`, where not NULL, takes the file's points, if it has any (else it
- * stays empty). */
-struct host_points;
-int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
-                         struct host_points *points, struct host_error *error);
-int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
-                          struct host_tetrahedra *tets,
-                          struct host_points *points, struct host_error *error);
-
 void host_tetrahedra_free(struct host_tetrahedra *tets);
 
 #endif

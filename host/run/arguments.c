@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "host/base/parse.h"
+#include "host/formats/formats.h"
 
 enum {
     KEY_STRATEGY = 256,
@@ -40,10 +41,9 @@ enum {
 static const struct argp_option options_of_run[] = {
     {NULL, 0, NULL, 0, "What to compute, and where:", 1},
     {"output", 'o', "FILE", 0,
-     "Write the tetrahedra to FILE, by its extension: .ele (with .node, "
-     ".neigh and .face beside it), .vtu, .vtk, .msh, .mesh, .npy; - is .ele "
-     "on standard output. May be given several times; all files get their "
-     "names at the end of a run that succeeds, or none does",
+     "Write the tetrahedra to FILE, by its extension: %s; - is .ele on "
+     "standard output. May be given several times; all files get their names "
+     "at the end of a run that succeeds, or none does",
      1},
     {"strategy", KEY_STRATEGY, "NAME", 0,
      "sequential (one node computes, others hold pages), spatial (a region a "
@@ -419,11 +419,27 @@ static char *list_rows(const char *text, const char *(*name)(unsigned i),
     return whole;
 }
 
+/* `text` with the formats of a use in the place of its %s. */
+static char *list_formats(const char *text, enum host_use use)
+{
+    char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
+    const char *place = strstr(text, "%s");
+    host_format_help(use, list, sizeof list);
+    return asprintf(&whole, "%.*s%s%s", (int)(place - text), text, list,
+                    place + strlen("%s")) < 0
+               ? NULL
+               : whole;
+}
+
 /* As argp asks for it: `text` itself, or what is to be freed. */
 static char *complete_help(int key, const char *text, void *input)
 {
     (void)input;
     switch (key) {
+    case 'o':
+        return list_formats(text, HOST_WRITE_TETRAHEDRA);
+    case ARGP_KEY_HELP_POST_DOC:
+        return list_formats(text, HOST_READ_POINTS);
     case KEY_LINK:
         return list_rows(text, host_link_name, link_help);
     case KEY_BOARD:
@@ -443,10 +459,9 @@ static int parse_run(int argc, char **argv, unsigned flags,
         "POINTS",
         "Triangulates POINTS on a cube of nodes that it starts on this "
         "machine, and writes each output by its extension.\v"
-        "POINTS: .xyz .txt .csv .node .ply .off .npy (n,3) .vtk .vtu .vtp "
-        ".vts, PLOT3D .x .p3d .bin; .gz of any of them; - is .xyz from "
-        "standard input. Of a .csv whose first line names columns x, y and z, "
-        "in any order and among others, these are taken.\n\n"
+        "POINTS: %s; .gz of any of them; - is .xyz from standard input. Of a "
+        ".csv whose first line names columns x, y and z, in any order and "
+        "among others, these are taken.\n\n"
         "Examples:\n"
         "  incode run bunny.ply -o bunny.vtu\n"
         "  incode run points.xyz --nodes 8 --verify --stats run.json\n"

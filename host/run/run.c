@@ -12,6 +12,7 @@
 #include "host/files/output.h"
 #include "report.h"
 #include "stats.h"
+#include "host/formats/read.h"
 #include "host/formats/write.h"
 
 const char *const host_strategies[] = {[HOST_SEQUENTIAL] = "sequential",

@@ -2,11 +2,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "host/mesh/points.h"
-
-static const char *const names[] = {
-    "a.xyz", "a.csv", "a.node", "a.ply", "a.off", "a.npy", "a.vtk",   "a.vtu",
-    "a.vtp", "a.vts", "a.p3d",  "a.x",   "a.bin", "a.txt", "a.xyz.gz"};
+#include "file_name.h"
+#include "host/formats/read.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -15,10 +12,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct host_points points = {0};
     struct host_error error = {0};
+    char name[FILE_NAME_MAX];
     if (size == 0) {
         return 0;
     }
-    const char *name = names[data[0] % (sizeof names / sizeof names[0])];
+    file_name(HOST_READ_POINTS, data[0], name);
     int code = host_points_parse(name, data + 1, size - 1, &points, &error);
     if (code != error.code || (code != 0) != (error.text[0] != '\0') ||
         (code != 0 && points.count != 0)) {

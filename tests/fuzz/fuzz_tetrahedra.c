@@ -2,11 +2,8 @@
  * can always be sorted and digested. */
 #include <stdlib.h>
 
-#include "host/mesh/points.h"
-#include "host/mesh/tetrahedra.h"
-
-static const char *const names[] = {"a.ele", "a.vtu",  "a.vtk",
-                                    "a.msh", "a.mesh", "a.npy"};
+#include "file_name.h"
+#include "host/formats/read.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -17,10 +14,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct host_tetrahedra tets = {0};
     struct host_error error = {0};
     struct host_digest digest;
+    char name[FILE_NAME_MAX];
     if (size == 0) {
         return 0;
     }
-    const char *name = names[data[0] % (sizeof names / sizeof names[0])];
+    file_name(HOST_READ_TETRAHEDRA, data[0], name);
     int code =
         host_tetrahedra_parse(name, data + 1, size - 1, &tets, &points, &error);
     if (code != error.code || (code != 0) != (error.text[0] != '\0')) {

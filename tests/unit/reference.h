@@ -17,7 +17,7 @@
 #include <string.h>
 
 #include "host/mesh/adjacency.h"
-#include "host/mesh/points.h"
+#include "host/formats/read.h"
 #include "incode/predicates/predicates.h"
 
 enum { REFERENCE_FACES = 1 << 18 };

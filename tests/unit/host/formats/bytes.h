@@ -22,7 +22,7 @@
 
 #include <cmocka.h>
 
-#include "host/mesh/points.h"
+#include "host/formats/read.h"
 
 /* A file's bytes, put together piece by piece. */
 struct bytes {

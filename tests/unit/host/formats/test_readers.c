@@ -5,6 +5,7 @@
 
 #include "host/mesh/gen.h"
 #include "host/files/output.h"
+#include "host/formats/write.h"
 #include "host/files/source.h"
 #include "bytes.h"
 #include "tests/unit/reference.h"

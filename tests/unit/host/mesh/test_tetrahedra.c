@@ -18,6 +18,7 @@
 #include "host/formats/convert.h"
 #include "host/mesh/gen.h"
 #include "host/files/output.h"
+#include "host/formats/read.h"
 #include "host/formats/write.h"
 #include "tests/unit/reference.h"
 

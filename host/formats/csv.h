@@ -7,8 +7,8 @@
  *     while (csv.fields > 0 && host_scan_skip_blank_lines(&scan))
  *         host_csv_row(&csv, &scan, xyz, &error);
  */
-#ifndef HOST_READ_CSV_H
-#define HOST_READ_CSV_H
+#ifndef HOST_CSV_H
+#define HOST_CSV_H
 
 #include "scan.h"
 

@@ -5,7 +5,9 @@
 #include <string.h>
 #include <strings.h>
 
-#include "readers.h"
+#include "format.h"
+#include "numbers.h"
+#include "rows.h"
 #include "scan.h"
 
 enum { PROPERTIES_MAX = 64, ELEMENTS_MAX = 16 };
@@ -226,8 +228,8 @@ static int check_end(struct ply *ply, struct host_error *error)
     return ply->at == ply->end ? 0 : host_source_fail(ply->source, error, what);
 }
 
-int host_read_ply(const struct host_source *source, struct host_mesh *mesh,
-                  struct host_error *error)
+static int read_ply(const struct host_source *source, struct host_mesh *mesh,
+                    struct host_error *error)
 {
     struct ply ply = {
         .source = source,
@@ -254,3 +256,21 @@ int host_read_ply(const struct host_source *source, struct host_mesh *mesh,
                : host_source_fail(source, error,
                                   "there is no element 'vertex'; give points");
 }
+
+static void write_ply(struct host_output *out, const struct host_points *points)
+{
+    host_put_line(out, "ply\nformat binary_little_endian 1.0\nelement vertex ",
+                  points->count,
+                  "\nproperty double x\nproperty double y\n"
+                  "property double z\nend_header\n");
+    for (uint64_t i = 0; i < 3 * points->count; i++) {
+        host_put_double(out, points->xyz[i], false);
+    }
+}
+
+const struct host_format host_format_ply = {
+    .name = "Stanford",
+    .extensions = {".ply"},
+    .read_points = read_ply,
+    .write_points = write_ply,
+};

@@ -1,35 +1,15 @@
-/* The readers, one for each format: bytes in memory to points, tetrahedra or
- * both.  Whatever the bytes, they return; sizes that a file claims are checked
- * against its length before anything is reserved.
+/* Numbers in binary files, of every type and either byte order.
  *
- * Memory: what they append.  Work: one pass over the bytes.
+ * Memory: none.  Work: a load or a copy a number.
  *
- *     struct host_mesh mesh = {.points = &points};
- *     if (host_read_ply(&source, &mesh, &error) != 0) ...
- *     host_points_free(&points);
+ *     enum host_number type = host_number_named("Float32");
+ *     double x = host_number_at(bytes, type, true);
+ *     host_put_double(out, x, false);
  */
-#ifndef HOST_READERS_H
-#define HOST_READERS_H
+#ifndef HOST_NUMBERS_H
+#define HOST_NUMBERS_H
 
-#include "host/mesh/points.h"
-#include "host/files/source.h"
-#include "host/mesh/tetrahedra.h"
-
-/* Where a reader puts what it finds; NULL: not wanted. */
-struct host_mesh {
-    struct host_points *points;
-    struct host_tetrahedra *tets;
-};
-
-typedef int host_reader(const struct host_source *source,
-                        struct host_mesh *mesh, struct host_error *error);
-
-host_reader host_read_xyz, host_read_node, host_read_off; /* read_text.c */
-host_reader host_read_ply, host_read_npy, host_read_vtk, host_read_vtkxml;
-host_reader host_read_plot3d;
-host_reader host_read_ele, host_read_msh, host_read_mesh; /* read_tets.c */
-
-/* --- Numbers in binary files ------------------------------------------ */
+#include "format.h"
 
 enum host_number {
     HOST_F64,
@@ -63,10 +43,16 @@ int host_append_numbers(struct host_points *points, const uint8_t *from,
                         uint64_t rows, size_t stride, enum host_number type,
                         bool big, struct host_error *error);
 
-/* Appends one tetrahedron. */
+/* Appends one tetrahedron; HOST_INPUT where a vertex is no row number. */
 int host_append_tetrahedron(struct host_tetrahedra *tets,
                             const uint64_t vertex[4],
                             const struct host_source *source,
                             struct host_error *error);
+
+/* The lowest `bytes` bytes of a whole number, at most 8. */
+void host_put_whole(struct host_output *out, uint64_t value, size_t bytes,
+                    bool big);
+
+void host_put_double(struct host_output *out, double value, bool big);
 
 #endif

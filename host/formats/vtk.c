@@ -1,11 +1,14 @@
 /* VTK's legacy files, text or binary (big-endian), all kinds of data set that
  * have points. */
 #include <ctype.h>
+#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
 #include "host/base/memory.h"
-#include "readers.h"
+#include "format.h"
+#include "numbers.h"
+#include "rows.h"
 #include "scan.h"
 #include "stream.h"
 
@@ -421,8 +424,8 @@ static int read_sections(struct vtk *vtk, struct host_error *error)
     return vtk->mesh->tets != NULL ? append_cells(vtk, error) : 0;
 }
 
-int host_read_vtk(const struct host_source *source, struct host_mesh *mesh,
-                  struct host_error *error)
+static int read_vtk(const struct host_source *source, struct host_mesh *mesh,
+                    struct host_error *error)
 {
     struct vtk vtk = {
         .source = source,
@@ -437,3 +440,65 @@ int host_read_vtk(const struct host_source *source, struct host_mesh *mesh,
     }
     return error->code;
 }
+
+static void write_points(struct host_output *out,
+                         const struct host_points *points)
+{
+    host_put_line(out,
+                  "# vtk DataFile Version 3.0\nincode\nBINARY\n"
+                  "DATASET POLYDATA\nPOINTS ",
+                  points->count, " double\n");
+    for (uint64_t i = 0; i < 3 * points->count; i++) {
+        host_put_double(out, points->xyz[i], true);
+    }
+    host_output_text(out, "\n");
+}
+
+static int write_tetrahedra(struct host_output *out, struct host_output *beside,
+                            const struct host_points *points,
+                            const struct host_tetrahedra *tets,
+                            struct host_error *error)
+{
+    (void)beside;
+    char text[160];
+    if (points->count > INT32_MAX) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: legacy VTK counts points in 31 bits; write .vtu",
+                         out->path);
+    }
+    host_output_text(out, "# vtk DataFile Version 3.0\nincode\nBINARY\n"
+                          "DATASET UNSTRUCTURED_GRID\n");
+    (void)snprintf(text, sizeof text, "POINTS %llu double\n",
+                   (unsigned long long)points->count);
+    host_output_text(out, text);
+    for (uint64_t i = 0; i < 3 * points->count; i++) {
+        host_put_double(out, points->xyz[i] + 0.0, true);
+    }
+    unsigned long long words = 5 * tets->count;
+    (void)snprintf(text, sizeof text, "\nCELLS %llu %llu\n",
+                   (unsigned long long)tets->count, words);
+    host_output_text(out, text);
+    for (uint64_t i = 0; i < tets->count; i++) {
+        host_put_whole(out, 4, 4, true);
+        for (int k = 0; k < 4; k++) {
+            host_put_whole(out, tets->v[i][k], 4, true);
+        }
+    }
+    (void)snprintf(text, sizeof text, "\nCELL_TYPES %llu\n",
+                   (unsigned long long)tets->count);
+    host_output_text(out, text);
+    for (uint64_t i = 0; i < tets->count; i++) {
+        host_put_whole(out, 10, 4, true);
+    }
+    host_output_text(out, "\n");
+    return error->code;
+}
+
+const struct host_format host_format_vtk = {
+    .name = "legacy VTK",
+    .extensions = {".vtk"},
+    .read_points = read_vtk,
+    .read_tetrahedra = read_vtk,
+    .write_points = write_points,
+    .write_tetrahedra = write_tetrahedra,
+};

@@ -4,7 +4,8 @@
  * float or double, iblank or not. */
 #include <string.h>
 
-#include "readers.h"
+#include "format.h"
+#include "numbers.h"
 
 enum { BLOCKS_MAX = 65536 };
 
@@ -119,8 +120,8 @@ static bool walk(const struct host_source *source, struct variant v,
     return c.at == source->bytes;
 }
 
-int host_read_plot3d(const struct host_source *source, struct host_mesh *mesh,
-                     struct host_error *error)
+static int read_plot3d(const struct host_source *source, struct host_mesh *mesh,
+                       struct host_error *error)
 {
     for (unsigned bits = 0; bits < 32; bits++) {
         /* Of two variants that fit, marks are the better evidence, and
@@ -139,3 +140,9 @@ int host_read_plot3d(const struct host_source *source, struct host_mesh *mesh,
                             "no variant of PLOT3D accounts for every byte; "
                             "the file is cut short, or give a binary 3D grid");
 }
+
+const struct host_format host_format_plot3d = {
+    .name = "PLOT3D",
+    .extensions = {".x", ".p3d", ".bin"},
+    .read_points = read_plot3d,
+};

@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "readers.h"
+#include "format.h"
+#include "numbers.h"
 
 struct npy {
     enum host_number type;
@@ -176,8 +177,8 @@ static int read_tetrahedra(const struct host_source *source,
     return 0;
 }
 
-int host_read_npy(const struct host_source *source, struct host_mesh *mesh,
-                  struct host_error *error)
+static int read_npy(const struct host_source *source, struct host_mesh *mesh,
+                    struct host_error *error)
 {
     struct npy npy = {.type = HOST_NO_NUMBER};
     if (parse_header(source, &npy, error) != 0) {
@@ -188,3 +189,58 @@ int host_read_npy(const struct host_source *source, struct host_mesh *mesh,
     }
     return read_points(source, &npy, mesh->points, error);
 }
+
+/* The header of an array of `columns`, so long that numbers are aligned to 64.
+ */
+static void write_header(struct host_output *out, const char *type,
+                         uint64_t rows, int columns)
+{
+    char text[160];
+    int n = snprintf(text, sizeof text,
+                     "{'descr': '%s', 'fortran_order': False, "
+                     "'shape': (%llu, %d), }",
+                     type, (unsigned long long)rows, columns);
+    int padded = (10 + n + 1 + 63) / 64 * 64 - 10;
+    host_output_bytes(out, "\x93NUMPY\x01\x00", 8);
+    host_put_whole(out, (uint64_t)padded, 2, false);
+    host_output_text(out, text);
+    for (; n < padded - 1; n++) {
+        host_output_text(out, " ");
+    }
+    host_output_text(out, "\n");
+}
+
+static void write_points(struct host_output *out,
+                         const struct host_points *points)
+{
+    write_header(out, "<f8", points->count, 3);
+    for (uint64_t i = 0; i < 3 * points->count; i++) {
+        host_put_double(out, points->xyz[i], false);
+    }
+}
+
+static int write_tetrahedra(struct host_output *out, struct host_output *beside,
+                            const struct host_points *points,
+                            const struct host_tetrahedra *tets,
+                            struct host_error *error)
+{
+    (void)beside;
+    (void)points;
+    write_header(out, "<u4", tets->count, 4);
+    for (uint64_t i = 0; i < tets->count; i++) {
+        for (int k = 0; k < 4; k++) {
+            host_put_whole(out, tets->v[i][k], 4, false);
+        }
+    }
+    return error->code;
+}
+
+const struct host_format host_format_npy = {
+    .name = "NumPy",
+    .extensions = {".npy"},
+    .read_points = read_npy,
+    .read_tetrahedra = read_npy,
+    .write_points = write_points,
+    .write_tetrahedra = write_tetrahedra,
+    .rows_only = true,
+};

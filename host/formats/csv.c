@@ -1,4 +1,4 @@
-#include "read_csv.h"
+#include "csv.h"
 
 #include <string.h>
 #include <strings.h>

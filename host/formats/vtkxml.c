@@ -6,7 +6,9 @@
 #include <string.h>
 #include <strings.h>
 
-#include "readers.h"
+#include "format.h"
+#include "numbers.h"
+#include "rows.h"
 #include "scan.h"
 #include "stream.h"
 #include "vtk_array.h"
@@ -369,8 +371,8 @@ static void parse(struct xml *x, size_t bytes)
     }
 }
 
-int host_read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
-                     struct host_error *error)
+static int read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
+                       struct host_error *error)
 {
     struct xml x = {.source = source,
                     .mesh = mesh,
@@ -388,3 +390,151 @@ int host_read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
     free(x.text);
     return error->code;
 }
+
+/* .vtu and .vtp: one cell a point, so that ParaView shows them. */
+static void write_cells_of_points(struct host_output *out,
+                                  const struct host_points *points,
+                                  bool polydata)
+{
+    uint64_t n = points->count;
+    host_output_text(out, "<?xml version=\"1.0\"?>\n<VTKFile type=\"");
+    host_output_text(out, polydata ? "PolyData" : "UnstructuredGrid");
+    host_output_text(out, "\" version=\"1.0\" byte_order=\"LittleEndian\" "
+                          "header_type=\"UInt64\">\n<");
+    host_output_text(out, polydata ? "PolyData" : "UnstructuredGrid");
+    host_put_line(out, ">\n<Piece NumberOfPoints=\"", n,
+                  polydata ? "\" NumberOfVerts=\"" : "\" NumberOfCells=\"");
+    host_put_line(
+        out, "", n,
+        "\">\n<Points>\n<DataArray type=\"Float64\" Name=\"Points\" "
+        "NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\n"
+        "</Points>\n");
+    host_output_text(out, polydata ? "<Verts>\n" : "<Cells>\n");
+    host_put_line(
+        out,
+        "<DataArray type=\"Int64\" Name=\"connectivity\" format=\"appended\" "
+        "offset=\"",
+        8 + 24 * n, "\"/>\n");
+    host_put_line(
+        out,
+        "<DataArray type=\"Int64\" Name=\"offsets\" format=\"appended\" "
+        "offset=\"",
+        16 + 32 * n, "\"/>\n");
+    if (!polydata) {
+        host_put_line(
+            out,
+            "<DataArray type=\"UInt8\" Name=\"types\" format=\"appended\" "
+            "offset=\"",
+            24 + 40 * n, "\"/>\n");
+    }
+    host_output_text(out, polydata ? "</Verts>\n</Piece>\n</PolyData>\n"
+                                   : "</Cells>\n</Piece>\n"
+                                     "</UnstructuredGrid>\n");
+    host_output_text(out, "<AppendedData encoding=\"raw\">\n_");
+    host_put_whole(out, 24 * n, 8, false);
+    for (uint64_t i = 0; i < 3 * n; i++) {
+        host_put_double(out, points->xyz[i], false);
+    }
+    for (uint64_t array = 0; array < 2; array++) {
+        host_put_whole(out, 8 * n, 8, false);
+        for (uint64_t i = 0; i < n; i++) {
+            host_put_whole(out, i + array, 8, false);
+        }
+    }
+    host_put_whole(out, n, 8, false);
+    for (uint64_t i = 0; i < n && !polydata; i++) {
+        host_put_whole(out, 1, 1, false); /* VTK_VERTEX */
+    }
+    host_output_text(out, "\n</AppendedData>\n</VTKFile>\n");
+}
+
+static void write_vtu(struct host_output *out, const struct host_points *points)
+{
+    write_cells_of_points(out, points, false);
+}
+
+static void write_vtp(struct host_output *out, const struct host_points *points)
+{
+    write_cells_of_points(out, points, true);
+}
+
+/* Appended raw data: what ParaView loads fastest. */
+static int write_tetrahedra(struct host_output *out, struct host_output *beside,
+                            const struct host_points *points,
+                            const struct host_tetrahedra *tets,
+                            struct host_error *error)
+{
+    (void)beside;
+    uint64_t m = tets->count, n = points->count;
+    size_t word = 4 * m < INT32_MAX && n < INT32_MAX ? 4 : 8;
+    const char *type = word == 4 ? "Int32" : "Int64";
+    uint64_t bytes[4] = {24 * n, 4 * m * word, m * word, m};
+    uint64_t at[3] = {8 + bytes[0]}; /* past a length and its bytes */
+    at[1] = at[0] + 8 + bytes[1];
+    at[2] = at[1] + 8 + bytes[2];
+    char text[1600];
+    (void)snprintf(
+        text, sizeof text,
+        "<?xml version=\"1.0\"?>\n"
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
+        "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+        "<UnstructuredGrid>\n"
+        "<Piece NumberOfPoints=\"%llu\" NumberOfCells=\"%llu\">\n"
+        "<Points>\n<DataArray type=\"Float64\" Name=\"Points\" "
+        "NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\n"
+        "</Points>\n<Cells>\n"
+        "<DataArray type=\"%s\" Name=\"connectivity\" format=\"appended\" "
+        "offset=\"%llu\"/>\n"
+        "<DataArray type=\"%s\" Name=\"offsets\" format=\"appended\" "
+        "offset=\"%llu\"/>\n"
+        "<DataArray type=\"UInt8\" Name=\"types\" format=\"appended\" "
+        "offset=\"%llu\"/>\n"
+        "</Cells>\n</Piece>\n</UnstructuredGrid>\n"
+        "<AppendedData encoding=\"raw\">\n_",
+        (unsigned long long)n, (unsigned long long)m, type,
+        (unsigned long long)at[0], type, (unsigned long long)at[1],
+        (unsigned long long)at[2]);
+    host_output_text(out, text);
+    host_put_whole(out, bytes[0], 8, false);
+    for (uint64_t i = 0; i < 3 * n; i++) {
+        host_put_double(out, points->xyz[i] + 0.0, false);
+    }
+    host_put_whole(out, bytes[1], 8, false);
+    for (uint64_t i = 0; i < m; i++) {
+        for (int k = 0; k < 4; k++) {
+            host_put_whole(out, tets->v[i][k], word, false);
+        }
+    }
+    host_put_whole(out, bytes[2], 8, false);
+    for (uint64_t i = 0; i < m; i++) {
+        host_put_whole(out, 4 * (i + 1), word, false);
+    }
+    host_put_whole(out, bytes[3], 8, false);
+    for (uint64_t i = 0; i < m; i++) {
+        host_output_bytes(out, "\x0a", 1); /* VTK_TETRA */
+    }
+    host_output_text(out, "\n</AppendedData>\n</VTKFile>\n");
+    return error->code;
+}
+
+const struct host_format host_format_vtu = {
+    .name = "VTK XML",
+    .extensions = {".vtu"},
+    .read_points = read_vtkxml,
+    .read_tetrahedra = read_vtkxml,
+    .write_points = write_vtu,
+    .write_tetrahedra = write_tetrahedra,
+};
+
+const struct host_format host_format_vtp = {
+    .name = "VTK XML",
+    .extensions = {".vtp"},
+    .read_points = read_vtkxml,
+    .write_points = write_vtp,
+};
+
+const struct host_format host_format_vts = {
+    .name = "VTK XML",
+    .extensions = {".vts"},
+    .read_points = read_vtkxml,
+};

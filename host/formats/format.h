@@ -1,0 +1,63 @@
+/* What a format is: a name, the extensions by which files are known to have
+ * it, and what reads and writes points and tetrahedra in it.  A new format is a
+ * file of this room that defines one, host_format_NAME, and a row of formats.c.
+ *
+ * A reader takes bytes in memory.  Whatever the bytes, it returns; sizes that a
+ * file claims are checked against its length before anything is reserved.
+ *
+ * Memory: a reader's, what it appends; a writer's, none.  Work: one pass.
+ *
+ *     const struct host_format host_format_xyz = {
+ *         .name = "text", .extensions = {".xyz", ".txt"},
+ *         .read_points = read_xyz, .write_points = write_xyz};
+ */
+#ifndef HOST_FORMAT_H
+#define HOST_FORMAT_H
+
+#include "host/files/output.h"
+#include "host/files/source.h"
+#include "host/mesh/points.h"
+#include "host/mesh/tetrahedra.h"
+
+enum { HOST_EXTENSIONS_MAX = 4, HOST_BESIDE_MAX = 4 };
+
+/* Where a reader puts what it finds; NULL: not wanted.  Of the two, a reader of
+ * points has points, and a reader of tetrahedra has tets. */
+struct host_mesh {
+    struct host_points *points;
+    struct host_tetrahedra *tets;
+};
+
+/* Appends what the file holds; coordinates need not be finite.  0, or
+ * HOST_INPUT with the place. */
+typedef int host_reader(const struct host_source *source,
+                        struct host_mesh *mesh, struct host_error *error);
+
+/* The same doubles come back when it is read. */
+typedef void host_points_writer(struct host_output *out,
+                                const struct host_points *points);
+
+/* tets: sorted, vertices = rows of points.  beside: the outputs of the format's
+ * `beside`, in that order; NULL: none of them is wanted.  0, or an error. */
+typedef int host_tetrahedra_writer(struct host_output *out,
+                                   struct host_output *beside,
+                                   const struct host_points *points,
+                                   const struct host_tetrahedra *tets,
+                                   struct host_error *error);
+
+struct host_format {
+    const char *name;
+    /* With their dots, in lower case; a file may have them in either case, and
+     * .gz behind them where it is read. */
+    const char *extensions[HOST_EXTENSIONS_MAX + 1];
+    /* NULL: the format has none. */
+    host_reader *read_points, *read_tetrahedra;
+    host_points_writer *write_points;
+    host_tetrahedra_writer *write_tetrahedra;
+    /* Of the files that belong to an output of tetrahedra, and are written
+     * beside it. */
+    const char *beside[HOST_BESIDE_MAX + 1];
+    bool rows_only; /* a file of tetrahedra holds no points */
+};
+
+#endif

@@ -1,0 +1,35 @@
+/* A name with one of the extensions that the table of formats reads; packed
+ * for the highest quarter of the choices.
+ *
+ *     char name[FILE_NAME_MAX];
+ *     file_name(HOST_READ_POINTS, data[0], name);
+ */
+#ifndef FUZZ_FILE_NAME_H
+#define FUZZ_FILE_NAME_H
+
+#include <stdio.h>
+#include <string.h>
+
+#include "host/formats/formats.h"
+
+enum { FILE_NAME_MAX = 32, FILE_NAME_PACKED = 192 };
+
+/* choice: of 256. */
+static inline void file_name(enum host_use use, unsigned choice,
+                             char name[FILE_NAME_MAX])
+{
+    char list[HOST_FORMAT_LIST_MAX];
+    unsigned count = 1;
+    host_format_list(use, list, sizeof list);
+    for (const char *c = list; *c != '\0'; c++) {
+        count += *c == ' ';
+    }
+    const char *at = list;
+    for (unsigned skip = choice % count; skip > 0; skip--) {
+        at = strchr(at, ' ') + 1;
+    }
+    (void)snprintf(name, FILE_NAME_MAX, "a%.*s%s", (int)strcspn(at, " "), at,
+                   choice >= FILE_NAME_PACKED ? ".gz" : "");
+}
+
+#endif
