@@ -1,8 +1,11 @@
-#include "link_internal.h"
+#include "link.h"
 
 #include <string.h>
 
 #include "check.h"
+#include "link_receive.h"
+#include "link_send.h"
+#include "link_session.h"
 
 /* --- memory -------------------------------------------------------------- */
 
@@ -147,17 +150,13 @@ struct link *link_init(void *memory, size_t bytes,
 
 /* --- messages ------------------------------------------------------------ */
 
-static unsigned used(const struct link *link)
-{
-    return (uint16_t)(link->send.end - link->send.first);
-}
-
 unsigned link_room(const struct link *link, size_t size)
 {
     if (link->closing || link->closed) {
         return 0;
     }
-    return (link->config.window - used(link)) / fragments(&link->config, size);
+    return (link->config.window - link_used(link)) /
+           fragments(&link->config, size);
 }
 
 /* A message in two parts, from which fragments are cut. */
@@ -195,7 +194,7 @@ int link_write(struct link *link, const void *head, size_t head_size,
     link->statistics.payload_sent += left;
     bool more = true;
     while (more) {
-        unsigned at = s->head + used(link);
+        unsigned at = s->head + link_used(link);
         at = at >= link->config.window ? at - link->config.window : at;
         struct link_send_slot *slot = &s->slots[at];
         size_t part = left < link->config.frame_payload
@@ -209,8 +208,8 @@ int link_write(struct link *link, const void *head, size_t head_size,
         slot->state = LINK_WAITING;
         s->end++;
     }
-    if (used(link) > link->statistics.send_high_water) {
-        link->statistics.send_high_water = used(link);
+    if (link_used(link) > link->statistics.send_high_water) {
+        link->statistics.send_high_water = link_used(link);
     }
     return 0;
 }
@@ -267,12 +266,12 @@ unsigned link_forget_unsent(struct link *link)
     bool inside = s->inside;
     /* What is begun must end. */
     while (inside) {
-        LINK_ASSERT(offset < used(link));
+        LINK_ASSERT(offset < link_used(link));
         unsigned at = s->head + offset++;
         at = at >= link->config.window ? at - link->config.window : at;
         inside = (s->slots[at].flags & LINK_MORE) != 0;
     }
-    for (unsigned i = offset; i < used(link); i++) {
+    for (unsigned i = offset; i < link_used(link); i++) {
         unsigned at = s->head + i;
         at = at >= link->config.window ? at - link->config.window : at;
         count += (s->slots[at].flags & LINK_MORE) == 0;
@@ -306,13 +305,148 @@ bool link_take_datagram(struct link *link, struct link_message *datagram,
     return true;
 }
 
-/* --- state --------------------------------------------------------------- */
+/* --- joining session, sender and receiver -------------------------------- */
+
+/* What a frame's session means for the two windows. */
+static void enter(struct link *link, enum link_session session)
+{
+    if (session == LINK_FOREIGN || session == LINK_PRESENT) {
+        return;
+    }
+    if (session == LINK_RESUMED) {
+        link_send_resume(link);
+    } else {
+        uint8_t credit = link->candidate.credit;
+        if (session == LINK_RESTARTED) {
+            link_send_reset(link, credit);
+        } else {
+            link->send.limit = (uint16_t)(link->send.first + credit);
+        }
+        link_receive_reset(link, (uint16_t)link->peer_epoch);
+    }
+    link->receive.ack_now = true;
+    link->send.timer_us = link->now_us;
+    link->send.backoff = 0;
+}
+
+static void on_frame(struct link *link, struct link_frame *frame)
+{
+    const struct frame_header *header = &frame->header;
+    if (header->kind != LINK_HELLO) {
+        enum link_session session = link_accept_session(link, header->session);
+        if (session == LINK_FOREIGN) {
+            link->statistics.stale++;
+            link_greet(link);
+            return;
+        }
+        enter(link, session);
+        link->heard_us = link->kept_us = link->now_us;
+    }
+    switch (link_take_frame(link, frame)) {
+    case LINK_GREETED:
+        enter(link, link_on_hello(link, header, frame->payload));
+        break;
+    case LINK_ACKNOWLEDGED:
+        link_on_acknowledge(link, header, frame->sack);
+        break;
+    case LINK_NOTHING:
+        break;
+    }
+}
+
+/* Takes the whole frames among the bytes at hand, at most `most`. */
+static int take_frames(struct link *link, int most)
+{
+    struct link_frame frame;
+    int count = 0;
+    while (count < most) {
+        enum link_search found = link_find_frame(link, &frame);
+        if (found == LINK_NO_FRAME) {
+            break;
+        }
+        if (found == LINK_FOUND) {
+            on_frame(link, &frame);
+        }
+        count++;
+    }
+    return count;
+}
+
+int link_poll_receive(struct link *link, uint64_t now_us)
+{
+    int most = link->config.window + 2;
+    link->now_us = now_us;
+    if (link->closing && link->closed) {
+        return 0;
+    }
+    int count = take_frames(link, most);
+    for (int calls = 0; calls < link->config.window && count < most; calls++) {
+        enum link_fill fill = link_fill(link);
+        if (fill == LINK_FILL_CLOSED) {
+            link_pipe_lost(link);
+            break;
+        }
+        count += take_frames(link, most - count);
+        if (fill == LINK_FILL_SOME) {
+            break;
+        }
+    }
+    return count;
+}
+
+/* One frame more, the most urgent; false: nothing to say. */
+static bool stage_one(struct link *link)
+{
+    uint8_t hello[LINK_HELLO_SIZE];
+    if (!link_hello_due(link)) {
+        return link_stage_frame(link);
+    }
+    link_make_hello(link, hello);
+    link_stage_hello(link, hello);
+    return true;
+}
+
+/* Gives the pipe what is staged; false: it does not take all. */
+static bool flush(struct link *link)
+{
+    enum link_flush status = link_flush(link);
+    if (status == LINK_FLUSH_CLOSED) {
+        link_pipe_lost(link);
+    }
+    return status == LINK_FLUSH_DONE;
+}
+
+int link_poll_send(struct link *link, uint64_t now_us)
+{
+    int count = 0, most = link->config.window + 2;
+    link->now_us = now_us;
+    if (link->closing && !link->closed && now_us >= link->deadline_us) {
+        link->closed = true;
+        link->up = false;
+    }
+    if (!link->pipe_up || (link->closing && link->closed) || !flush(link)) {
+        return 0;
+    }
+    link_run_timer(link);
+    while (count < most) {
+        int before = count;
+        while (count < most && link_staging_room(link) && stage_one(link)) {
+            count++;
+        }
+        if (!flush(link) || count == before) {
+            break;
+        }
+    }
+    return count;
+}
 
 int link_poll(struct link *link, uint64_t now_us)
 {
     int count = link_poll_receive(link, now_us);
     return count + link_poll_send(link, now_us);
 }
+
+/* --- state --------------------------------------------------------------- */
 
 void link_close(struct link *link, uint64_t deadline_us)
 {
@@ -323,7 +457,7 @@ void link_close(struct link *link, uint64_t deadline_us)
 
 bool link_idle(const struct link *link)
 {
-    return used(link) == 0;
+    return link_used(link) == 0;
 }
 
 enum link_state link_state(const struct link *link)

@@ -1,14 +1,15 @@
-/* What the parts of a link share: link.c (memory, messages, timers), session.c
- * (handshake), link_send.c and link_receive.c (the two windows).  Not for
- * others.
+/* The data of a link.  link_session.c (the handshake), link_send.c and
+ * link_receive.c (the two windows) know it, and nothing of each other; link.c
+ * alone joins them.  Not for others.
  *
  * Memory and work: see link.h.
  *
- *     link_note_heard(link, &header, sack);
+ *     free_slots = link_credit(link);
  */
 #ifndef TRANSPORT_LINK_INTERNAL_H
 #define TRANSPORT_LINK_INTERNAL_H
 
+#include "check.h"
 #include "frame.h"
 #include "link.h"
 
@@ -46,7 +47,7 @@ struct link_candidate {
     uint32_t epoch; /* 0: none */
     uint32_t session_in;
     uint16_t window;
-    uint8_t credit;
+    uint8_t credit; /* stays when its session has begun */
     uint8_t hellos_left;
 };
 
@@ -132,28 +133,32 @@ static inline size_t link_frame_bytes(const struct link_config *config)
                              : LINK_DATAGRAM_MAX);
 }
 
-/* session.c */
-void link_greet(struct link *link);
-void link_on_hello(struct link *link, const struct frame_header *header,
-                   const uint8_t *hello);
-bool link_accept_session(struct link *link, uint32_t session);
-void link_pack_hello(const struct link *link, uint8_t *hello);
-void link_pipe_lost(struct link *link);
-bool link_hello_due(const struct link *link);
-bool link_refuses(const struct link *link);
+static inline bool link_refuses(const struct link *link)
+{
+    return link->peer.refusal != LINK_FITS;
+}
 
-/* link_send.c */
-void link_on_acknowledge(struct link *link, const struct frame_header *header,
-                         uint64_t sack);
-void link_send_reset(struct link *link, uint8_t credit);
-void link_send_resume(struct link *link);
-uint32_t link_timeout_us(const struct link *link);
-bool link_may_send(const struct link *link);
-bool link_ack_due(const struct link *link);
+/* Slots of the send window that hold frames. */
+static inline unsigned link_used(const struct link *link)
+{
+    return (uint16_t)(link->send.end - link->send.first);
+}
 
-/* link_receive.c */
-void link_receive_reset(struct link *link, uint16_t first);
-unsigned link_credit(const struct link *link);
-uint64_t link_sack(const struct link *link);
+/* Free slots of the receive window: what the peer may send. */
+static inline unsigned link_credit(const struct link *link)
+{
+    LINK_ASSERT(link->receive.ready <= link->config.window);
+    return (unsigned)link->config.window - link->receive.ready;
+}
+
+/* The slot of frame `offset` after those that came in order. */
+static inline unsigned link_slot_of(const struct link *link, unsigned offset)
+{
+    unsigned slot = (unsigned)link->receive.head + link->receive.ready + offset;
+    while (slot >= link->config.window) {
+        slot -= link->config.window;
+    }
+    return slot;
+}
 
 #endif

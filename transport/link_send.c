@@ -1,4 +1,4 @@
-#include "link_internal.h"
+#include "link_send.h"
 
 #include <string.h>
 
@@ -154,11 +154,10 @@ void link_on_acknowledge(struct link *link, const struct frame_header *header,
     }
 }
 
-/* A new peer knows nothing of what was sent to the old one. */
 void link_send_reset(struct link *link, uint8_t credit)
 {
     struct link_sender *s = &link->send;
-    unsigned queued = (uint16_t)(s->end - s->first);
+    unsigned queued = link_used(link);
     for (unsigned i = 0; i < queued; i++) {
         bool more = (s->slots[slot_at(link, i)].flags & LINK_MORE) != 0;
         link->statistics.messages_dropped += !more;
@@ -170,7 +169,6 @@ void link_send_reset(struct link *link, uint8_t credit)
     s->inside = false;
 }
 
-/* What was on its way when the pipe broke is not coming. */
 void link_send_resume(struct link *link)
 {
     mark_lost(link, link->send.order);
@@ -242,10 +240,26 @@ static void stage(struct link *link, unsigned kind, unsigned flags,
     link->statistics.frames_sent++;
 }
 
+/* Of what came: bit i: frame next + 1 + i is here. */
+static uint64_t sack_of(const struct link *link)
+{
+    uint64_t bits = 0;
+    unsigned credit = link_credit(link);
+    if (link->receive.early == 0) {
+        return 0;
+    }
+    for (unsigned i = 1; i < credit; i++) {
+        if (link->receive.slots[link_slot_of(link, i)].full) {
+            bits |= (uint64_t)1 << (i - 1);
+        }
+    }
+    return bits;
+}
+
 static void stage_ack(struct link *link, unsigned flags)
 {
     uint8_t bytes[LINK_SACK_SIZE];
-    uint64_t sack = link_sack(link);
+    uint64_t sack = sack_of(link);
     for (unsigned i = 0; i < sizeof bytes; i++) {
         bytes[i] = (uint8_t)(sack >> 8 * i);
     }
@@ -294,19 +308,10 @@ static void stage_next(struct link *link)
     s->next++;
 }
 
-static void stage_hello(struct link *link)
+void link_stage_hello(struct link *link, const uint8_t hello[LINK_HELLO_SIZE])
 {
-    uint8_t hello[LINK_HELLO_SIZE];
-    struct link_candidate *c = &link->candidate;
-    link_pack_hello(link, hello);
-    stage(link, LINK_HELLO, 0, link->send.first, hello, sizeof hello);
-    link->hello_us = link->now_us;
-    link->hello_now = false;
-    link->intruder = 0;
+    stage(link, LINK_HELLO, 0, link->send.first, hello, LINK_HELLO_SIZE);
     link->statistics.hellos_sent++;
-    if (c->epoch != 0 && c->hellos_left-- == 0) {
-        c->epoch = 0;
-    }
 }
 
 static void stage_datagram(struct link *link)
@@ -341,9 +346,7 @@ static void timeout(struct link *link)
     }
 }
 
-/* The oldest frame goes again when nothing was heard of it for long; a sender
- * without credits asks, as the frame that brought them may be lost. */
-static void run_timer(struct link *link)
+void link_run_timer(struct link *link)
 {
     struct link_sender *s = &link->send;
     bool waits = in_flight(link) > 0;
@@ -373,8 +376,7 @@ static void run_timer(struct link *link)
 
 /* --- bytes --------------------------------------------------------------- */
 
-/* Gives the pipe what is staged; false: it does not take all. */
-static bool flush(struct link *link)
+enum link_flush link_flush(struct link *link)
 {
     struct link_bytes_out *out = &link->out;
     const struct link_pipe *pipe = &link->config.pipe;
@@ -383,8 +385,7 @@ static bool flush(struct link *link)
         size_t left = out->end - out->begin;
         int taken = pipe->send(pipe->context, out->bytes + out->begin, left);
         if (taken < 0) {
-            link_pipe_lost(link);
-            return false;
+            return LINK_FLUSH_CLOSED;
         }
         LINK_ASSERT((size_t)taken <= left);
         out->begin += (size_t)taken;
@@ -392,14 +393,14 @@ static bool flush(struct link *link)
         if ((size_t)taken < left) {
             link->stalled = true;
             link->statistics.stalled++;
-            return false;
+            return LINK_FLUSH_STALLED;
         }
     }
     out->begin = out->end = 0;
-    return true;
+    return LINK_FLUSH_DONE;
 }
 
-static bool staging_room(const struct link *link)
+bool link_staging_room(const struct link *link)
 {
     return link->buffer_bytes - link->out.end >=
            link_frame_bytes(&link->config) + FRAME_SLACK + 1;
@@ -414,20 +415,16 @@ static bool stage_control(struct link *link)
         stage_ack(link, 0);
         return true;
     }
-    if (link->closing && link_idle(link) && bye_us >= link->config.hello_us) {
+    if (link->closing && link_used(link) == 0 &&
+        bye_us >= link->config.hello_us) {
         stage_bye(link, LINK_ASK);
         return true;
     }
     return false;
 }
 
-/* One frame more, the most urgent; false: nothing to say. */
-static bool stage_one(struct link *link)
+bool link_stage_frame(struct link *link)
 {
-    if (link_hello_due(link)) {
-        stage_hello(link);
-        return true;
-    }
     if (link->bye_due) {
         stage_bye(link, 0);
         link->bye_due = false;
@@ -448,28 +445,4 @@ static bool stage_one(struct link *link)
         return stage_control(link);
     }
     return true;
-}
-
-int link_poll_send(struct link *link, uint64_t now_us)
-{
-    int count = 0, most = link->config.window + 2;
-    link->now_us = now_us;
-    if (link->closing && !link->closed && now_us >= link->deadline_us) {
-        link->closed = true;
-        link->up = false;
-    }
-    if (!link->pipe_up || (link->closing && link->closed) || !flush(link)) {
-        return 0;
-    }
-    run_timer(link);
-    while (count < most) {
-        int before = count;
-        while (count < most && staging_room(link) && stage_one(link)) {
-            count++;
-        }
-        if (!flush(link) || count == before) {
-            break;
-        }
-    }
-    return count;
 }

@@ -1,9 +1,4 @@
-#include "link_internal.h"
-
-bool link_refuses(const struct link *link)
-{
-    return link->peer.refusal != LINK_FITS;
-}
+#include "link_session.h"
 
 static void put16(uint8_t *p, unsigned value)
 {
@@ -27,7 +22,7 @@ static uint32_t get32(const uint8_t *p)
     return get16(p) | (uint32_t)get16(p + 2) << 16;
 }
 
-void link_pack_hello(const struct link *link, uint8_t *hello)
+static void pack_hello(const struct link *link, uint8_t *hello)
 {
     const struct link_config *c = &link->config;
     bool candidate = link->candidate.epoch != 0;
@@ -159,76 +154,55 @@ static bool intrudes(const struct link *link, uint32_t epoch)
            link->now_us - link->kept_us <= link->config.silence_us;
 }
 
-static void come_up(struct link *link)
+/* The peer is another start than before, if there was one. */
+static enum link_session start_session(struct link *link)
 {
-    link->up = true;
-    link->receive.ack_now = true;
-    link->send.timer_us = link->now_us;
-    link->send.backoff = 0;
-}
-
-/* The peer is another start than before, if there was one: what was on its way
- * to the old one is lost, and counted. */
-static void start_session(struct link *link)
-{
-    const struct link_candidate *c = &link->candidate;
+    struct link_candidate *c = &link->candidate;
     bool first = link->peer_epoch == 0;
     link->peer_epoch = c->epoch;
     link->peer_window = c->window;
     link->session_in = c->session_in;
     link->session_out = session_to(link, c->epoch);
     link->statistics.sessions++;
-    if (!first) {
-        link_send_reset(link, c->credit);
-    } else {
-        link->send.limit = (uint16_t)(link->send.first + c->credit);
-    }
-    link_receive_reset(link, (uint16_t)c->epoch);
-    link->candidate.epoch = 0;
+    c->epoch = 0;
     link->kept_us = link->now_us;
     link->closed = false;
     link->bye_due = false;
-    come_up(link);
+    link->up = true;
+    return first ? LINK_BEGUN : LINK_RESTARTED;
 }
 
-static void resume_session(struct link *link)
-{
-    link->statistics.resumed++;
-    link_send_resume(link);
-    come_up(link);
-}
-
-/* Whether a frame of that session, its header sound, is one to look at.  It
- * proves that its sender knows both epochs. */
-bool link_accept_session(struct link *link, uint32_t session)
+enum link_session link_accept_session(struct link *link, uint32_t session)
 {
     if (link_refuses(link)) {
-        return false;
+        return LINK_FOREIGN;
     }
     if (link->peer_epoch != 0 && session == link->session_in) {
-        if (!link->up && !link->closed) {
-            resume_session(link);
+        if (link->up || link->closed) {
+            return LINK_PRESENT;
         }
-        return true;
+        link->statistics.resumed++;
+        link->up = true;
+        return LINK_RESUMED;
     }
     if (link->candidate.epoch != 0 && session == link->candidate.session_in) {
-        start_session(link);
-        return true;
+        return start_session(link);
     }
-    return false;
+    return LINK_FOREIGN;
 }
 
-void link_on_hello(struct link *link, const struct frame_header *header,
-                   const uint8_t *hello)
+enum link_session link_on_hello(struct link *link,
+                                const struct frame_header *header,
+                                const uint8_t hello[LINK_HELLO_SIZE])
 {
     uint32_t epoch = get32(hello + 8), mine = get32(hello + 12);
     if (epoch == 0 || link->closing) {
-        return;
+        return LINK_FOREIGN;
     }
     if (intrudes(link, epoch)) {
         link->intruder = epoch;
         link->hello_now = true;
-        return;
+        return LINK_FOREIGN;
     }
     link->heard_us = link->now_us;
     if (epoch == link->peer_epoch) {
@@ -237,7 +211,7 @@ void link_on_hello(struct link *link, const struct frame_header *header,
     describe_peer(link, hello);
     if (link_refuses(link)) {
         link->up = false;
-        return;
+        return LINK_FOREIGN;
     }
     if (epoch != link->peer_epoch) {
         struct link_candidate *c = &link->candidate;
@@ -249,13 +223,12 @@ void link_on_hello(struct link *link, const struct frame_header *header,
     }
     if (mine != link->config.epoch) {
         link->hello_now = true;
-        return;
+        return LINK_FOREIGN;
     }
-    link_accept_session(link, session_from(link, epoch));
     link->receive.ack_now = true;
+    return link_accept_session(link, session_from(link, epoch));
 }
 
-/* A greeting soon, but no more often than greetings go. */
 void link_greet(struct link *link)
 {
     if (link->now_us - link->hello_us >= link->config.hello_us) {
@@ -270,6 +243,18 @@ bool link_hello_due(const struct link *link)
     return link->hello_now ||
            (waiting && !link->closed &&
             link->now_us - link->hello_us >= link->config.hello_us);
+}
+
+void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE])
+{
+    struct link_candidate *c = &link->candidate;
+    pack_hello(link, hello);
+    link->hello_us = link->now_us;
+    link->hello_now = false;
+    link->intruder = 0;
+    if (c->epoch != 0 && c->hellos_left-- == 0) {
+        c->epoch = 0;
+    }
 }
 
 void link_pipe_lost(struct link *link)
