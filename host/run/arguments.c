@@ -7,6 +7,8 @@
 
 #include "host/base/parse.h"
 #include "host/formats/formats.h"
+#include "host/order/names.h"
+#include "host/service/strategies/strategies.h"
 
 enum {
     KEY_STRATEGY = 256,
@@ -45,10 +47,7 @@ static const struct argp_option options_of_run[] = {
      "standard output. May be given several times; all files get their names "
      "at the end of a run that succeeds, or none does",
      1},
-    {"strategy", KEY_STRATEGY, "NAME", 0,
-     "sequential (one node computes, others hold pages), spatial (a region a "
-     "node), or auto, the default",
-     1},
+    {"strategy", KEY_STRATEGY, "NAME", 0, "How the work is shared out:", 1},
     {"partition", KEY_PARTITION, "NAME", 0,
      "Regions of equal counts (adaptive, the default) or equal cells "
      "(uniform)",
@@ -208,9 +207,9 @@ static bool parse_names(int key, const char *value, struct parse *p)
     struct host_run_options *o = p->options;
     switch (key) {
     case KEY_STRATEGY:
-        o->strategy =
-            (enum host_strategy)choose(p, "strategy", value, host_strategies,
-                                       ",master-slaves,linda,hybrid,exchange,");
+        o->strategy = host_strategy_row(
+            (unsigned)choose_row(p, "strategy", value, host_strategy_name,
+                                 host_strategies_elsewhere));
         return true;
     case KEY_PARTITION:
         o->partition = (enum host_partition)choose(p, "partition", value,
@@ -397,9 +396,10 @@ static const char *board_help(unsigned i)
     return host_board_row(i)->help;
 }
 
-/* Option's help with the rows of the table that its values are from. */
+/* Option's help with the rows of the table that its values are from; usual: the
+ * default's name. */
 static char *list_rows(const char *text, const char *(*name)(unsigned i),
-                       const char *(*help)(unsigned i))
+                       const char *(*help)(unsigned i), const char *usual)
 {
     size_t size = strlen(text) + 1;
     for (unsigned i = 0; name(i) != NULL; i++) {
@@ -414,7 +414,8 @@ static char *list_rows(const char *text, const char *(*name)(unsigned i),
     for (unsigned i = 0; name(i) != NULL; i++) {
         used += (size_t)snprintf(whole + used, size - used, "%s %s (%s%s)",
                                  i == 0 ? "" : ",", name(i), help(i),
-                                 i == 0 ? "; the default" : "");
+                                 strcmp(name(i), usual) == 0 ? "; the default"
+                                                             : "");
     }
     return whole;
 }
@@ -440,10 +441,12 @@ static char *complete_help(int key, const char *text, void *input)
         return list_formats(text, HOST_WRITE_TETRAHEDRA);
     case ARGP_KEY_HELP_POST_DOC:
         return list_formats(text, HOST_READ_POINTS);
+    case KEY_STRATEGY:
+        return list_rows(text, host_strategy_name, host_strategy_help, "auto");
     case KEY_LINK:
-        return list_rows(text, host_link_name, link_help);
+        return list_rows(text, host_link_name, link_help, host_link_name(0));
     case KEY_BOARD:
-        return list_rows(text, host_board_name, board_help);
+        return list_rows(text, host_board_name, board_help, host_board_name(0));
     default:
         return (char *)text;
     }

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include "host/mesh/gen.h"
+#include "host/order/names.h"
+#include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
 
 /* The processor time of the busiest node: what t_max would be if every node
@@ -144,16 +146,15 @@ void host_report_run(FILE *file, const struct host_run_options *options,
     fprintf(file,
             "%s on %u node%s: %.3f s to triangulate (%.3f Mtet/s), %.3f s "
             "in all%s\n",
-            host_strategies[r->strategy], r->nodes, r->nodes == 1 ? "" : "s",
+            r->strategy->name, r->nodes, r->nodes == 1 ? "" : "s",
             r->time_triangulation_s,
             1e-6 * ratio((double)r->tetrahedra, r->time_triangulation_s),
             r->time_total_s, r->verified ? "; verified" : "");
     if (alone != NULL) {
         char title[128];
         snprintf(title, sizeof title, "%s, %s partition, index %s",
-                 r->strategy == HOST_SPATIAL ? "Spatial decomposition"
-                                             : "Sequential",
-                 host_partitions[r->partition], host_indexes[r->index]);
+                 r->strategy->title, host_partitions[r->partition],
+                 host_indexes[r->index]);
         table_head(file, title);
         table_row(file, alone, alone);
         table_row(file, r, alone);
@@ -173,7 +174,7 @@ static int bench_row(const struct host_run_options *options,
     struct host_run_options row = *options;
     struct host_tetrahedra tets = {0};
     row.nodes = nodes;
-    row.strategy = HOST_SPATIAL;
+    row.strategy = &host_spatial;
     row.quiet = true;
     memset(result, 0, sizeof *result);
     int status = host_triangulate(&row, points, &tets, result, error);

@@ -10,26 +10,15 @@
 #include "host/mesh/facets.h"
 #include "host/base/memory.h"
 #include "host/files/output.h"
+#include "host/service/strategies/strategies.h"
 #include "report.h"
 #include "stats.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
 
-const char *const host_strategies[] = {[HOST_SEQUENTIAL] = "sequential",
-                                       [HOST_SPATIAL] = "spatial",
-                                       [HOST_AUTO] = "auto",
-                                       NULL};
-const char *const host_partitions[] = {
-    [HOST_ADAPTIVE] = "adaptive", [HOST_UNIFORM] = "uniform", NULL};
-const char *const host_indexes[] = {
-    [INCODE_NAIVE] = "naive", [INCODE_GRID] = "grid", [INCODE_KD] = "kd", NULL};
-const char *const host_face_rules[] = {
-    [INCODE_FACE_OWN] = "own", [INCODE_FACE_PAPER] = "paper", NULL};
-
 void host_run_defaults(struct host_run_options *options)
 {
     memset(options, 0, sizeof *options);
-    options->strategy = HOST_AUTO;
     options->partition = HOST_ADAPTIVE;
     options->index = INCODE_KD;
     options->face_rule = INCODE_FACE_OWN;
@@ -60,11 +49,13 @@ unsigned host_run_nodes(const struct host_run_options *options)
     if (options->nodes != 0) {
         return options->nodes;
     }
-    return options->strategy == HOST_SEQUENTIAL ? 1 : suitable_nodes();
+    unsigned nodes =
+        options->strategy == NULL ? 0 : options->strategy->nodes_default;
+    return nodes != 0 ? nodes : suitable_nodes();
 }
 
 /* Nodes and strategy, where they were left open. */
-static void settle(const struct host_run_options *options,
+static void settle(const struct host_run_options *options, uint64_t points,
                    struct host_run_result *result)
 {
     result->strategy = options->strategy;
@@ -74,8 +65,9 @@ static void settle(const struct host_run_options *options,
     result->board = options->board;
     result->memory = options->memory;
     result->nodes = host_run_nodes(options);
-    if (result->strategy == HOST_AUTO) {
-        result->strategy = result->nodes > 1 ? HOST_SPATIAL : HOST_SEQUENTIAL;
+    if (result->strategy == NULL) {
+        struct host_task task = {points, result->memory, result->nodes};
+        result->strategy = host_strategy_auto(&task);
     }
 }
 
@@ -93,10 +85,9 @@ static void gather_reports(const struct host_service *service,
         const struct incode_statistics *s = &f->statistics;
         double wall = 1e-6 * (double)f->wall_us;
         r->retransmitted += f->retransmitted;
-        if (i >= service->workers && s->vertices == 0) {
-            continue;
+        if (wall > 0 && (r->t_min_s == 0.0 || wall < r->t_min_s)) {
+            r->t_min_s = wall;
         }
-        r->t_min_s = i == 0 || wall < r->t_min_s ? wall : r->t_min_s;
         r->t_max_s = wall > r->t_max_s ? wall : r->t_max_s;
         r->make_tetra_calls += s->make_tetra_calls;
         r->built += s->tetrahedra_built;
@@ -123,7 +114,6 @@ static int run_service(const struct host_run_options *options,
     service->setup.setup.index = (uint8_t)options->index;
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
-    service->workers = result->strategy == HOST_SEQUENTIAL ? 1 : result->nodes;
     int status = host_service_run(service, error);
     gather_reports(service, result);
     result->time_io_s += 1e-6 * (double)service->pages_us;
@@ -217,6 +207,7 @@ int host_triangulate_on(const struct host_run_options *options,
         slowed = host_throttle_machine(&throttled, machine, &options->throttle);
         service.machine = &slowed;
     }
+    service.strategy = result->strategy;
     service.window = options->window;
     service.patience_us = options->patience_s * UINT64_C(1000000);
     service.show_progress = options->progress && !options->quiet;
@@ -227,7 +218,7 @@ int host_triangulate_on(const struct host_run_options *options,
         status = host_order_make(
             &order, options->input == NULL ? "points" : options->input,
             points->xyz, points->count, options->partition,
-            result->strategy == HOST_SEQUENTIAL ? 1 : result->nodes,
+            result->strategy->regions(result->nodes),
             options->index == INCODE_GRID, error);
         result->time_order_s = seconds_since(start);
     }
@@ -296,7 +287,7 @@ int host_triangulate(const struct host_run_options *options,
     static const uint32_t no_cells[3] = {0, 0, 0};
     struct host_machine machine;
     uint64_t start = host_now_us();
-    settle(options, result);
+    settle(options, points->count, result);
     if (check_memory(options, result->nodes, 1, no_cells, error) != 0 ||
         (options->begin != NULL ? options->begin : begin_on_board)(
             options, result, &machine, error) != 0) {
@@ -427,7 +418,7 @@ static int run_alone(const struct host_run_options *options,
     struct host_run_options one = *options;
     struct host_tetrahedra tets = {0};
     one.nodes = 1;
-    one.strategy = HOST_SEQUENTIAL;
+    one.strategy = NULL;
     int status = host_triangulate(&one, points, &tets, alone, error);
     host_tetrahedra_free(&tets);
     return status;

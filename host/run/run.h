@@ -21,9 +21,6 @@
 #include "host/mesh/tetrahedra.h"
 #include "host/check/verify.h"
 
-/* HOST_AUTO is the last: one of those before it. */
-enum host_strategy { HOST_SEQUENTIAL, HOST_SPATIAL, HOST_AUTO };
-
 enum { HOST_OUTPUTS_MAX = 16 };
 
 struct host_run_result;
@@ -32,7 +29,7 @@ struct host_run_options {
     const char *input;
     const char *output[HOST_OUTPUTS_MAX];
     unsigned outputs;
-    enum host_strategy strategy;
+    const struct host_strategy *strategy; /* NULL: auto */
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;
@@ -60,7 +57,7 @@ struct host_run_result {
     uint64_t rows, points, duplicates, negative_zeros;
     uint64_t tetrahedra, hull_facets;
     struct host_digest digest;
-    enum host_strategy strategy; /* the one taken */
+    const struct host_strategy *strategy; /* the one taken */
     enum host_partition partition;
     enum incode_index index;
     enum host_wire_kind link;
@@ -85,11 +82,6 @@ struct host_run_result {
 };
 
 void host_run_defaults(struct host_run_options *options);
-
-/* The names of the enumerations by their values, as options and statistics have
- * them; a NULL behind them. */
-extern const char *const host_strategies[], *const host_partitions[];
-extern const char *const host_indexes[], *const host_face_rules[];
 
 /* How many nodes the cube gets. */
 unsigned host_run_nodes(const struct host_run_options *options);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "host/files/output.h"
+#include "host/order/names.h"
 #include "node/roles/roles.h"
 
 double host_candidates_mean(const struct host_run_result *result)
@@ -105,7 +106,7 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "tetrahedra", r->tetrahedra);
     put(o, "hull_facets", r->hull_facets);
     put_text(o, "digest", r->digest.text);
-    put_text(o, "strategy", host_strategies[r->strategy]);
+    put_text(o, "strategy", r->strategy->name);
     put_text(o, "partition", host_partitions[r->partition]);
     put_text(o, "index", host_indexes[r->index]);
     put_text(o, "link", host_links[r->link].name);

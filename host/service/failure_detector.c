@@ -53,7 +53,7 @@ static void ping_next(struct host_service *s)
 {
     unsigned best = UINT32_MAX;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->node[i].lost && !s->report[i].here &&
+        if (!s->work.lost[i] && !s->report[i].here &&
             (best == UINT32_MAX || distance(s, i) < distance(s, best))) {
             best = i;
         }
@@ -71,21 +71,22 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
     s->loss = false;
     s->probing = s->probe;
     s->probe = false;
-    s->living = s->here = s->ready = 0;
+    s->work.living = s->here = s->ready = 0;
     s->began_us = s->searching ? s->began_us : now_us;
     s->news_us = s->ping_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
-        node->lost = node->given_up || !cube_reaches(s->cube, (uint16_t)i);
-        s->living += !node->lost;
-        node->ping_due = !node->lost && !s->probing;
+        bool lost = node->given_up || !cube_reaches(s->cube, (uint16_t)i);
+        s->work.lost[i] = lost;
+        s->work.living += !lost;
+        node->ping_due = !lost && !s->probing;
         node->pinged_us = now_us;
         node->pinged = false;
         node->ping_again_us = PING_AGAIN_US_MIN;
         node->sent = node->received = node->missed = 0;
         node->silent_us = 0;
         s->report[i].here = s->report[i].ready = false;
-        if (node->lost) {
+        if (lost) {
             close_start(s, i);
         }
     }
@@ -190,7 +191,7 @@ static void ping_in_turn(struct host_service *s, uint64_t now_us)
                          now_us - s->ping_us >= every;
          i++) {
         struct host_node *node = &s->node[s->ping_turn];
-        if (!node->lost && !node->pinged) {
+        if (!s->work.lost[s->ping_turn] && !node->pinged) {
             due += !node->ping_due;
             node->ping_due = true;
             node->pinged_us = now_us;
@@ -242,7 +243,8 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
                                       ? 2 * node->ping_again_us
                                       : PING_AGAIN_US;
         }
-        if (!s->started || node->lost || !(node->pinged || node->ping_due)) {
+        if (!s->started || s->work.lost[i] ||
+            !(node->pinged || node->ping_due)) {
             continue;
         }
         node->silent_us += elapsed_us;
@@ -364,13 +366,13 @@ static int fail_silent(const struct host_service *s, unsigned node,
 static int check_bring_up(const struct host_service *s, uint64_t now_us,
                           struct host_error *error)
 {
-    if (s->started || s->here == s->living ||
+    if (s->started || s->here == s->work.living ||
         now_us - s->began_us <= patience_of(s) ||
         host_missing_links_undecided(s, now_us, patience_of(s))) {
         return 0;
     }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->node[i].lost && !s->report[i].here) {
+        if (!s->work.lost[i] && !s->report[i].here) {
             return fail_silent(s, i, error);
         }
     }

@@ -110,8 +110,7 @@ static int take_results(struct host_service *s,
         host_tetrahedra_keep(s->tets, count);
         node->unreported += count;
         if (event == NODE_RESULT_COMMIT &&
-            host_ledger_commit(&s->ledger, message->source, reader.brick) !=
-                0) {
+            s->strategy->commit(&s->work, message->source, reader.brick) != 0) {
             return unsound(message, error, "committed brick %u, not of its job",
                            reader.brick);
         }
@@ -257,6 +256,18 @@ static int take_fault(const struct cube_message *message,
                      advice(text));
 }
 
+/* What the strategy's roles have to say. */
+static int take_other(struct host_service *s,
+                      const struct cube_message *message,
+                      struct host_error *error)
+{
+    const struct host_strategy *strategy = s->strategy;
+    if (strategy->take == NULL || !strategy->take(&s->work, message, error)) {
+        return unsound(message, error, "unknown type of message");
+    }
+    return error->code;
+}
+
 static int take(struct host_service *service,
                 const struct cube_message *message, struct host_error *error)
 {
@@ -278,7 +289,7 @@ static int take(struct host_service *service,
     case NODE_FAULT:
         return take_fault(message, error);
     default:
-        return unsound(message, error, "unknown type of message");
+        return take_other(service, message, error);
     }
 }
 

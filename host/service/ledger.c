@@ -5,10 +5,6 @@
 
 #include "incode/predicates/predicates.h"
 
-/* Ranges a worker after a loss: they differ in work, and whoever is free takes
- * the next; but each has a border, which is worked on from both sides. */
-enum { PIECES = 2 };
-
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error)
 {
@@ -131,7 +127,7 @@ static uint32_t owner(const struct host_order *order, const uint32_t v[4])
     return smallest / INCODE_BRICK_POINTS;
 }
 
-uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t workers,
+uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
                              const struct host_order *order,
                              struct host_tetrahedra *tets)
 {
@@ -148,6 +144,6 @@ uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t workers,
         ledger->job[i].epoch = 0;
     }
     ledger->cursor = 0;
-    ledger->piece_max = workers <= 1 ? left : left / (PIECES * workers) + 1;
+    ledger->piece_max = left / pieces + 1;
     return count - kept;
 }

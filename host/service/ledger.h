@@ -65,10 +65,10 @@ bool host_ledger_committed(const struct host_ledger *ledger, uint32_t brick);
 int host_ledger_finish(struct host_ledger *ledger, uint32_t node);
 
 /* Closes all jobs, drops the tetrahedra (of vertex numbers, in any order) that
- * belong to uncommitted bricks, and makes ready to give those bricks to so many
- * workers: in ranges small enough that all end at about the same time.  Returns
- * how many tetrahedra were dropped. */
-uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t workers,
+ * belong to uncommitted bricks, and makes ready to give those bricks out in
+ * ranges, each at most one of so many equal pieces (1 or more) of what is left.
+ * Returns how many tetrahedra were dropped. */
+uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
                              const struct host_order *order,
                              struct host_tetrahedra *tets);
 

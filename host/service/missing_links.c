@@ -123,14 +123,14 @@ bool host_missing_links_check(struct host_service *service, uint64_t now_us,
         return false;
     }
     if (!s->searching) {
-        if (s->here < s->living &&
+        if (s->here < s->work.living &&
             now_us - s->news_us >= wait_us(patience_us)) {
             search(s, now_us);
         }
         return s->searching;
     }
     found.gateway = host_service_gateway(s, &found);
-    if (s->here == s->living) {
+    if (s->here == s->work.living) {
         end_search(s, now_us,
                    false); /* all have come, or the wires are not needed */
     } else if (now_us - s->search_us < search_us(patience_us)) {
@@ -178,8 +178,8 @@ static uint32_t missing_of(const struct host_service *s, unsigned node)
     missing |= ~node & (bit_of(dimension) - 1);
     missing &= ~s->node[node].links;
     for (unsigned d = 0; missing >> d != 0; d++) {
-        bool there = !s->node[node].lost &&
-                     (d == dimension || !s->node[node ^ 1u << d].lost) &&
+        bool there = !s->work.lost[node] &&
+                     (d == dimension || !s->work.lost[node ^ 1u << d]) &&
                      !wiring_is_dead(w, w->dead_count, node, d, dimension);
         missing &= there ? ~(uint32_t)0 : ~bit_of(d);
     }
@@ -227,7 +227,7 @@ static bool all_attentive(const struct host_service *s)
 {
     bool all = true;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        all = all && (s->node[i].lost || s->node[i].silent_us <= ATTENTIVE_US);
+        all = all && (s->work.lost[i] || s->node[i].silent_us <= ATTENTIVE_US);
     }
     return all;
 }
@@ -237,7 +237,7 @@ static void call_all(struct host_service *s)
 {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
-        node->ping_due = node->ping_due || (!node->lost && !node->pinged);
+        node->ping_due = node->ping_due || (!s->work.lost[i] && !node->pinged);
     }
 }
 

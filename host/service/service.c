@@ -1,6 +1,5 @@
 #include "service.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -87,6 +86,13 @@ static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
     return sent;
 }
 
+/* The same for the strategy. */
+static bool write_counted(void *context, unsigned node, uint8_t type,
+                          const void *data, size_t size)
+{
+    return send_counted(context, (uint16_t)node, type, data, size);
+}
+
 static bool send_page(struct host_service *s, uint16_t to)
 {
     struct {
@@ -139,21 +145,6 @@ static bool send_unspill(struct host_service *s, uint16_t to,
 
 /* --- jobs ----------------------------------------------------------------- */
 
-/* Whether the node computes: all do, or in the strategy `sequential` the first
- * that is there. */
-static bool computes(const struct host_service *s, unsigned node)
-{
-    if (s->node[node].lost) {
-        return false;
-    }
-    for (unsigned i = 0; s->workers == 1 && i < node; i++) {
-        if (!s->node[i].lost) {
-            return false;
-        }
-    }
-    return true;
-}
-
 static void give_job(struct host_service *s, unsigned to,
                      const struct incode_job *job)
 {
@@ -166,72 +157,22 @@ static void give_job(struct host_service *s, unsigned to,
     s->working++;
 }
 
-/* Bricks [first, last), and the box of their points. */
-static struct incode_job job_of(const struct host_order *order, uint32_t first,
-                                uint32_t last)
-{
-    struct incode_job job = {.first = first, .last = last};
-    for (int k = 0; k < 3; k++) {
-        job.lo[k] = INFINITY;
-        job.hi[k] = -INFINITY;
-    }
-    for (uint32_t v = first * INCODE_BRICK_POINTS;
-         v < last * INCODE_BRICK_POINTS; v++) {
-        double p[3];
-        host_vertex(order, v, p);
-        for (int k = 0; k < 3; k++) {
-            job.lo[k] = p[k] < job.lo[k] ? p[k] : job.lo[k];
-            job.hi[k] = p[k] > job.hi[k] ? p[k] : job.hi[k];
-        }
-    }
-    return job;
-}
-
-/* The next range of bricks, for a node that has nothing to do. */
-static void give_next(struct host_service *s, unsigned to)
-{
-    uint32_t first, last;
-    if (computes(s, to) &&
-        host_ledger_next(&s->ledger, s->order, &first, &last)) {
-        struct incode_job job = job_of(s->order, first, last);
-        give_job(s, to, &job);
-    }
-}
-
-/* Every node has its setup: the first jobs.  As long as nothing is done and
- * nobody lost, each node has its region. */
+/* Every node has its setup: the first jobs. */
 static void deal(struct host_service *s)
 {
+    struct incode_job job;
     s->dealt = true;
-    if (s->ledger.committed > 0 || s->living < s->machine->nodes) {
-        return; /* serve_node gives ranges */
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->work.lost[i] && s->strategy->first(&s->work, i, &job)) {
+            give_job(s, i, &job);
+        }
     }
-    for (unsigned i = 0; i < s->workers; i++) {
-        const struct host_region *region = &s->order->region[i];
-        struct incode_job job = {.first = region->first, .last = region->last};
-        memcpy(job.lo, region->lo, sizeof region->lo);
-        memcpy(job.hi, region->hi, sizeof region->hi);
-        give_job(s, i, &job);
-    }
-    s->ledger.cursor = s->ledger.bricks;
-}
-
-/* Whoever does not compute keeps pages for node 0. */
-static struct node_setup_message setup_of(const struct host_service *s,
-                                          unsigned node)
-{
-    struct node_setup_message setup = s->setup;
-    bool holds = node >= 1 && node <= setup.holders;
-    setup.role = holds ? NODE_HOLDER : NODE_WORKER;
-    return setup;
 }
 
 /* Begins with the nodes as after their start: nothing is out, nothing asked
  * for, and each has to have its setup. */
 static void set_up(struct host_service *s)
 {
-    bool all = s->living == s->machine->nodes;
-    s->setup.holders = (uint16_t)(all ? s->machine->nodes - s->workers : 0);
     s->dealt = false;
     s->working = 0;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -258,13 +199,15 @@ static bool serve_work(struct host_service *s, uint16_t to,
         return false; /* what goes before the first answer may get lost */
     }
     if (node->setup_due) {
-        struct node_setup_message setup = setup_of(s, to);
+        struct node_setup_message setup = s->setup;
+        s->strategy->set_up(&s->work, to, &setup);
         node->setup_due =
             !send_counted(s, to, NODE_SETUP, &setup, sizeof setup);
         return !node->setup_due;
     }
-    if (s->dealt && !node->working) {
-        give_next(s, to);
+    struct incode_job job;
+    if (s->dealt && !node->working && s->strategy->next(&s->work, to, &job)) {
+        give_job(s, to, &job);
     }
     if (node->job_due) {
         node->job_due =
@@ -284,6 +227,9 @@ static bool serve_work(struct host_service *s, uint16_t to,
         node->credit = credit;
         return true;
     }
+    if (s->strategy->send != NULL && s->strategy->send(&s->work, to)) {
+        return true;
+    }
     if (node->unspills_count > 0) {
         return send_unspill(s, to, error);
     }
@@ -296,7 +242,7 @@ static bool serve_node(struct host_service *s, uint16_t to,
                        struct host_error *error)
 {
     struct host_node *node = &s->node[to];
-    if (node->lost) {
+    if (s->work.lost[to]) {
         return false;
     }
     if (node->ping_due && !node->ping_last) {
@@ -391,8 +337,7 @@ static int begin_again(struct host_service *s, uint64_t now_us,
         return error->code;
     }
     if (s->started) {
-        unsigned workers = s->workers == 1 ? 1 : s->living;
-        (void)host_ledger_abandon(&s->ledger, workers, s->order, s->tets);
+        s->strategy->lose(&s->work);
         host_spill_clear(&s->spill);
         set_up(s);
     }
@@ -490,7 +435,9 @@ int host_service_open(struct host_service *service, struct host_error *error)
     s->patience_us = s->patience_us == 0 ? HOST_PATIENCE_US : s->patience_us;
     s->node = calloc(s->machine->nodes, sizeof *s->node);
     s->report = calloc(s->machine->nodes, sizeof *s->report);
-    if (s->node == NULL || s->report == NULL) {
+    s->work.nodes = s->machine->nodes;
+    s->work.lost = calloc(s->machine->nodes, sizeof *s->work.lost);
+    if (s->node == NULL || s->report == NULL || s->work.lost == NULL) {
         return host_fail_memory(error, "the nodes' queues");
     }
     if (make_cube(s, error) != 0) {
@@ -504,7 +451,7 @@ int host_service_open(struct host_service *service, struct host_error *error)
 
 bool host_service_is_up(const struct host_service *service)
 {
-    return service->here == service->living && !service->searching;
+    return service->here == service->work.living && !service->searching;
 }
 
 int host_service_start(struct host_service *service, struct host_error *error)
@@ -514,6 +461,21 @@ int host_service_start(struct host_service *service, struct host_error *error)
         status = host_service_round(service, error);
     }
     return status;
+}
+
+/* The strategy's part, and what it sees. */
+static int prepare_work(struct host_service *s, struct host_error *error)
+{
+    struct host_work *work = &s->work;
+    work->order = s->order;
+    work->ledger = &s->ledger;
+    work->tets = s->tets;
+    work->write = write_counted;
+    work->context = s;
+    work->state = calloc(1, s->strategy->state_bytes + 1);
+    return work->state != NULL
+               ? 0
+               : host_fail_memory(error, "the strategy's state");
 }
 
 /* What is the same in all generations. */
@@ -535,14 +497,14 @@ static void ask_for_reports(struct host_service *s)
 {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
-        node->report_due = !node->lost && !node->reported;
+        node->report_due = !s->work.lost[i] && !node->reported;
     }
 }
 
 static bool all_reported(const struct host_service *s)
 {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->node[i].lost && !s->node[i].reported) {
+        if (!s->work.lost[i] && !s->node[i].reported) {
             return false;
         }
     }
@@ -554,7 +516,8 @@ int host_service_run(struct host_service *service, struct host_error *error)
     struct host_service *s = service;
     if (host_ledger_init(&s->ledger, s->order->bricks, s->machine->nodes,
                          error) != 0 ||
-        host_spill_init(&s->spill, 0, error) != 0) {
+        host_spill_init(&s->spill, 0, error) != 0 ||
+        prepare_work(s, error) != 0) {
         return error->code;
     }
     prepare(s);
@@ -566,7 +529,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
             host_progress_end(&s->progress);
             return error->code;
         }
-        if (!s->dealt && s->ready == s->living) {
+        if (!s->dealt && s->ready == s->work.living) {
             deal(s);
         }
         if (!asked && s->ledger.committed == s->ledger.bricks &&
@@ -636,9 +599,12 @@ void host_service_end(struct host_service *service)
     host_spill_free(&s->spill);
     free(s->node);
     free(s->report);
+    free(s->work.lost);
+    free(s->work.state);
     free(s->cube_memory);
     s->cube = NULL;
     s->node = NULL;
     s->report = NULL;
+    memset(&s->work, 0, sizeof s->work);
     s->cube_memory = NULL;
 }

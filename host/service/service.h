@@ -23,6 +23,7 @@
 #include "host/order/order.h"
 #include "host/base/progress.h"
 #include "spill.h"
+#include "strategies/strategy.h"
 #include "host/mesh/tetrahedra.h"
 
 enum {
@@ -48,10 +49,9 @@ struct host_node {
     bool working;  /* a job is out */
     bool reported; /* statistics of all that it has done are here */
     /* Whether it is there: failure_detector.h. */
-    bool lost;      /* not reached in this generation: nothing is sent to it */
-    bool given_up;  /* for the rest of the run */
-    bool pinged;    /* a ping has not been answered */
-    bool ping_last; /* what it was sent last is a ping */
+    bool given_up;           /* for the rest of the run */
+    bool pinged;             /* a ping has not been answered */
+    bool ping_last;          /* what it was sent last is a ping */
     uint32_t sent, received; /* counted messages of this generation */
     uint32_t missed;         /* pings that were lost before the first answer */
     uint32_t start;          /* the epoch of its start; 0: not heard of */
@@ -79,12 +79,11 @@ struct host_service {
     struct host_machine *machine;
     const struct host_order *order;
     struct host_tetrahedra *tets; /* takes rows of vertex numbers */
+    const struct host_strategy *strategy;
     struct node_setup_message setup;
     unsigned window;      /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     bool show_progress;
-    /* Nodes that compute, one region of the order each; others hold pages. */
-    unsigned workers;
     /* Results. */
     struct host_node_report *report; /* [nodes], until the end */
     uint64_t pages_us;               /* time spent on serving pages */
@@ -96,6 +95,7 @@ struct host_service {
     struct cube *cube;
     void *cube_memory;
     struct host_node *node;
+    struct host_work work; /* what the strategy sees; who is lost */
     struct host_ledger ledger;
     struct host_spill spill;
     struct host_progress progress;
@@ -117,8 +117,7 @@ struct host_service {
     uint64_t uncabled_us; /* time without that, while all nodes answer */
     bool probe, probing; /* nodes are pinged one by one: in the next generation;
                             now, until all have answered */
-    unsigned living;     /* nodes that are not lost */
-    unsigned here, ready; /* of them, that are up; that have their setup */
+    unsigned here, ready; /* living nodes that are up; that have their setup */
     unsigned working;     /* that have a job */
     unsigned turn;        /* the node to be served next */
     unsigned ping_turn;   /* to be pinged next */

@@ -79,7 +79,7 @@ static int make_work(struct host_sim_run *r, struct host_error *error)
         return error->code;
     }
     return host_order_make(&r->order, "points", r->points.xyz, r->points.count,
-                           p->partition, p->sequential ? 1 : p->nodes,
+                           p->partition, p->strategy->regions(p->nodes),
                            p->index == INCODE_GRID, error);
 }
 
@@ -92,7 +92,7 @@ static int check_queues(const struct host_sim_run *r, struct host_error *error)
         const struct host_world_node *node = &r->world.node[i];
         left += s->node[i].pages_count + s->node[i].unspills_count;
         /* A node that was cut off for good keeps what it has. */
-        bool counts = node->state == HOST_WORLD_UP && !s->node[i].lost;
+        bool counts = node->state == HOST_WORLD_UP && !s->work.lost[i];
         left += counts ? node_held(node->node) : 0;
     }
     if (s->ledger.committed != s->ledger.bricks || left > 0) {
@@ -144,7 +144,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
     s->tets = &r->tets;
     s->window = p->host_window;
     s->patience_us = p->patience_us;
-    s->workers = p->sequential ? 1 : p->nodes;
+    s->strategy = p->strategy;
     s->setup.setup.index = (uint8_t)p->index;
     s->setup.setup.face_rule = (uint8_t)p->face_rule;
     s->setup.setup.shuffle_seed = p->shuffle_seed;

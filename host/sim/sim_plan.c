@@ -2,7 +2,8 @@
 
 #include <string.h>
 
-#include "host/run/run.h"
+#include "host/order/names.h"
+#include "host/service/strategies/strategies.h"
 #include "sim_draw.h"
 
 /* A slow wire does not wake its node for every byte. */
@@ -37,13 +38,26 @@ static unsigned draw_nodes(uint64_t *state)
     return 1u << cubes[i].dimension;
 }
 
+/* The first of the table keeps to one node, mostly: seldom; the others alike.
+ */
+static const struct host_strategy *draw_strategy(const struct host_sim_plan *p,
+                                                 bool first)
+{
+    uint64_t state = sim_seed(p->seed, 81);
+    unsigned rows = 0;
+    while (host_strategy_row(rows) != NULL) {
+        rows++;
+    }
+    return host_strategy_row(first ? 0 : (unsigned)draw(&state, 1, rows - 1));
+}
+
 static void draw_work(struct host_sim_plan *p, uint64_t *state)
 {
     static const char *const kinds[] = {"uniform", "bubbles", "bluntfin",
                                         "sphere",  "grid",    "rotated",
                                         "hub",     "uniform"};
     p->kind = kinds[draw(state, 0, 7)];
-    p->sequential = one_in(state, 6);
+    p->strategy = draw_strategy(p, one_in(state, 6));
     p->partition = one_in(state, 3) ? HOST_UNIFORM : HOST_ADAPTIVE;
     p->index = one_in(state, 8) && p->nodes <= 64 ? INCODE_NAIVE
                : one_in(state, 6)                 ? INCODE_GRID
@@ -156,8 +170,7 @@ void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)
 {
     fprintf(file, "%llu points %s, %u node%s, %s, %s, %s, %s;",
             (unsigned long long)plan->points, plan->kind, plan->nodes,
-            plan->nodes == 1 ? "" : "s",
-            host_strategies[plan->sequential ? HOST_SEQUENTIAL : HOST_SPATIAL],
+            plan->nodes == 1 ? "" : "s", plan->strategy->name,
             host_partitions[plan->partition], host_indexes[plan->index],
             host_face_rules[plan->face_rule]);
 }

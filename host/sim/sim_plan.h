@@ -22,7 +22,7 @@ struct host_sim_plan {
     /* The work. */
     const char *kind; /* of points: gen.h */
     uint64_t points;
-    bool sequential;
+    const struct host_strategy *strategy;
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;

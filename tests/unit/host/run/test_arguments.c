@@ -3,11 +3,16 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
+#include "host/order/names.h"
 #include "host/run/arguments.h"
+#include "host/service/strategies/strategies.h"
 
 enum { WORDS_MAX = 12 };
 
@@ -34,7 +39,7 @@ static void test_defaults(void **unused)
     struct host_error error;
     static const char *const words[] = {"a.xyz", NULL};
     assert_int_equal(parse(words, &o, &error), 0);
-    assert_int_equal(o.strategy, HOST_AUTO);
+    assert_null(o.strategy); /* auto */
     assert_int_equal(o.partition, HOST_ADAPTIVE);
     assert_int_equal(o.index, INCODE_KD);
     assert_int_equal(o.face_rule, INCODE_FACE_OWN);
@@ -64,7 +69,7 @@ static void test_options(void **unused)
                                         "a.xyz",
                                         NULL};
     assert_int_equal(parse(words, &o, &error), 0);
-    assert_int_equal(o.strategy, HOST_SPATIAL);
+    assert_ptr_equal(o.strategy, &host_spatial);
     assert_int_equal(o.partition, HOST_UNIFORM);
     assert_int_equal(o.index, INCODE_GRID);
     assert_int_equal(o.face_rule, INCODE_FACE_PAPER);
@@ -144,8 +149,7 @@ static void test_names(void **unused)
         const char *option;
         const char *const *names;
         int last;
-    } tables[] = {{"--strategy", host_strategies, HOST_AUTO},
-                  {"--partition", host_partitions, HOST_UNIFORM},
+    } tables[] = {{"--partition", host_partitions, HOST_UNIFORM},
                   {"--index", host_indexes, INCODE_KD},
                   {"--face-rule", host_face_rules, INCODE_FACE_PAPER},
                   {"--link", links, HOST_WIRE_MPI},
@@ -163,13 +167,79 @@ static void test_names(void **unused)
                                    "a.xyz", NULL};
             assert_non_null(words[1]);
             assert_int_equal(parse(words, &o, &error), 0);
-            const int found[] = {
-                (int)o.strategy, (int)o.partition,
-                (int)o.index,    (int)o.face_rule,
-                (int)o.link,     o.board == host_board_row(0) ? 0 : -1};
+            const int found[] = {(int)o.partition, (int)o.index,
+                                 (int)o.face_rule, (int)o.link,
+                                 o.board == host_board_row(0) ? 0 : -1};
             assert_int_equal(found[i], value);
         }
         assert_null(tables[i].names[tables[i].last + 1]);
+    }
+}
+
+/* What `incode run` prints with this word, blanks squeezed. */
+static void printed(const char *word, char *text, size_t size)
+{
+    size_t used = 0;
+    int ends[2];
+    char c;
+    assert_int_equal(pipe(ends), 0);
+    fflush(NULL);
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        const char *const words[] = {word, NULL};
+        struct host_run_options o;
+        struct host_error error;
+        dup2(ends[1], STDOUT_FILENO);
+        (void)parse(words, &o, &error); /* ends the process */
+        _exit(1);
+    }
+    close(ends[1]);
+    while (read(ends[0], &c, 1) == 1 && used + 1 < size) {
+        bool blank = c == ' ' || c == '\n';
+        if (!blank || used == 0 || text[used - 1] != ' ') {
+            text[used++] = blank ? ' ' : c;
+        }
+    }
+    text[used] = '\0';
+    close(ends[0]);
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(status, 0);
+}
+
+/* The strategies of the table, and auto, are those that the option takes, its
+ * help explains, and the error about any other lists. */
+static void test_strategies(void **unused)
+{
+    (void)unused;
+    static char help[16384];
+    struct host_run_options o;
+    struct host_error refusal, error;
+    const char *words[] = {"--strategy", "quick", "a.xyz", NULL};
+    printed("--help", help, sizeof help);
+    assert_int_equal(parse(words, &o, &refusal), HOST_USAGE);
+    unsigned i = 0;
+    for (; host_strategy_name(i) != NULL; i++) {
+        char line[128];
+        words[1] = host_strategy_name(i);
+        assert_int_equal(parse(words, &o, &error), 0);
+        assert_ptr_equal(o.strategy, host_strategy_row(i));
+        assert_non_null(strstr(refusal.text, words[1]));
+        snprintf(line, sizeof line, "%s (%s", words[1], host_strategy_help(i));
+        assert_non_null(strstr(help, line));
+    }
+    assert_true(i >= 3);
+    assert_string_equal(host_strategy_name(i - 1), "auto");
+    /* What other versions know is none of this one. */
+    for (const char *c = host_strategies_elsewhere; c[1] != '\0';) {
+        char name[32];
+        assert_int_equal(sscanf(c, ",%31[^,]", name), 1);
+        words[1] = name;
+        assert_null(host_strategy_named(name));
+        assert_int_equal(parse(words, &o, &error), HOST_USAGE);
+        assert_non_null(strstr(error.text, "not in this version; allowed: "));
+        c += strlen(name) + 1;
     }
 }
 
@@ -178,7 +248,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_defaults), cmocka_unit_test(test_options),
         cmocka_unit_test(test_refused),  cmocka_unit_test(test_in_vain),
-        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_names),    cmocka_unit_test(test_strategies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

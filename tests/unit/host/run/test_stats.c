@@ -15,6 +15,7 @@
 #include "host/base/memory.h"
 #include "host/files/output.h"
 #include "host/run/stats.h"
+#include "host/service/strategies/strategies.h"
 
 static const char *const names[] = {"points",
                                     "distinct_points",
@@ -67,7 +68,7 @@ static void fill(struct host_run_result *r)
     r->built = 600;
     r->time_triangulation_s = 2.0;
     r->nodes = 4;
-    r->strategy = HOST_SPATIAL;
+    r->strategy = &host_spatial;
     r->index = INCODE_KD;
     r->link = HOST_WIRE_SERIAL;
     r->board = host_board_named("linux");

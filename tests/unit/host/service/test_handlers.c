@@ -11,6 +11,7 @@
 
 #include "host/mesh/gen.h"
 #include "host/service/handlers.h"
+#include "host/service/strategies/strategies.h"
 #include "node/result.h"
 #include "transport/drivers/sim.h"
 
@@ -81,7 +82,10 @@ static void begin(void)
     service.machine = &machine;
     service.order = &order;
     service.tets = &tets;
-    service.workers = NODES;
+    service.strategy = &host_spatial;
+    service.work.ledger = &service.ledger;
+    service.work.lost = calloc(NODES, sizeof *service.work.lost);
+    assert_non_null(service.work.lost);
     service.started = true;
     service.node = calloc(NODES, sizeof *service.node);
     service.report = calloc(NODES, sizeof *service.report);
@@ -101,6 +105,7 @@ static void end(void)
     free(cube_arena);
     free(service.node);
     free(service.report);
+    free(service.work.lost);
     host_ledger_free(&service.ledger);
     host_spill_free(&service.spill);
     host_tetrahedra_free(&tets);

@@ -95,7 +95,7 @@ static void test_abandon(void **unused)
     fill(&tets);
     assert_int_equal(host_ledger_commit(&ledger, 0, 1), 0);
     assert_int_equal(host_ledger_commit(&ledger, 1, 6), 0);
-    assert_int_equal(host_ledger_abandon(&ledger, 2, &order, &tets), 509 - 128);
+    assert_int_equal(host_ledger_abandon(&ledger, 4, &order, &tets), 509 - 128);
     /* Every job is closed, the other nodes' too. */
     assert_false(host_ledger_current(&ledger, 0, stays));
     assert_false(host_ledger_current(&ledger, 1, lost));
@@ -118,14 +118,14 @@ static void test_ranges(void **unused)
     struct host_order order = make_order();
     struct host_tetrahedra none = {0};
     static const struct {
-        uint32_t workers;
+        uint32_t pieces;
         const char *committed, *ranges;
     } cases[] = {
         {1, "", "0-3 3-8 "},
         {1, "1", "0-1 2-3 3-8 "},
         {1, "0127", "3-7 "},
-        {2, "0127", "3-5 5-7 "},
-        {8, "34", "0-1 1-2 2-3 5-6 6-7 7-8 "},
+        {4, "0127", "3-5 5-7 "},
+        {16, "34", "0-1 1-2 2-3 5-6 6-7 7-8 "},
         {1, "01234567", ""},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -139,7 +139,7 @@ static void test_ranges(void **unused)
             assert_int_equal(
                 host_ledger_commit(&ledger, 0, (uint32_t)(*c - '0')), 0);
         }
-        (void)host_ledger_abandon(&ledger, cases[i].workers, &order, &none);
+        (void)host_ledger_abandon(&ledger, cases[i].pieces, &order, &none);
         while (host_ledger_next(&ledger, &order, &first, &last)) {
             char range[16];
             assert_true(first >= before && first < last);

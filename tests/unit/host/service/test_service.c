@@ -15,6 +15,7 @@
 
 #include "host/mesh/gen.h"
 #include "host/run/run.h"
+#include "host/service/strategies/strategies.h"
 #include "node/node.h"
 #include "tests/unit/node/rings.h"
 
@@ -224,7 +225,7 @@ static void prepare(void)
 }
 
 /* Runs the world as it was prepared; the error's code. */
-static int run(enum host_strategy strategy, struct host_digest *digest,
+static int run(const struct host_strategy *strategy, struct host_digest *digest,
                struct host_error *error)
 {
     struct host_run_options options;
@@ -251,7 +252,7 @@ static int run(enum host_strategy strategy, struct host_digest *digest,
     return status;
 }
 
-static void survives(enum host_strategy strategy)
+static void survives(const struct host_strategy *strategy)
 {
     struct host_digest digest;
     struct host_error error;
@@ -268,7 +269,7 @@ static void fails_with(const char *text)
 {
     struct host_digest digest;
     struct host_error error;
-    if (run(HOST_SPATIAL, &digest, &error) != HOST_CUBE) {
+    if (run(&host_spatial, &digest, &error) != HOST_CUBE) {
         fail_msg("not an error of the cube: %s", error.text);
     }
     if (strstr(error.text, text) == NULL) {
@@ -284,7 +285,7 @@ static int set_up(void **unused)
     assert_int_equal(host_gen("uniform", 8000, 5, &points, &error), 0);
     prepare();
     start_world();
-    assert_int_equal(run(HOST_SPATIAL, &expected, &error), 0);
+    assert_int_equal(run(&host_spatial, &expected, &error), 0);
     undisturbed_us = world.now_us;
     assert_int_equal(result.generations, 1);
     return 0;
@@ -298,7 +299,7 @@ static int tear_down(void **unused)
 }
 
 static void survives_restart(unsigned node, double when,
-                             enum host_strategy strategy)
+                             const struct host_strategy *strategy)
 {
     prepare();
     world.events[0] = (struct event){RESTART, when, node, 0};
@@ -311,16 +312,16 @@ static void test_restarts(void **unused)
 {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
-        survives_restart(i, 0.05 * (i + 1), HOST_SPATIAL);
+        survives_restart(i, 0.05 * (i + 1), &host_spatial);
         assert_int_equal(result.generations, 2);
-        survives_restart(i, 0.1 * (i + 1), HOST_SPATIAL);
-        survives_restart(i, 0.1 * (i + 1), HOST_SEQUENTIAL);
+        survives_restart(i, 0.1 * (i + 1), &host_spatial);
+        survives_restart(i, 0.1 * (i + 1), &host_sequential);
     }
     prepare();
     for (unsigned k = 0; k < EVENTS; k++) {
         world.events[k] = (struct event){RESTART, 0.3 * k, k * 5 % NODES, 0};
     }
-    survives(HOST_SPATIAL);
+    survives(&host_spatial);
 }
 
 /* Any mixture of them; SERVICE_ROUNDS for more than a few. */
@@ -344,7 +345,7 @@ static void test_mixtures(void **unused)
                                          draw(NODES), draw(DIMENSION)};
         world.events[7] =
             (struct event){draw(2) == 0 ? STOP : NOTHING, when, gone, 0};
-        survives(draw(2) == 0 ? HOST_SPATIAL : HOST_SEQUENTIAL);
+        survives(draw(2) == 0 ? &host_spatial : &host_sequential);
     }
 }
 
@@ -358,7 +359,7 @@ static void test_stopped(void **unused)
         double pause = 4e6 / (double)undisturbed_us;
         world.events[0] = (struct event){STOP, 0.3, i, 0};
         world.events[1] = (struct event){CONTINUE, 0.3 + pause, i, 0};
-        survives(i % 2 == 0 ? HOST_SPATIAL : HOST_SEQUENTIAL);
+        survives(i % 2 == 0 ? &host_spatial : &host_sequential);
         assert_int_equal(result.generations, 1);
     }
 }
@@ -373,13 +374,13 @@ static void test_gone(void **unused)
         /* A node that holds pages is soon needed no more. */
         bool holds = i % 3 == 0;
         world.events[0] = (struct event){STOP, holds ? 0.1 : 0.4, i, 0};
-        survives(holds ? HOST_SEQUENTIAL : HOST_SPATIAL);
+        survives(holds ? &host_sequential : &host_spatial);
         assert_true(result.generations > 1);
     }
     prepare();
     world.events[0] = (struct event){STOP, 0.4, 6, 0};
     world.events[1] = (struct event){STOP, 0.4, 3, 0};
-    survives(HOST_SPATIAL);
+    survives(&host_spatial);
 }
 
 /* Node 0 is done without where another has a wire to the host. */
@@ -394,7 +395,7 @@ static void test_gateway(void **unused)
         prepare();
         world.spare = 5;
         world.events[0] = (struct event){STOP, 0.4, 0, 0};
-        survives(k == 0 ? HOST_SPATIAL : HOST_SEQUENTIAL);
+        survives(k == 0 ? &host_spatial : &host_sequential);
         assert_true(result.generations > 1);
     }
 }
@@ -408,7 +409,7 @@ static void test_for_ever(void **unused)
     prepare();
     start_world();
     world.sick = true;
-    assert_int_equal(run(HOST_SEQUENTIAL, &digest, &error), HOST_CUBE);
+    assert_int_equal(run(&host_sequential, &digest, &error), HOST_CUBE);
     if (strstr(error.text, "node 0 link 3: ") == NULL) {
         fail_msg("%s", error.text);
     }
@@ -424,14 +425,14 @@ static void test_next_host(void **unused)
         prepare();
         start_world();
         world.host_fails = 0.1 * k;
-        if (run(HOST_SPATIAL, &digest, &error) == 0) {
+        if (run(&host_spatial, &digest, &error) == 0) {
             assert_true(k > 3); /* it was done by then */
             end_world();
             continue;
         }
         assert_string_equal(error.text, "the host fails; as it should");
         world.host_fails = 0.0;
-        if (run(HOST_SPATIAL, &digest, &error) != 0) {
+        if (run(&host_spatial, &digest, &error) != 0) {
             fail_msg("%s", error.text);
         }
         assert_string_equal(digest.text, expected.text);
@@ -446,7 +447,7 @@ static void test_cut(void **unused)
     for (unsigned i = 0; i < NODES; i++) {
         prepare();
         world.events[0] = (struct event){CUT, 0.3, i, i % DIMENSION};
-        survives(i % 2 == 0 ? HOST_SPATIAL : HOST_SEQUENTIAL);
+        survives(i % 2 == 0 ? &host_spatial : &host_sequential);
         lost += result.generations > 1;
     }
     assert_true(lost >= 4); /* others have done with it */
@@ -457,7 +458,7 @@ static void lacks(unsigned node, unsigned link)
     wire_of(node, link)->cut = true;
 }
 
-static void survives_as(enum host_strategy strategy)
+static void survives_as(const struct host_strategy *strategy)
 {
     struct host_digest digest;
     struct host_error error;
@@ -480,7 +481,7 @@ static void test_missing_wire(void **unused)
                 world.absent_s = 3;
                 start_world();
                 lacks(i, d);
-                survives_as(d == 0 ? HOST_SEQUENTIAL : HOST_SPATIAL);
+                survives_as(d == 0 ? &host_sequential : &host_spatial);
                 missed += result.generations > 1;
                 assert_int_equal(result.missing_wires, 1);
             }
@@ -493,7 +494,7 @@ static void test_missing_wire(void **unused)
     lacks(0, 0);
     lacks(3, 0);
     lacks(6, 1);
-    survives_as(HOST_SPATIAL);
+    survives_as(&host_spatial);
     assert_int_equal(result.generations, 2);
     assert_int_equal(result.missing_wires, 3);
 }
@@ -510,7 +511,7 @@ static void test_missing_wire_and_late_node(void **unused)
     world.stopped[5] = true;
     world.events[0] =
         (struct event){CONTINUE, 3e6 / (double)undisturbed_us, 5, 0};
-    survives_as(HOST_SPATIAL);
+    survives_as(&host_spatial);
     assert_true(world.now_us > 8000000);
     assert_int_equal(result.generations, 2);
     assert_int_equal(result.missing_wires, 1);
@@ -525,7 +526,7 @@ static void test_missing_host_wire(void **unused)
     world.spare = 5;
     start_world();
     lacks(0, DIMENSION);
-    survives_as(HOST_SPATIAL);
+    survives_as(&host_spatial);
     assert_int_equal(result.generations, 2);
     assert_int_equal(result.missing_wires, 1);
     prepare(); /* the other, which is there for a loss alone */
@@ -533,7 +534,7 @@ static void test_missing_host_wire(void **unused)
     world.spare = 5;
     start_world();
     lacks(5, DIMENSION);
-    survives_as(HOST_SPATIAL);
+    survives_as(&host_spatial);
     assert_int_equal(result.generations, 1);
     assert_int_equal(result.missing_wires, 1);
 }
@@ -553,7 +554,7 @@ static void test_late_wire(void **unused)
         world.events[0] = (struct event){MEND, when, 5, 1};
         world.events[1] = (struct event){k == 0 ? NOTHING : STOP, 0.4, 7, 0};
         world.events[2] = (struct event){CONTINUE, 0.98 * when, 7, 0};
-        survives_as(HOST_SPATIAL);
+        survives_as(&host_spatial);
         assert_true(world.now_us > late_us);
         assert_int_equal(result.generations, 1);
         assert_int_equal(result.missing_wires, 0);
@@ -571,7 +572,7 @@ static void test_late_node(void **unused)
         world.stopped[i] = true;
         world.events[0] =
             (struct event){CONTINUE, 7.6e6 / (double)undisturbed_us, i, 0};
-        survives_as(HOST_SPATIAL);
+        survives_as(&host_spatial);
         assert_true(world.now_us > 7600000);
         assert_int_equal(result.generations, 1);
         assert_int_equal(result.missing_wires, 0);

@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "host/base/parallel.h"
+#include "host/service/strategies/strategies.h"
 #include "host/sim/sim.h"
 #include "tests/unit/emulated.h"
 
@@ -63,7 +64,7 @@ static struct host_sim_plan small_run(void)
     host_sim_plan_draw(&plan, 1, 4);
     plan.kind = "uniform";
     plan.points = 30;
-    plan.sequential = false;
+    plan.strategy = host_strategy_named("spatial");
     plan.index = INCODE_KD;
     plan.partition = HOST_ADAPTIVE;
     plan.face_rule = INCODE_FACE_OWN;

@@ -1,0 +1,54 @@
+/* One node computes, and the others keep pages for it: node 0, and after a loss
+ * the first that is there, which then has pages from the host alone. */
+#include "regions.h"
+#include "strategies.h"
+
+static double cost(const struct host_task *task)
+{
+    (void)task;
+    return 1.0;
+}
+
+static unsigned regions(unsigned nodes)
+{
+    (void)nodes;
+    return 1;
+}
+
+static void set_up(const struct host_work *work, unsigned node,
+                   struct node_setup_message *setup)
+{
+    bool all = work->living == work->nodes;
+    setup->holders = (uint16_t)(all ? work->nodes - 1 : 0);
+    setup->role = all && node > 0 ? NODE_HOLDER : NODE_WORKER;
+}
+
+static bool next(struct host_work *work, unsigned node, struct incode_job *job)
+{
+    for (unsigned i = 0; i < node; i++) {
+        if (!work->lost[i]) {
+            return false;
+        }
+    }
+    return host_regions_next(work, node, job);
+}
+
+/* One node has no use for more ranges than are left. */
+static void lose(struct host_work *work)
+{
+    (void)host_ledger_abandon(work->ledger, 1, work->order, work->tets);
+}
+
+const struct host_strategy host_sequential = {
+    .name = "sequential",
+    .title = "Sequential",
+    .help = "one node computes, others hold pages",
+    .nodes_default = 1,
+    .cost = cost,
+    .regions = regions,
+    .set_up = set_up,
+    .first = host_regions_first,
+    .next = next,
+    .commit = host_regions_commit,
+    .lose = lose,
+};

@@ -1,0 +1,35 @@
+/* The table of strategies, from which options, help, messages, statistics and
+ * the simulator have them, and the choice of `auto` among them.
+ *
+ * Memory: the table.  Work: a pass over it.
+ *
+ *     const struct host_strategy *spatial = host_strategy_named("spatial");
+ *     for (unsigned i = 0; host_strategy_name(i) != NULL; i++)
+ *         printf("%s: %s\n", host_strategy_name(i), host_strategy_help(i));
+ */
+#ifndef HOST_STRATEGIES_H
+#define HOST_STRATEGIES_H
+
+#include "strategy.h"
+
+/* One a file. */
+extern const struct host_strategy host_sequential, host_spatial;
+
+/* Row i of the table; NULL past the last. */
+const struct host_strategy *host_strategy_row(unsigned i);
+
+/* NULL where there is none of that name. */
+const struct host_strategy *host_strategy_named(const char *name);
+
+/* The one that costs least; of equals the first in the table. */
+const struct host_strategy *host_strategy_auto(const struct host_task *task);
+
+/* What a user may ask for: the names of the rows, and "auto" behind them, with
+ * a few words on each; NULL past the last. */
+const char *host_strategy_name(unsigned i);
+const char *host_strategy_help(unsigned i);
+
+/* Names that other versions know, with a comma before and after each. */
+extern const char host_strategies_elsewhere[];
+
+#endif

@@ -1,0 +1,88 @@
+/* A strategy: which node has which role, what each is given first and next,
+ * and what a commit and a loss mean.  The service runs them all and knows none;
+ * to add one, write a file that defines such a struct, and put it into the
+ * table of strategies.c.
+ *
+ * Memory: state_bytes a run, cleared before it and freed after it.  Work: that
+ * of the functions; the service calls `next` and `send` whenever it comes to a
+ * node, so that they have to return at once.
+ *
+ *     strategy->set_up(&work, node, &setup);
+ *     if (strategy->first(&work, node, &job))
+ *         (void)host_ledger_open(work.ledger, node, job.first, job.last);
+ */
+#ifndef HOST_STRATEGY_H
+#define HOST_STRATEGY_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "host/base/error.h"
+#include "host/mesh/tetrahedra.h"
+#include "host/order/order.h"
+#include "host/service/ledger.h"
+#include "incode/triangulator.h"
+#include "node/message.h"
+#include "transport/cube.h"
+
+/* What a strategy sees of a run. */
+struct host_work {
+    unsigned nodes;  /* of the cube */
+    unsigned living; /* of them, those that are not lost */
+    bool *lost;      /* [nodes]: not in this generation */
+    const struct host_order *order;
+    struct host_ledger *ledger;
+    struct host_tetrahedra *tets; /* that have come, of vertex numbers */
+    void *state;                  /* the strategy's own, state_bytes */
+    /* Sends a counted message, of at most CUBE_PAYLOAD_MAX bytes; false: there
+     * is no room now.  For the strategy's `send`. */
+    bool (*write)(void *context, unsigned node, uint8_t type, const void *data,
+                  size_t size);
+    void *context; /* of write */
+};
+
+/* What `auto` knows when it chooses. */
+struct host_task {
+    uint64_t points;
+    uint64_t memory; /* of a node, bytes */
+    unsigned nodes;
+};
+
+struct host_strategy {
+    const char *name;       /* in options and statistics */
+    const char *title;      /* in tables */
+    const char *help;       /* what it does, in a few words */
+    size_t state_bytes;     /* of its own */
+    unsigned nodes_default; /* 0: as many as this machine has processors */
+    /* Time that it is expected to take, in that of one node alone; INFINITY
+     * where it cannot do the task.  `auto` takes the least. */
+    double (*cost)(const struct host_task *task);
+    /* Regions that the order is cut into: a power of two. */
+    unsigned (*regions)(unsigned nodes);
+    /* Fills in what the node has to know: its role, and what goes with it.  The
+     * rest is there already.  Once a node and generation, or more often. */
+    void (*set_up)(const struct host_work *work, unsigned node,
+                   struct node_setup_message *setup);
+    /* The first job of a node, when all nodes have their setup: true, or false
+     * where it has none.  Once a node and generation, in the order of nodes. */
+    bool (*first)(struct host_work *work, unsigned node,
+                  struct incode_job *job);
+    /* The same for a node that is not lost and has no job. */
+    bool (*next)(struct host_work *work, unsigned node, struct incode_job *job);
+    /* A node says that all tetrahedra of a brick are here: notes it in the
+     * ledger.  0, or -1 where it is not for this node to say. */
+    int (*commit)(struct host_work *work, unsigned node, uint32_t brick);
+    /* A generation begins after a loss, work->lost and work->living are those
+     * of the new one: drops what does not count any more, closes all jobs. */
+    void (*lose)(struct host_work *work);
+    /* Sends a node what else is due to it, a message at most: true where it has
+     * sent one.  NULL: there is nothing else. */
+    bool (*send)(struct host_work *work, unsigned node);
+    /* A message of a type that the service does not know: false where the
+     * strategy does not either, or where it is not sound.  NULL: never. */
+    bool (*take)(struct host_work *work, const struct cube_message *message,
+                 struct host_error *error);
+};
+
+#endif
