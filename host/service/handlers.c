@@ -4,10 +4,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "failure_detector.h"
+#include "missing_links.h"
 #include "node/result.h"
 #include "node/totals.h"
-#include "missing_links.h"
-#include "failure_detector.h"
 
 /* A message that no sound node sends: what is wrong with it, as printf. */
 __attribute__((format(printf, 3, 4))) static int

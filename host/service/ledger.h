@@ -18,8 +18,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "host/order/order.h"
 #include "host/mesh/tetrahedra.h"
+#include "host/order/order.h"
 
 struct host_job {
     uint32_t epoch; /* 0: the node has no job */

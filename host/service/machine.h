@@ -15,8 +15,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "transport/cube.h"
 #include "host/base/error.h"
+#include "transport/cube.h"
 
 enum { HOST_NODES_MAX = 1024 }; /* of any machine: 2^CUBE_DIMENSION_MAX */
 

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "generations.h"
 #include "transport/wiring.h"
 
 enum {
@@ -83,7 +84,7 @@ static void end_search(struct host_service *s, uint64_t now_us, bool missing)
     next.absent_s = missing ? s->machine->absent_s : 0;
     if (missing) {
         tell(s, &next);
-        next.gateway = host_service_gateway(s, &next);
+        next.gateway = host_generation_gateway(s, &next);
         s->generations++;
     } else {
         next.dead_count = next.settled;
@@ -129,7 +130,7 @@ bool host_missing_links_check(struct host_service *service, uint64_t now_us,
         }
         return s->searching;
     }
-    found.gateway = host_service_gateway(s, &found);
+    found.gateway = host_generation_gateway(s, &found);
     if (s->here == s->work.living) {
         end_search(s, now_us,
                    false); /* all have come, or the wires are not needed */

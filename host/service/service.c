@@ -3,15 +3,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "transport/wiring.h"
+#include "failure_detector.h"
+#include "generations.h"
 #include "handlers.h"
 #include "missing_links.h"
-#include "failure_detector.h"
+#include "sending.h"
 
 enum {
     WINDOW_DEFAULT = 32,
     IDLE_US_MAX = 20000,
-    FRUITLESS_MAX = 64,
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
     CREDITS_SHARED = 128
@@ -78,326 +78,6 @@ static int read_all(struct host_service *s, unsigned *moved,
     return status;
 }
 
-static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
-                         const void *data, size_t size)
-{
-    bool sent = cube_write(s->cube, to, type, data, size) == 0;
-    s->node[to].sent += sent;
-    return sent;
-}
-
-/* The same for the strategy. */
-static bool write_counted(void *context, unsigned node, uint8_t type,
-                          const void *data, size_t size)
-{
-    return send_counted(context, (uint16_t)node, type, data, size);
-}
-
-static bool send_page(struct host_service *s, uint16_t to)
-{
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } body;
-    struct host_node *node = &s->node[to];
-    if (cube_room(s->cube, to) == 0) {
-        return false;
-    }
-    body.page = node->pages[node->pages_first];
-    size_t size = host_page(s->order, body.page, body.data);
-    if (!send_counted(s, to, NODE_PAGE, &body, 4 + size)) {
-        return false;
-    }
-    node->pages_first = (node->pages_first + 1) % HOST_PAGES_QUEUED_MAX;
-    node->pages_count--;
-    s->report[to].pages++;
-    s->report[to].page_bytes += size;
-    return true;
-}
-
-static bool send_unspill(struct host_service *s, uint16_t to,
-                         struct host_error *error)
-{
-    struct {
-        struct node_spill_header header;
-        struct incode_face faces[NODE_FACES_A_MESSAGE];
-    } body;
-    struct host_node *node = &s->node[to];
-    struct host_spill_list *list = &node->unspills[node->unspills_first].list;
-    if (cube_room(s->cube, to) == 0) {
-        return false;
-    }
-    body.header = node->unspills[node->unspills_first].header;
-    if (host_spill_take(&s->spill, list, body.faces, NODE_FACES_A_MESSAGE,
-                        &body.header.count, error) != 0) {
-        return false;
-    }
-    body.header.last = list->faces == 0;
-    body.header.sent = node->sent - node->missed;
-    if (body.header.last) {
-        node->unspills_first = (node->unspills_first + 1) % HOST_UNSPILLS_MAX;
-        node->unspills_count--;
-    }
-    return send_counted(s, to, NODE_UNSPILL, &body,
-                        sizeof body.header +
-                            body.header.count * sizeof body.faces[0]);
-}
-
-/* --- jobs ----------------------------------------------------------------- */
-
-static void give_job(struct host_service *s, unsigned to,
-                     const struct incode_job *job)
-{
-    struct host_node *node = &s->node[to];
-    node->job.job = *job;
-    node->job.epoch = host_ledger_open(&s->ledger, to, job->first, job->last);
-    node->job_due = true;
-    node->working = true;
-    node->reported = false;
-    s->working++;
-}
-
-/* Every node has its setup: the first jobs. */
-static void deal(struct host_service *s)
-{
-    struct incode_job job;
-    s->dealt = true;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->work.lost[i] && s->strategy->first(&s->work, i, &job)) {
-            give_job(s, i, &job);
-        }
-    }
-}
-
-/* Begins with the nodes as after their start: nothing is out, nothing asked
- * for, and each has to have its setup. */
-static void set_up(struct host_service *s)
-{
-    s->dealt = false;
-    s->working = 0;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        struct host_node *node = &s->node[i];
-        node->pages_first = node->pages_count = 0;
-        node->unspills_first = node->unspills_count = 0;
-        node->results = 0;
-        node->credit = s->setup.credits;
-        node->setup_due = true;
-        node->job_due = node->report_due = false;
-        node->working = node->reported = false;
-    }
-}
-
-/* --- the loop ------------------------------------------------------------- */
-
-/* The next message that is due to this node, pings apart; false: none, or no
- * room. */
-static bool serve_work(struct host_service *s, uint16_t to,
-                       struct host_error *error)
-{
-    struct host_node *node = &s->node[to];
-    if (!s->started || !s->report[to].here) {
-        return false; /* what goes before the first answer may get lost */
-    }
-    if (node->setup_due) {
-        struct node_setup_message setup = s->setup;
-        s->strategy->set_up(&s->work, to, &setup);
-        node->setup_due =
-            !send_counted(s, to, NODE_SETUP, &setup, sizeof setup);
-        return !node->setup_due;
-    }
-    struct incode_job job;
-    if (s->dealt && !node->working && s->strategy->next(&s->work, to, &job)) {
-        give_job(s, to, &job);
-    }
-    if (node->job_due) {
-        node->job_due =
-            !send_counted(s, to, NODE_JOB, &node->job, sizeof node->job);
-        return !node->job_due;
-    }
-    if (node->report_due) {
-        node->report_due = !send_counted(s, to, NODE_REPORT, NULL, 0);
-        return !node->report_due;
-    }
-    /* Half of the credit back at a time. */
-    uint32_t credit = node->results + s->setup.credits;
-    if (credit - node->credit >= s->setup.credits / 2) {
-        if (!send_counted(s, to, NODE_CREDIT, &credit, sizeof credit)) {
-            return false;
-        }
-        node->credit = credit;
-        return true;
-    }
-    if (s->strategy->send != NULL && s->strategy->send(&s->work, to)) {
-        return true;
-    }
-    if (node->unspills_count > 0) {
-        return send_unspill(s, to, error);
-    }
-    return node->pages_count > 0 && send_page(s, to);
-}
-
-/* A ping and a message of work in turn: on a slow wire the pings of many nodes
- * would leave no room for anything else. */
-static bool serve_node(struct host_service *s, uint16_t to,
-                       struct host_error *error)
-{
-    struct host_node *node = &s->node[to];
-    if (s->work.lost[to]) {
-        return false;
-    }
-    if (node->ping_due && !node->ping_last) {
-        node->ping_last = host_detector_ping(s, to);
-        return node->ping_last;
-    }
-    if (serve_work(s, to, error)) {
-        node->ping_last = false;
-        return true;
-    }
-    return node->ping_due && host_detector_ping(s, to);
-}
-
-/* Serves the nodes in turn, while the wire takes it. */
-static unsigned serve(struct host_service *s, struct host_error *error)
-{
-    unsigned sent = 0, idle = 0;
-    while (idle < s->machine->nodes && error->code == 0) {
-        if (serve_node(s, (uint16_t)s->turn, error)) {
-            sent++;
-            idle = 0;
-        } else {
-            idle++;
-        }
-        s->turn = (s->turn + 1) % s->machine->nodes;
-    }
-    return sent;
-}
-
-static bool pages_wait(const struct host_service *s)
-{
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (s->node[i].pages_count > 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* --- generations ---------------------------------------------------------- */
-
-/* Whether the host can speak by that node: by a wire, and on to another. */
-static bool speaks(const struct host_service *s, const struct cube_wiring *w,
-                   uint16_t gateway)
-{
-    unsigned dimension = s->machine->dimension;
-    bool on = dimension == 0;
-    for (unsigned d = 0; d < dimension; d++) {
-        on = on || !wiring_is_dead(w, w->dead_count, gateway, d, dimension);
-    }
-    return on &&
-           !wiring_is_dead(w, w->dead_count, gateway, dimension, dimension);
-}
-
-uint16_t host_service_gateway(const struct host_service *service,
-                              const struct cube_wiring *next)
-{
-    const struct host_service *s = service;
-    uint16_t other = next->gateway != 0 ? 0 : s->machine->spare_node;
-    return !speaks(s, next, next->gateway) && speaks(s, next, other)
-               ? other
-               : next->gateway;
-}
-
-/* The gateway must be there, and what was given up must not be on the way. */
-static int check_renewed(const struct host_service *s, struct host_error *error)
-{
-    const struct cube_wiring *w = cube_wiring(s->cube);
-    unsigned dimension = s->machine->dimension;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        bool dead = wiring_is_dead(w, w->dead_count, i, dimension, dimension);
-        if (i == w->gateway ? dead : s->node[i].given_up && !dead) {
-            return host_detector_doubt(s, i, error) != 0
-                       ? error->code
-                       : host_fail(
-                             error, HOST_CUBE,
-                             "node %u link %u: lost, and the cube cannot go "
-                             "on without it; look after that node and its "
-                             "wires, and run again",
-                             i, host_detector_link(s, i));
-        }
-    }
-    return 0;
-}
-
-/* In a new generation all nodes begin again, with what is not committed. */
-static int begin_again(struct host_service *s, uint64_t now_us,
-                       struct host_error *error)
-{
-    host_detector_begin(s, now_us);
-    if (check_renewed(s, error) != 0) {
-        return error->code;
-    }
-    if (s->started) {
-        s->strategy->lose(&s->work);
-        host_spill_clear(&s->spill);
-        set_up(s);
-    }
-    return 0;
-}
-
-/* Boards that reset themselves would have the run begin for ever. */
-static int check_progress(struct host_service *s, struct host_error *error)
-{
-    s->fruitless =
-        s->ledger.committed == s->committed_before ? s->fruitless + 1 : 0;
-    s->committed_before = s->ledger.committed;
-    return s->fruitless <= FRUITLESS_MAX
-               ? 0
-               : host_fail(error, HOST_CUBE,
-                           "node %u link %u: %u losses in a row, and nothing "
-                           "done between them; look after that node and its "
-                           "wires, and run again",
-                           s->blamed, host_detector_link(s, s->blamed),
-                           s->fruitless);
-}
-
-/* After a loss: a new generation, without what was given up. */
-static int renew(struct host_service *s, uint64_t now_us,
-                 struct host_error *error)
-{
-    struct cube_wiring next = *cube_wiring(s->cube);
-    unsigned dimension = s->machine->dimension;
-    s->loss = false;
-    if (s->started && s->ledger.committed == s->ledger.bricks) {
-        s->over = true; /* nothing is lost that is needed */
-        return 0;
-    }
-    if (check_progress(s, error) != 0) {
-        return error->code;
-    }
-    next.generation++;
-    if (s->searching) {
-        next.dead_count = next.settled; /* that a wire is absent shows later */
-    } else {
-        next.absent_s = s->started ? s->machine->absent_s : next.absent_s;
-    }
-    if (s->wire_lost) {
-        struct cube_dead dead = {next.gateway, (uint8_t)dimension};
-        (void)wiring_add_dead(&next, dead, dimension);
-        s->wire_lost = false;
-        s->wire_down_us = now_us;
-    }
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        struct cube_dead dead = {(uint16_t)i, CUBE_WHOLE_NODE};
-        if (s->node[i].given_up) {
-            (void)wiring_add_dead(&next, dead, dimension);
-        }
-    }
-    next.gateway = host_service_gateway(s, &next);
-    cube_renew(s->cube, &next);
-    s->generations++;
-    return begin_again(s, now_us, error);
-}
-
 /* One round of the loop: read, serve, and sleep where nothing moved. */
 int host_service_round(struct host_service *service, struct host_error *error)
 {
@@ -406,21 +86,21 @@ int host_service_round(struct host_service *service, struct host_error *error)
     unsigned moved = (unsigned)cube_poll(s->cube, now);
     /* Nodes that have served another start of the host know a later one. */
     if (cube_wiring(s->cube)->generation != s->generation &&
-        begin_again(s, now, error) != 0) {
+        host_generation_begin(s, now, error) != 0) {
         return error->code;
     }
     if (read_all(s, &moved, error) != 0) {
         return error->code;
     }
-    bool pages = s->started && pages_wait(s);
+    bool pages = s->started && host_sending_pages_wait(s);
     uint64_t begun = pages ? now_of(s) : 0;
-    moved += serve(s, error);
+    moved += host_sending_serve(s, error);
     s->pages_us += pages ? now_of(s) - begun : 0;
     if (error->code != 0 || host_detector_check(s, now, error) != 0) {
         return error->code;
     }
     if (s->loss) {
-        return renew(s, now, error);
+        return host_generation_renew(s, now, error);
     }
     if (moved == 0) {
         wait_for_wire(s, now);
@@ -470,7 +150,7 @@ static int prepare_work(struct host_service *s, struct host_error *error)
     work->order = s->order;
     work->ledger = &s->ledger;
     work->tets = s->tets;
-    work->write = write_counted;
+    work->write = host_sending_write;
     work->context = s;
     work->state = calloc(1, s->strategy->state_bytes + 1);
     return work->state != NULL
@@ -521,7 +201,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
         return error->code;
     }
     prepare(s);
-    set_up(s);
+    host_sending_begin(s);
     host_progress_start(&s->progress, s->show_progress);
     bool asked = false;
     while (!s->over && !(asked && all_reported(s))) {
@@ -530,7 +210,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
             return error->code;
         }
         if (!s->dealt && s->ready == s->work.living) {
-            deal(s);
+            host_sending_deal(s);
         }
         if (!asked && s->ledger.committed == s->ledger.bricks &&
             s->working == 0) {

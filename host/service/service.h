@@ -17,14 +17,14 @@
 #ifndef HOST_SERVICE_H
 #define HOST_SERVICE_H
 
-#include "node/message.h"
+#include "host/base/progress.h"
+#include "host/mesh/tetrahedra.h"
+#include "host/order/order.h"
 #include "ledger.h"
 #include "machine.h"
-#include "host/order/order.h"
-#include "host/base/progress.h"
+#include "node/message.h"
 #include "spill.h"
 #include "strategies/strategy.h"
-#include "host/mesh/tetrahedra.h"
 
 enum {
     HOST_PAGES_QUEUED_MAX = 256,
@@ -145,11 +145,6 @@ int host_service_run(struct host_service *service, struct host_error *error);
  * yet, and that nothing needed, until they are or are named.  At once where all
  * have been, as is the rule. */
 int host_service_wires(struct host_service *service, struct host_error *error);
-
-/* For missing_links.h: the node by which the host speaks from now on: as
- * before, or the other one that has a wire to the host. */
-uint16_t host_service_gateway(const struct host_service *service,
-                              const struct cube_wiring *next);
 
 /* Tells the nodes to stop, ends those that do not, and frees all. */
 void host_service_end(struct host_service *service);

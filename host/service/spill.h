@@ -14,8 +14,8 @@
 
 #include <stdint.h>
 
-#include "incode/triangulator.h"
 #include "host/base/error.h"
+#include "incode/triangulator.h"
 
 enum { HOST_SPILL_BLOCK_FACES = 42 };
 

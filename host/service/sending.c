@@ -1,0 +1,204 @@
+#include "sending.h"
+
+#include <string.h>
+
+#include "failure_detector.h"
+
+static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
+                         const void *data, size_t size)
+{
+    bool sent = cube_write(s->cube, to, type, data, size) == 0;
+    s->node[to].sent += sent;
+    return sent;
+}
+
+bool host_sending_write(void *service, unsigned node, uint8_t type,
+                        const void *data, size_t size)
+{
+    return send_counted(service, (uint16_t)node, type, data, size);
+}
+
+static bool send_page(struct host_service *s, uint16_t to)
+{
+    struct {
+        uint32_t page;
+        uint8_t data[INCODE_PAGE_BYTES];
+    } body;
+    struct host_node *node = &s->node[to];
+    if (cube_room(s->cube, to) == 0) {
+        return false;
+    }
+    body.page = node->pages[node->pages_first];
+    size_t size = host_page(s->order, body.page, body.data);
+    if (!send_counted(s, to, NODE_PAGE, &body, 4 + size)) {
+        return false;
+    }
+    node->pages_first = (node->pages_first + 1) % HOST_PAGES_QUEUED_MAX;
+    node->pages_count--;
+    s->report[to].pages++;
+    s->report[to].page_bytes += size;
+    return true;
+}
+
+static bool send_unspill(struct host_service *s, uint16_t to,
+                         struct host_error *error)
+{
+    struct {
+        struct node_spill_header header;
+        struct incode_face faces[NODE_FACES_A_MESSAGE];
+    } body;
+    struct host_node *node = &s->node[to];
+    struct host_spill_list *list = &node->unspills[node->unspills_first].list;
+    if (cube_room(s->cube, to) == 0) {
+        return false;
+    }
+    body.header = node->unspills[node->unspills_first].header;
+    if (host_spill_take(&s->spill, list, body.faces, NODE_FACES_A_MESSAGE,
+                        &body.header.count, error) != 0) {
+        return false;
+    }
+    body.header.last = list->faces == 0;
+    body.header.sent = node->sent - node->missed;
+    if (body.header.last) {
+        node->unspills_first = (node->unspills_first + 1) % HOST_UNSPILLS_MAX;
+        node->unspills_count--;
+    }
+    return send_counted(s, to, NODE_UNSPILL, &body,
+                        sizeof body.header +
+                            body.header.count * sizeof body.faces[0]);
+}
+
+static void give_job(struct host_service *s, unsigned to,
+                     const struct incode_job *job)
+{
+    struct host_node *node = &s->node[to];
+    node->job.job = *job;
+    node->job.epoch = host_ledger_open(&s->ledger, to, job->first, job->last);
+    node->job_due = true;
+    node->working = true;
+    node->reported = false;
+    s->working++;
+}
+
+void host_sending_deal(struct host_service *service)
+{
+    struct host_service *s = service;
+    struct incode_job job;
+    s->dealt = true;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->work.lost[i] && s->strategy->first(&s->work, i, &job)) {
+            give_job(s, i, &job);
+        }
+    }
+}
+
+void host_sending_begin(struct host_service *service)
+{
+    struct host_service *s = service;
+    s->dealt = false;
+    s->working = 0;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct host_node *node = &s->node[i];
+        node->pages_first = node->pages_count = 0;
+        node->unspills_first = node->unspills_count = 0;
+        node->results = 0;
+        node->credit = s->setup.credits;
+        node->setup_due = true;
+        node->job_due = node->report_due = false;
+        node->working = node->reported = false;
+    }
+}
+
+/* The next message that is due to this node, pings apart; false: none, or no
+ * room. */
+static bool serve_work(struct host_service *s, uint16_t to,
+                       struct host_error *error)
+{
+    struct host_node *node = &s->node[to];
+    if (!s->started || !s->report[to].here) {
+        return false; /* what goes before the first answer may get lost */
+    }
+    if (node->setup_due) {
+        struct node_setup_message setup = s->setup;
+        s->strategy->set_up(&s->work, to, &setup);
+        node->setup_due =
+            !send_counted(s, to, NODE_SETUP, &setup, sizeof setup);
+        return !node->setup_due;
+    }
+    struct incode_job job;
+    if (s->dealt && !node->working && s->strategy->next(&s->work, to, &job)) {
+        give_job(s, to, &job);
+    }
+    if (node->job_due) {
+        node->job_due =
+            !send_counted(s, to, NODE_JOB, &node->job, sizeof node->job);
+        return !node->job_due;
+    }
+    if (node->report_due) {
+        node->report_due = !send_counted(s, to, NODE_REPORT, NULL, 0);
+        return !node->report_due;
+    }
+    /* Half of the credit back at a time. */
+    uint32_t credit = node->results + s->setup.credits;
+    if (credit - node->credit >= s->setup.credits / 2) {
+        if (!send_counted(s, to, NODE_CREDIT, &credit, sizeof credit)) {
+            return false;
+        }
+        node->credit = credit;
+        return true;
+    }
+    if (s->strategy->send != NULL && s->strategy->send(&s->work, to)) {
+        return true;
+    }
+    if (node->unspills_count > 0) {
+        return send_unspill(s, to, error);
+    }
+    return node->pages_count > 0 && send_page(s, to);
+}
+
+/* A ping and a message of work in turn: on a slow wire the pings of many nodes
+ * would leave no room for anything else. */
+static bool serve_node(struct host_service *s, uint16_t to,
+                       struct host_error *error)
+{
+    struct host_node *node = &s->node[to];
+    if (s->work.lost[to]) {
+        return false;
+    }
+    if (node->ping_due && !node->ping_last) {
+        node->ping_last = host_detector_ping(s, to);
+        return node->ping_last;
+    }
+    if (serve_work(s, to, error)) {
+        node->ping_last = false;
+        return true;
+    }
+    return node->ping_due && host_detector_ping(s, to);
+}
+
+unsigned host_sending_serve(struct host_service *service,
+                            struct host_error *error)
+{
+    struct host_service *s = service;
+    unsigned sent = 0, idle = 0;
+    while (idle < s->machine->nodes && error->code == 0) {
+        if (serve_node(s, (uint16_t)s->turn, error)) {
+            sent++;
+            idle = 0;
+        } else {
+            idle++;
+        }
+        s->turn = (s->turn + 1) % s->machine->nodes;
+    }
+    return sent;
+}
+
+bool host_sending_pages_wait(const struct host_service *service)
+{
+    for (unsigned i = 0; i < service->machine->nodes; i++) {
+        if (service->node[i].pages_count > 0) {
+            return true;
+        }
+    }
+    return false;
+}
