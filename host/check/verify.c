@@ -316,8 +316,8 @@ int host_verify(const struct host_points *points, struct host_tetrahedra *tets,
     v.lowest = host_map(rows * sizeof *v.lowest);
     v.used = host_map(rows);
     if (v.lowest == NULL || v.used == NULL ||
-        (rows > 0 && (report->distinct = host_unique_rows(points->xyz, rows,
-                                                          v.lowest)) == 0)) {
+        (rows > 0 && (report->distinct = host_distinct_rows(points->xyz, rows,
+                                                            v.lowest)) == 0)) {
         host_fail_memory(error, "the check");
     } else {
         host_tetrahedra_sort(tets);

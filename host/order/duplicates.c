@@ -170,12 +170,12 @@ static void fill_part(void *context, unsigned part)
     }
     s->negative_zeros[part] = negative_zeros;
     size_t count = (size_t)(s->first[part + 1] - s->first[part]);
-    host_arrange_box(to - count, count, s->lo[part], s->hi[part]);
+    host_kd_box(to - count, count, s->lo[part], s->hi[part]);
 }
 
-static void fill_items(struct search *s, struct host_unique *unique)
+static void fill_items(struct search *s, struct host_distinct *distinct)
 {
-    s->items = unique->items;
+    s->items = distinct->items;
     s->parts = s->rows < COPY_ROWS ? 1 : s->parts;
     host_fork_all(s->parts, count_part, s);
     for (unsigned i = 0; i < s->parts; i++) {
@@ -183,22 +183,22 @@ static void fill_items(struct search *s, struct host_unique *unique)
     }
     host_fork_all(s->parts, fill_part, s);
     for (unsigned i = 0; i < s->parts; i++) {
-        unique->negative_zeros += s->negative_zeros[i];
+        distinct->negative_zeros += s->negative_zeros[i];
     }
     for (int d = 0; d < 3; d++) {
-        unique->lo[d] = INFINITY;
-        unique->hi[d] = -INFINITY;
+        distinct->lo[d] = INFINITY;
+        distinct->hi[d] = -INFINITY;
         for (unsigned i = 0; i < s->parts; i++) {
-            unique->lo[d] = fmin(unique->lo[d], s->lo[i][d]);
-            unique->hi[d] = fmax(unique->hi[d], s->hi[i][d]);
+            distinct->lo[d] = fmin(distinct->lo[d], s->lo[i][d]);
+            distinct->hi[d] = fmax(distinct->hi[d], s->hi[i][d]);
         }
     }
 }
 
-int host_unique_make(struct host_unique *unique, const double *xyz,
-                     uint64_t rows, struct host_error *error)
+int host_distinct_make(struct host_distinct *distinct, const double *xyz,
+                       uint64_t rows, struct host_error *error)
 {
-    *unique = (struct host_unique){0};
+    *distinct = (struct host_distinct){0};
     if (rows >= UINT32_MAX) {
         return host_fail(error, HOST_INPUT,
                          "host: %llu points are more than row numbers of 32 "
@@ -212,27 +212,27 @@ int host_unique_make(struct host_unique *unique, const double *xyz,
         return host_fail_memory(error, "the search for duplicates");
     }
     for (unsigned i = 0; i < s.parts; i++) {
-        unique->count += (size_t)s.distinct[i];
+        distinct->count += (size_t)s.distinct[i];
     }
-    unique->capacity = unique->count;
-    unique->items = host_map(unique->capacity * sizeof *unique->items);
-    if (unique->items == NULL) {
+    distinct->capacity = distinct->count;
+    distinct->items = host_map(distinct->capacity * sizeof *distinct->items);
+    if (distinct->items == NULL) {
         host_fail_memory(error, "the points");
     } else {
-        fill_items(&s, unique);
+        fill_items(&s, distinct);
     }
     host_unmap(s.doubled, (size_t)rows);
     return error->code;
 }
 
-void host_unique_free(struct host_unique *unique)
+void host_distinct_free(struct host_distinct *distinct)
 {
-    host_unmap(unique->items, unique->capacity * sizeof *unique->items);
-    *unique = (struct host_unique){0};
+    host_unmap(distinct->items, distinct->capacity * sizeof *distinct->items);
+    *distinct = (struct host_distinct){0};
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): the threads write it */
-uint64_t host_unique_rows(const double *xyz, uint64_t rows, uint32_t *lowest)
+uint64_t host_distinct_rows(const double *xyz, uint64_t rows, uint32_t *lowest)
 {
     struct search s = {.xyz = xyz, .rows = rows, .lowest = lowest};
     uint64_t distinct = 0;

@@ -1,23 +1,25 @@
-/* Input rows without their duplicates, -0.0 turned into 0.0, as records ready
- * to be arranged.
+/* Input rows without their duplicates, -0.0 turned into 0.0, as records for the
+ * k-d build.
  *
  * Memory: 32 bytes a distinct point, 12 to 25 more a row while it works.  Work:
  * O(n) expected, one hash table a thread.
  *
- *     host_unique_make(&unique, xyz, rows, &error);
- *     ... unique.items[0 .. unique.count) ...
- *     host_unique_free(&unique);
+ *     struct host_distinct distinct;
+ *     if (host_distinct_make(&distinct, xyz, rows, &error) != 0)
+ *         return error.code;
+ *     host_kd_box(distinct.items, distinct.count, lo, hi);
+ *     host_distinct_free(&distinct);
  */
-#ifndef HOST_UNIQUE_H
-#define HOST_UNIQUE_H
+#ifndef HOST_DUPLICATES_H
+#define HOST_DUPLICATES_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-#include "kd_build.h"
 #include "host/base/error.h"
+#include "kd_build.h"
 
-struct host_unique {
+struct host_distinct {
     struct host_item *items; /* in input order; row = the lowest of equals */
     size_t count;
     size_t capacity;
@@ -25,12 +27,12 @@ struct host_unique {
     double lo[3], hi[3];     /* tight box */
 };
 
-int host_unique_make(struct host_unique *unique, const double *xyz,
-                     uint64_t rows, struct host_error *error);
-void host_unique_free(struct host_unique *unique);
+int host_distinct_make(struct host_distinct *distinct, const double *xyz,
+                       uint64_t rows, struct host_error *error);
+void host_distinct_free(struct host_distinct *distinct);
 
 /* For every row the lowest row of the same point, into lowest[rows] (all
  * threads).  Returns the number of distinct points, 0 without memory. */
-uint64_t host_unique_rows(const double *xyz, uint64_t rows, uint32_t *lowest);
+uint64_t host_distinct_rows(const double *xyz, uint64_t rows, uint32_t *lowest);
 
 #endif

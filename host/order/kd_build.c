@@ -12,8 +12,8 @@ enum {
     FORK_ITEMS = 1 << 13, /* fewer items than this are not worth a thread */
 };
 
-void host_arrange_box(const struct host_item *items, size_t n, double lo[3],
-                      double hi[3])
+void host_kd_box(const struct host_item *items, size_t n, double lo[3],
+                 double hi[3])
 {
     double l0 = INFINITY, l1 = INFINITY, l2 = INFINITY;
     double h0 = -INFINITY, h1 = -INFINITY, h2 = -INFINITY;
@@ -30,7 +30,7 @@ void host_arrange_box(const struct host_item *items, size_t n, double lo[3],
     hi[0] = h0, hi[1] = h1, hi[2] = h2;
 }
 
-int host_arrange_longest(const double lo[3], const double hi[3])
+int host_kd_longest(const double lo[3], const double hi[3])
 {
     int longest = 0;
     double best = -1;
@@ -73,7 +73,7 @@ static size_t partition_not_greater(struct host_item *a, size_t n, int d,
     return m;
 }
 
-size_t host_arrange_below(struct host_item *items, size_t n, int d, double wall)
+size_t host_kd_below(struct host_item *items, size_t n, int d, double wall)
 {
     return partition_less(items, n, d, 1, wall);
 }
@@ -153,8 +153,8 @@ static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
     return key[rank >= s ? s - 1 : rank];
 }
 
-void host_arrange_rank(struct host_item *a, size_t n, size_t k, int d,
-                       int from_above)
+void host_kd_rank(struct host_item *a, size_t n, size_t k, int d,
+                  int from_above)
 {
     int order[3] = {d, d == 0 ? 1 : 0, d == 2 ? 1 : 2};
     double sign = from_above ? -1 : 1;
@@ -184,15 +184,15 @@ void host_arrange_rank(struct host_item *a, size_t n, size_t k, int d,
 }
 
 /* Cuts n > 8 items into leaves of 8: the first part is a multiple of 8. */
-static void arrange_leaves(struct host_item *a, size_t n)
+static void build_leaves(struct host_item *a, size_t n)
 {
     while (n > INCODE_LEAF_POINTS) {
         double lo[3], hi[3];
-        host_arrange_box(a, n, lo, hi);
+        host_kd_box(a, n, lo, hi);
         size_t leaves = (n + INCODE_LEAF_POINTS - 1) / INCODE_LEAF_POINTS;
         size_t k = (leaves / 2) * INCODE_LEAF_POINTS;
-        host_arrange_rank(a, n, k, host_arrange_longest(lo, hi), 0);
-        arrange_leaves(a, k);
+        host_kd_rank(a, n, k, host_kd_longest(lo, hi), 0);
+        build_leaves(a, k);
         a += k, n -= k;
     }
 }
@@ -224,21 +224,21 @@ struct task {
     void *context;
 };
 
-static void arrange(void *argument)
+static void build(void *argument)
 {
     struct task *t = argument;
     if (t->n <= INCODE_BRICK_POINTS) {
-        arrange_leaves(t->items, t->n);
+        build_leaves(t->items, t->n);
         t->sink(t->context, t->first_brick, t->items, t->n);
         return;
     }
     double lo[3], hi[3];
-    host_arrange_box(t->items, t->n, lo, hi);
-    int d = host_arrange_longest(lo, hi);
+    host_kd_box(t->items, t->n, lo, hi);
+    int d = host_kd_longest(lo, hi);
     size_t bricks = (t->n + INCODE_BRICK_POINTS - 1) / INCODE_BRICK_POINTS;
     uint32_t cut = cut_bricks(t->first_brick, (uint32_t)bricks);
     size_t k = (size_t)cut * INCODE_BRICK_POINTS;
-    host_arrange_rank(t->items, t->n, k, d, (int)(t->from_above >> d & 1));
+    host_kd_rank(t->items, t->n, k, d, (int)(t->from_above >> d & 1));
     struct task first = *t, second = *t;
     first.n = k;
     second.items += k;
@@ -251,21 +251,20 @@ static void arrange(void *argument)
         struct host_fork fork;
         first.threads = t->threads / 2;
         second.threads = t->threads - first.threads;
-        host_fork_start(&fork, arrange, &first);
-        arrange(&second);
+        host_fork_start(&fork, build, &first);
+        build(&second);
         host_fork_join(&fork);
     } else {
-        arrange(&first);
-        arrange(&second);
+        build(&first);
+        build(&second);
     }
 }
 
-void host_arrange_bricks(struct host_item *items, size_t n,
-                         uint32_t first_brick, unsigned threads,
-                         host_brick_sink *sink, void *context)
+void host_kd_bricks(struct host_item *items, size_t n, uint32_t first_brick,
+                    unsigned threads, host_brick_sink *sink, void *context)
 {
     struct task task = {items, n, first_brick, threads, 0, sink, context};
     if (n > 0) {
-        arrange(&task);
+        build(&task);
     }
 }

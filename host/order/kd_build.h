@@ -1,15 +1,15 @@
-/* The k-d arrangement itself: points as records, selected by rank and moved in
- * place until bricks and their leaves are compact.
+/* The k-d build: points as records, selected by rank and moved in place until
+ * bricks and their leaves are compact.
  *
  * Memory: the records (32 bytes a point), O(log n) stack.  Work: O(n log n),
  * two or three moves a point and level.
  *
- *     host_arrange_box(items, n, lo, hi);
- *     below = host_arrange_below(items, n, 0, wall);
- *     host_arrange_bricks(items, n, first_brick, threads, emit, context);
+ *     host_kd_box(items, n, lo, hi);
+ *     size_t below = host_kd_below(items, n, 0, wall);
+ *     host_kd_bricks(items + below, n - below, 7, threads, sink, context);
  */
-#ifndef HOST_ARRANGE_H
-#define HOST_ARRANGE_H
+#ifndef HOST_KD_BUILD_H
+#define HOST_KD_BUILD_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -24,25 +24,23 @@ typedef void host_brick_sink(void *context, uint32_t brick,
                              const struct host_item *items, size_t count);
 
 /* Tight box; (+inf, -inf) for none. */
-void host_arrange_box(const struct host_item *items, size_t n, double lo[3],
-                      double hi[3]);
+void host_kd_box(const struct host_item *items, size_t n, double lo[3],
+                 double hi[3]);
 
 /* The dimension in which the box is longest, the first of equals. */
-int host_arrange_longest(const double lo[3], const double hi[3]);
+int host_kd_longest(const double lo[3], const double hi[3]);
 
 /* Moves the items with c[d] < wall to the front; returns how many. */
-size_t host_arrange_below(struct host_item *items, size_t n, int d,
-                          double wall);
+size_t host_kd_below(struct host_item *items, size_t n, int d, double wall);
 
 /* Moves the k smallest to the front, by c[d], ties by (x, y, z); no two items
  * are equal.  `from_above`: the k largest. */
-void host_arrange_rank(struct host_item *items, size_t n, size_t k, int d,
-                       int from_above);
+void host_kd_rank(struct host_item *items, size_t n, size_t k, int d,
+                  int from_above);
 
-/* Arranges items as bricks first_brick, .. and calls sink once for each, from
+/* Orders items as bricks first_brick, .. and calls sink once for each, from
  * up to `threads` threads. */
-void host_arrange_bricks(struct host_item *items, size_t n,
-                         uint32_t first_brick, unsigned threads,
-                         host_brick_sink *sink, void *context);
+void host_kd_bricks(struct host_item *items, size_t n, uint32_t first_brick,
+                    unsigned threads, host_brick_sink *sink, void *context);
 
 #endif

@@ -56,14 +56,14 @@ static void cut_regions(void *argument)
     double wall;
     if (c->partition == HOST_UNIFORM) {
         wall = 0.5 * c->lo[d] + 0.5 * c->hi[d];
-        k = host_arrange_below(items, c->n, d, wall);
+        k = host_kd_below(items, c->n, d, wall);
     } else {
         double lo[3], hi[3];
-        host_arrange_box(items, c->n, lo, hi);
-        d = c->n > 0 ? host_arrange_longest(lo, hi) : 0;
+        host_kd_box(items, c->n, lo, hi);
+        d = c->n > 0 ? host_kd_longest(lo, hi) : 0;
         k = half_rank(c->n);
-        host_arrange_rank(items, c->n, k, d, 0);
-        host_arrange_box(items + k, c->n - k, lo, hi);
+        host_kd_rank(items, c->n, k, d, 0);
+        host_kd_box(items + k, c->n - k, lo, hi);
         wall = k < c->n ? lo[d] : c->hi[d];
     }
     struct cut lower = *c, upper = *c;
@@ -112,14 +112,14 @@ struct spread {
     unsigned threads;
 };
 
-/* Arranges a run of regions, forking where there are threads and points. */
-static void arrange_regions(void *argument)
+/* Builds a run of regions, forking where there are threads and points. */
+static void build_regions(void *argument)
 {
     struct spread *s = argument;
     if (s->regions == 1) {
-        host_arrange_bricks(s->items + s->first, s->n,
-                            s->order->region[s->region].first, s->threads,
-                            store_brick, s->order);
+        host_kd_bricks(s->items + s->first, s->n,
+                       s->order->region[s->region].first, s->threads,
+                       store_brick, s->order);
         return;
     }
     struct spread lower = *s, upper = *s;
@@ -134,12 +134,12 @@ static void arrange_regions(void *argument)
         struct host_fork fork;
         lower.threads = s->threads / 2;
         upper.threads = s->threads - lower.threads;
-        host_fork_start(&fork, arrange_regions, &lower);
-        arrange_regions(&upper);
+        host_fork_start(&fork, build_regions, &lower);
+        build_regions(&upper);
         host_fork_join(&fork);
     } else {
-        arrange_regions(&lower);
-        arrange_regions(&upper);
+        build_regions(&lower);
+        build_regions(&upper);
     }
 }
 
@@ -289,7 +289,7 @@ static int make_grid(struct host_order *order, struct host_error *error)
 /* --- Dimension -------------------------------------------------------- */
 
 /* Points that span the space: the first that is off the first two's line, the
- * first that is off that plane.  Neighbours in the arrangement are close, so
+ * first that is off that plane.  Neighbours in this order are close, so
  * the second point is taken from the far end. */
 static int check_dimension(const struct host_order *order, const char *where,
                            struct host_error *error)
@@ -334,9 +334,8 @@ static int allocate(struct host_order *order, struct host_error *error)
     return 0;
 }
 
-static int arrange_items(struct host_order *order, struct host_item *items,
-                         enum host_partition partition,
-                         struct host_error *error)
+static int build_items(struct host_order *order, struct host_item *items,
+                       enum host_partition partition, struct host_error *error)
 {
     struct cut cut = {.order = order,
                       .items = items,
@@ -364,7 +363,7 @@ static int arrange_items(struct host_order *order, struct host_item *items,
                             .regions = order->regions,
                             .n = order->points,
                             .threads = host_threads()};
-    arrange_regions(&spread);
+    build_regions(&spread);
     make_boxes(order);
     return 0;
 }
@@ -375,28 +374,28 @@ int host_order_make(struct host_order *order, const char *where,
                     struct host_error *error)
 {
     *order = (struct host_order){.rows = rows, .regions = regions};
-    struct host_unique unique;
-    if (host_unique_make(&unique, xyz, rows, error) != 0) {
+    struct host_distinct distinct;
+    if (host_distinct_make(&distinct, xyz, rows, error) != 0) {
         return error->code;
     }
-    order->points = (uint32_t)unique.count;
-    order->duplicates = rows - unique.count;
-    order->negative_zeros = unique.negative_zeros;
-    if (unique.count < 4) {
+    order->points = (uint32_t)distinct.count;
+    order->duplicates = rows - distinct.count;
+    order->negative_zeros = distinct.negative_zeros;
+    if (distinct.count < 4) {
         host_fail(error, HOST_INPUT,
                   "%s: %u distinct points (of %llu) where a tetrahedron has 4; "
                   "give more points",
                   where, order->points, (unsigned long long)rows);
     }
-    memcpy(order->lo, unique.lo, sizeof order->lo);
-    memcpy(order->hi, unique.hi, sizeof order->hi);
+    memcpy(order->lo, distinct.lo, sizeof order->lo);
+    memcpy(order->hi, distinct.hi, sizeof order->hi);
     order->region = calloc(regions, sizeof *order->region);
     if (order->region == NULL) {
         host_fail_memory(error, "the regions");
     } else if (error->code == 0) {
-        arrange_items(order, unique.items, partition, error);
+        build_items(order, distinct.items, partition, error);
     }
-    host_unique_free(&unique);
+    host_distinct_free(&distinct);
     if (error->code == 0) {
         check_dimension(order, where, error);
     }

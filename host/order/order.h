@@ -1,5 +1,5 @@
 /* The points in the order of the run: duplicates merged, -0.0 turned into 0.0,
- * cut into regions, each region a balanced k-d arrangement of bricks of 64
+ * cut into regions, each region a balanced k-d order of bricks of 64
  * points and leaves of 8 (see incode/pages.h), with the pages that nodes ask
  * for.
  *

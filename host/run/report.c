@@ -3,7 +3,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/mesh/gen.h"
 #include "host/order/names.h"
 #include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
@@ -25,7 +24,7 @@ static double ratio(double a, double b)
     return b > 0.0 ? a / b : 0.0;
 }
 
-static void table_head(FILE *file, const char *title)
+void host_report_head(FILE *file, const char *title)
 {
     fprintf(file,
             "\n%s\n"
@@ -34,8 +33,8 @@ static void table_head(FILE *file, const char *title)
             "tetrahedra", "dupl.", "cpu_max", "speed-up", "eff.");
 }
 
-static void table_row(FILE *file, const struct host_run_result *r,
-                      const struct host_run_result *alone)
+void host_report_row(FILE *file, const struct host_run_result *r,
+                     const struct host_run_result *alone)
 {
     double wall = ratio(alone->t_max_s, r->t_max_s);
     double cpu = ratio(busiest(alone), busiest(r));
@@ -48,7 +47,7 @@ static void table_row(FILE *file, const struct host_run_result *r,
             cpu / r->nodes);
 }
 
-static void table_notes(FILE *file)
+void host_report_notes(FILE *file)
 {
     fprintf(file,
             "Seconds; t_min, t_max: of the fastest and the slowest node, on "
@@ -155,82 +154,13 @@ void host_report_run(FILE *file, const struct host_run_options *options,
         snprintf(title, sizeof title, "%s, %s partition, index %s",
                  r->strategy->title, host_partitions[r->partition],
                  host_indexes[r->index]);
-        table_head(file, title);
-        table_row(file, alone, alone);
-        table_row(file, r, alone);
-        table_notes(file);
+        host_report_head(file, title);
+        host_report_row(file, alone, alone);
+        host_report_row(file, r, alone);
+        host_report_notes(file);
         node_lines(file, r);
     }
     if (options->map) {
         host_report_map(file, r);
     }
-}
-
-/* One row of a table: `points` on so many nodes. */
-static int bench_row(const struct host_run_options *options,
-                     const struct host_points *points, unsigned nodes,
-                     struct host_run_result *result, struct host_error *error)
-{
-    struct host_run_options row = *options;
-    struct host_tetrahedra tets = {0};
-    row.nodes = nodes;
-    row.strategy = &host_spatial;
-    row.quiet = true;
-    memset(result, 0, sizeof *result);
-    int status = host_triangulate(&row, points, &tets, result, error);
-    host_tetrahedra_free(&tets);
-    return status;
-}
-
-static int bench_table(const struct host_run_options *options, const char *kind,
-                       const char *name, uint64_t n, unsigned nodes_max,
-                       struct host_error *error)
-{
-    static struct host_run_result alone, result;
-    struct host_points points = {0};
-    char title[128];
-    int status = host_gen(kind, n, 1, &points, error);
-    snprintf(title, sizeof title, "%s, %llu points, %s partition", name,
-             (unsigned long long)n, host_partitions[options->partition]);
-    table_head(stdout, title);
-    for (unsigned nodes = 1; status == 0 && nodes <= nodes_max; nodes *= 2) {
-        status = bench_row(options, &points, nodes, &result, error);
-        if (nodes == 1) {
-            alone = result;
-        }
-        if (status == 0) {
-            table_row(stdout, &result, &alone);
-            fflush(stdout);
-        }
-    }
-    host_points_free(&points);
-    return status;
-}
-
-int host_bench_paper(const struct host_run_options *options, unsigned nodes_max,
-                     struct host_error *error)
-{
-    static const struct {
-        const char *kind, *name;
-        uint64_t n;
-    } sets[] = {{"uniform", "Uniform", 10000},
-                {"bubbles", "Bubbles", 20000},
-                {"bluntfin", "Bluntfin", 10000}};
-    struct host_run_options row = *options;
-    int status = 0;
-    printf("Table 2: spatial decomposition of uniform sets\n");
-    row.partition = HOST_UNIFORM;
-    for (uint64_t n = 10000; status == 0 && n <= 20000; n += 10000) {
-        status = bench_table(&row, "uniform", "Uniform", n, nodes_max, error);
-    }
-    printf("\nTable 4: adaptive and uniform partition\n");
-    for (unsigned i = 0; status == 0 && i < 3; i++) {
-        for (unsigned k = 0; status == 0 && k < 2; k++) {
-            row.partition = k == 0 ? HOST_ADAPTIVE : HOST_UNIFORM;
-            status = bench_table(&row, sets[i].kind, sets[i].name, sets[i].n,
-                                 nodes_max, error);
-        }
-    }
-    table_notes(stdout);
-    return status;
 }

@@ -1,9 +1,10 @@
-/* What a run and a bench print for people.
+/* What a run prints for people, and the paper's table of which benches are made
+ * too.
  *
  * Memory: none.  Work: a line a node or a row.
  *
  *     host_report_run(stdout, &options, &result, &alone);
- *     host_bench_paper(&options, 8, &error);
+ *     host_report_map(stdout, &result);
  */
 #ifndef HOST_REPORT_H
 #define HOST_REPORT_H
@@ -21,8 +22,11 @@ void host_report_run(FILE *file, const struct host_run_options *options,
 /* How the tables of node 0 fill its memory. */
 void host_report_map(FILE *file, const struct host_run_result *result);
 
-/* Tables 2 and 4 of the paper on this machine, for 1 to nodes_max nodes. */
-int host_bench_paper(const struct host_run_options *options, unsigned nodes_max,
-                     struct host_error *error);
+/* The columns of the paper's Table 2: their head, under a title; a row, with
+ * the speed-up against `alone`; and what the columns are. */
+void host_report_head(FILE *file, const char *title);
+void host_report_row(FILE *file, const struct host_run_result *result,
+                     const struct host_run_result *alone);
+void host_report_notes(FILE *file);
 
 #endif

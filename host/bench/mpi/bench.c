@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "transport/drivers/mpi.h"
-#include "host/bench/bench_links.h"
+#include "host/bench/bench_end.h"
 
 static struct mpi_place place;
 static struct mpi_pipe wire;

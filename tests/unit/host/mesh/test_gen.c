@@ -121,7 +121,7 @@ static void seeds_differ_and_points_do_not_repeat(void **unused)
         struct host_points b = made(kinds[i], 2000, 2);
         assert_memory_not_equal(a.xyz, b.xyz, 24 * 2000);
         uint32_t lowest[2000];
-        assert_int_equal(host_unique_rows(a.xyz, 2000, lowest), 2000);
+        assert_int_equal(host_distinct_rows(a.xyz, 2000, lowest), 2000);
         host_points_free(&a);
         host_points_free(&b);
     }

@@ -347,16 +347,16 @@ static void signed_zeros_are_counted(void **unused)
     (void)unused;
     const size_t rows = (1 << 17) + 5;
     double *xyz = random_points(rows, 0);
-    struct host_unique distinct;
+    struct host_distinct distinct;
     struct host_error error = {0};
     uint64_t count = 0;
     for (size_t i = 0; i < 3 * rows; i += 7) {
         xyz[i] = i % 2 == 0 ? -0.0 : 0.0;
         count += i % 2 == 0;
     }
-    assert_int_equal(host_unique_make(&distinct, xyz, rows, &error), 0);
+    assert_int_equal(host_distinct_make(&distinct, xyz, rows, &error), 0);
     assert_int_equal(distinct.negative_zeros, count);
-    host_unique_free(&distinct);
+    host_distinct_free(&distinct);
     free(xyz);
 }
 
