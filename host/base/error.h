@@ -4,8 +4,9 @@
  * Memory: the struct alone.  Work: one vsnprintf.
  *
  *     struct host_error error = {0};
- *     if (host_points_read("a.xyz", &points, &error) != 0)
- *         return fprintf(stderr, "incode: %s\n", error.text), error.code;
+ *     if (fopen("a.xyz", "rb") == NULL)
+ *         return host_fail(&error, HOST_INPUT, "a.xyz: %s; give a file",
+ *                          strerror(errno));
  */
 #ifndef HOST_ERROR_H
 #define HOST_ERROR_H

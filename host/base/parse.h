@@ -3,7 +3,8 @@
  *
  * Memory: none.  Work: one pass over the text.
  *
- *     if (host_parse_number(text, 1, 64, &nodes) != 0 ||
+ *     uint64_t nodes, memory;
+ *     if (host_parse_number("8", 1, 64, &nodes) != 0 ||
  *         host_parse_bytes("4M", &memory) != 0)
  *         return -1;
  */

@@ -3,8 +3,9 @@
  *
  * Memory: the struct.  Work: a line at most ten times a second.
  *
- *     host_progress_start(&progress, wanted);
- *     host_progress_show(&progress, done, total, tetrahedra, now_us);
+ *     struct host_progress progress;
+ *     host_progress_start(&progress, true);
+ *     host_progress_show(&progress, done, total, tetrahedra);
  *     host_progress_end(&progress);
  */
 #ifndef HOST_PROGRESS_H

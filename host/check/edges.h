@@ -5,8 +5,9 @@
  * a sort at each vertex; all threads.
  *
  *     uint64_t edges;
- *     if (host_edges_count(&tets, rows, &edges, &error) != 0) ...
- *     euler = vertices - edges + facets - tets.count;
+ *     if (host_edges_count(&tets, rows, &edges, &error) != 0)
+ *         return error.code;
+ *     int64_t euler = (int64_t)(vertices - edges + facets - tets.count);
  */
 #ifndef HOST_EDGES_H
 #define HOST_EDGES_H

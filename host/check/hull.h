@@ -9,8 +9,9 @@
  * Memory: 56 bytes a facet.  Work: O(f log f).
  *
  *     struct host_hull hull = {.points = &points, .tets = &tets};
- *     host_hull_add(&hull, tet, corner, &error);
- *     faults = host_hull_check(&hull, &listener, &error);
+ *     if (host_hull_add(&hull, 7, 0, &error) != 0) // opposite corner 0
+ *         return error.code;
+ *     return host_hull_check(&hull, &listener, &error);
  */
 #ifndef HOST_HULL_H
 #define HOST_HULL_H

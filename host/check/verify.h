@@ -7,8 +7,8 @@
  * O(tetrahedra) for vertices of bounded degree, two threads, about 1 us a
  * tetrahedron.
  *
- *     if (host_verify(&points, &tets, &report, &error) != 0)
- *         fputs(report.text, stderr);   error.code is HOST_UNVERIFIED
+ *     if (host_verify(&points, &tets, &report, &error) == HOST_UNVERIFIED)
+ *         fputs(report.text, stderr);
  */
 #ifndef HOST_VERIFY_H
 #define HOST_VERIFY_H

@@ -6,10 +6,11 @@
  * Memory: a buffer of 1 MiB an output that is open; its names until the end.
  * Work: one copy, a write a MiB.
  *
- *     if (host_output_open(&out, "a.ele", &error) != 0) ...
- *     host_output_unsigned(&out, 7); host_output_text(&out, "\n");
- *     host_output_close(&out, 1, &error);
- *     ... other outputs, and what else may fail ...
+ *     if (host_output_open(&out, "a.ele", &error) != 0)
+ *         return error.code;
+ *     host_output_unsigned(&out, 7);
+ *     host_output_text(&out, "\n");
+ *     host_output_close(&out, 1, &error);  // so may others, and what may fail
  *     return host_output_commit(&error);
  */
 #ifndef HOST_OUTPUT_H

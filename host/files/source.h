@@ -4,7 +4,8 @@
  * pass.
  *
  *     struct host_source source;
- *     if (host_source_open(&source, "a.xyz.gz", &error) != 0) ...
+ *     if (host_source_open(&source, "a.xyz.gz", &error) != 0)
+ *         return error.code;
  *     host_source_close(&source);
  */
 #ifndef HOST_SOURCE_H

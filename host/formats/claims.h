@@ -7,7 +7,8 @@
  *
  *     struct host_claims claims = {0};
  *     host_claims_read(&claims, "a.node", &error);
- *     if (host_claims_write(&claims, "-o ", "a.ele", &error) != 0) ...
+ *     if (host_claims_write(&claims, "-o ", "a.ele", &error) != 0)
+ *         return error.code;
  *     host_claims_free(&claims);
  */
 #ifndef HOST_CLAIMS_H

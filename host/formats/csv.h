@@ -3,7 +3,8 @@
  * Memory: none.  Work: one pass over a line.
  *
  *     struct host_csv csv = {0};
- *     if (host_csv_header(&csv, &scan, &error) != 0) ...
+ *     if (host_csv_header(&csv, &scan, &error) != 0)
+ *         return error.code;
  *     while (csv.fields > 0 && host_scan_skip_blank_lines(&scan))
  *         host_csv_row(&csv, &scan, xyz, &error);
  */

@@ -7,9 +7,9 @@
  *
  * Memory: a reader's, what it appends; a writer's, none.  Work: one pass.
  *
- *     const struct host_format host_format_xyz = {
- *         .name = "text", .extensions = {".xyz", ".txt"},
- *         .read_points = read_xyz, .write_points = write_xyz};
+ *     const struct host_format host_format_planets = {
+ *         .name = "planets", .extensions = {".planets"},
+ *         .read_points = read_planets, .write_points = write_planets};
  */
 #ifndef HOST_FORMAT_H
 #define HOST_FORMAT_H

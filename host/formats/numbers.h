@@ -3,8 +3,8 @@
  * Memory: none.  Work: a load or a copy a number.
  *
  *     enum host_number type = host_number_named("Float32");
- *     double x = host_number_at(bytes, type, true);
- *     host_put_double(out, x, false);
+ *     double x = host_number_at(data, type, true);
+ *     host_put_double(&out, x, false);
  */
 #ifndef HOST_NUMBERS_H
 #define HOST_NUMBERS_H

@@ -2,10 +2,10 @@
  *
  * Memory: none.  Work: that of the numbers.
  *
- *     if (host_take_element(mesh, vertex, 1, source, &scan, error) != 0 ||
- *         host_take_section_end(&scan, error) != 0)
- *         return error->code;
- *     host_put_row(out, tets->v[0], 4, 1);
+ *     if (host_take_element(&mesh, number, 1, &source, &scan, &error) != 0 ||
+ *         host_take_section_end(&scan, &error) != 0)
+ *         return error.code;
+ *     host_put_row(&out, tets.v[0], 4, 1);
  */
 #ifndef HOST_ROWS_H
 #define HOST_ROWS_H

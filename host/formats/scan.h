@@ -6,7 +6,8 @@
  *
  *     struct host_scan s = host_scan_start("a.xyz", data, bytes);
  *     while (host_scan_skip_blank_lines(&s))
- *         if (host_scan_double(&s, &x, &error) != 0) return error.code;
+ *         if (host_scan_double(&s, &x, &error) != 0)
+ *             return error.code;
  */
 #ifndef HOST_SCAN_H
 #define HOST_SCAN_H

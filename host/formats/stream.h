@@ -2,9 +2,11 @@
  *
  * Memory: none.  Work: that of host_scan_double or of a load.
  *
- *     struct host_stream s = {.source = source, .type = HOST_F32, .big = true,
+ *     struct host_stream s = {.source = &source, .type = HOST_F32, .big = true,
  *                             .at = data, .end = data + bytes};
- *     while (n-- > 0 && host_stream_next(&s, &value, &error) == 0) ...
+ *     double value, sum = 0.0;
+ *     while (n-- > 0 && host_stream_next(&s, &value, &error) == 0)
+ *         sum += value;
  */
 #ifndef HOST_STREAM_H
 #define HOST_STREAM_H

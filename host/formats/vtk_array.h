@@ -4,8 +4,9 @@
  * Memory: the bytes that come out.  Work: one pass.
  *
  *     struct vtk_array a;
- *     vtk_array_unpack(&a, source, &coding, text, bytes, &error);
- *     ... a.data[0 .. a.bytes) ...;  vtk_array_free(&a);
+ *     if (vtk_array_unpack(&a, &source, &coding, text, bytes, &error) == 0)
+ *         fwrite(a.data, 1, a.bytes, stdout);
+ *     vtk_array_free(&a);
  */
 #ifndef HOST_VTK_ARRAY_H
 #define HOST_VTK_ARRAY_H

@@ -5,7 +5,8 @@
  * tetrahedron and 8 a point.  Work: one pass, about 100 ns a tetrahedron as
  * text.
  *
- *     host_tetrahedra_map(&tets, order.row); host_tetrahedra_sort(&tets);
+ *     host_tetrahedra_map(&tets, order.row);
+ *     host_tetrahedra_sort(&tets);
  *     if (host_write("out.vtu", &points, &tets, &error) != 0)
  *         return error.code;
  *     return host_output_commit(&error);

@@ -4,8 +4,10 @@
  * Memory: 4 bytes a tetrahedron and 8 a vertex.  Work: two passes; a group of g
  * facets O(g log g).
  *
- *     host_adjacency_make(&a, &tets, rows, &error);
- *     n = host_adjacency_group(&a, p, &group, &error);
+ *     if (host_adjacency_make(&a, &tets, rows, &error) != 0 ||
+ *         host_adjacency_group(&a, p, &group, &error) != 0)
+ *         return error.code;
+ *     host_group_free(&group);
  *     host_adjacency_free(&a);
  */
 #ifndef HOST_ADJACENCY_H

@@ -7,7 +7,9 @@
  * Memory: 8 bytes a vertex number.  Work: about 20 ns a tetrahedron, if their
  * vertices lie close in number; wrong once in 2^64 / V.
  *
- *     host_hull_facets(&tets, 64 * order.bricks, &facets, &error);
+ *     uint64_t facets;
+ *     if (host_hull_facets(&tets, rows, &facets, &error) != 0)
+ *         return error.code;
  */
 #ifndef HOST_FACETS_H
 #define HOST_FACETS_H

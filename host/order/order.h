@@ -6,9 +6,11 @@
  * Memory: 28 bytes a point at the end, 60 at most while it works (input rows
  * not counted).  Work: O(n log n), about 100 ms a million points on two cores.
  *
- *     host_order_make(&order, xyz, rows, HOST_ADAPTIVE, 8, false, &error);
- *     bytes = host_page(&order, page, buffer);
- *     row = order.row[vertex];
+ *     if (host_order_make(&order, "a.xyz", points.xyz, points.count,
+ *                         HOST_ADAPTIVE, 8, false, &error) != 0)
+ *         return error.code;
+ *     size_t bytes = host_page(&order, 0, buffer);
+ *     uint32_t row = order.row[vertex];
  */
 #ifndef HOST_ORDER_H
 #define HOST_ORDER_H
