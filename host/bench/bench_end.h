@@ -3,7 +3,7 @@
  *
  * Memory: a link.  Work: some seconds.
  *
- *     struct host_bench_end end = {pipe, idle, context, {0}};
+ *     struct host_bench_end end = {.pipe = pipe, .idle = idle};
  *     struct host_bench_row row;
  *     if (host_bench_end(&end, role, &row) == 0)
  *         printf("%.3f MB/s\n", 1e-6 * row.bytes_per_s);

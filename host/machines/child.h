@@ -4,12 +4,12 @@
  * Memory: struct host_process.  Work: a fork, and a wait until the child's
  * program has begun; a system call a look.
  *
- *     status = host_child_start(&process, &child, &error);
- *     if (host_child_died(&process)) {
- *         status = host_child_check(&process, node, link, &error);
- *         ... start it again ...
- *     }
- *     host_child_end(&process);
+ *     if (host_child_start(&process, &child, &error) != 0)
+ *         return error.code;
+ *     if (host_child_died(&process)) // may it be started again?
+ *         status = host_child_check(&process, 3, 0, &error);
+ *     if (host_child_kill(&process))
+ *         host_child_wait(&process);
  */
 #ifndef HOST_CHILD_H
 #define HOST_CHILD_H

@@ -6,10 +6,10 @@
  * Memory: 24 bytes a node; both ends of every wire, for nodes that start again.
  * Work: a fork and an exec a start of a node.
  *
- *     host_cluster_start(&cluster, &options, &error);
+ *     if (host_cluster_start(&cluster, &options, &error) != 0)
+ *         return error.code;
  *     machine = host_cluster_machine(&cluster);
- *     ... give it to the service ...
- *     host_cluster_stop(&cluster);
+ *     host_cluster_stop(&cluster); // or the machine's own stop
  */
 #ifndef HOST_CLUSTER_H
 #define HOST_CLUSTER_H

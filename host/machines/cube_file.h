@@ -4,8 +4,9 @@
  * Memory: about 600 bytes a wire.  Work: one pass over the file, and a look-up
  * for each host name.
  *
- *     if (host_cube_file_read(&file, "lab.cube", &error) != 0) ... error.text
- *     host_cube_straps(&file, 3, straps, sizeof straps);
+ *     if (host_cube_file_read(&file, "lab.cube", &error) != 0)
+ *         return error.code;
+ *     unsigned count = host_cube_straps(&file, 3, straps);
  *     host_cube_file_free(&file);
  */
 #ifndef HOST_CUBE_FILE_H

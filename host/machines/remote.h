@@ -5,9 +5,9 @@
  * Memory: two ports, and 24 bytes a node.  Work: a fork and an exec for each
  * node that the host starts.
  *
- *     host_remote_start(&remote, &file, program, &error);
- *     machine = host_remote_machine(&remote);
- *     ... give it to the service, whose end stops it ...
+ *     if (host_remote_start(&remote, &file, "incode-node", &error) != 0)
+ *         return error.code;
+ *     machine = host_remote_machine(&remote); // whose stop ends the nodes
  */
 #ifndef HOST_REMOTE_H
 #define HOST_REMOTE_H

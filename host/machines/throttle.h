@@ -3,8 +3,8 @@
  *
  * Memory: the struct.  Work: that of the machine beneath, and the sleep.
  *
+ *     struct host_throttled throttled;
  *     machine = host_throttle_machine(&throttled, &machine, &throttle);
- *     ... use machine ...
  */
 #ifndef HOST_THROTTLE_H
 #define HOST_THROTTLE_H

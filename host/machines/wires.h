@@ -4,8 +4,10 @@
  * Memory: 4 bytes for each port of HOST_PROCESSES_MAX nodes; in the kernel what
  * a wire of its kind takes.  Work: a few system calls a wire.
  *
- *     host_wires_make(&wires, HOST_WIRE_TCP, nodes, dimension, &error);
- *     ... hand wires.end[node][link] to the nodes, use wires.host ...
+ *     if (host_wires_make(&wires, HOST_WIRE_TCP, 8, 3, &error) != 0)
+ *         return error.code;
+ *     host_port_socket(&port, wires.host);
+ *     int fd = wires.end[node][0];
  *     host_wires_close(&wires);
  */
 #ifndef HOST_WIRES_H

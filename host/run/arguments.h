@@ -2,7 +2,8 @@
  *
  * Memory: none.  Work: none to speak of.
  *
- *     host_arguments_run(argc, argv, &options, &error);
+ *     if (host_arguments_run(argc, argv, &options, &error) != 0)
+ *         return error.code;
  */
 #ifndef HOST_ARGUMENTS_H
 #define HOST_ARGUMENTS_H

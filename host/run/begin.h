@@ -5,9 +5,7 @@
  *
  * Memory: none.  Work: a few system calls.
  *
- *     int main(int argc, char **argv)
- *     {
- *         host_begin();
+ *     host_begin(); // first of all in main
  */
 #ifndef HOST_BEGIN_H
 #define HOST_BEGIN_H

@@ -9,8 +9,9 @@
  *
  * Memory: 16 KiB of what mpirun says.  Work: sleeps until the ranks are done.
  *
- *     if (host_launch_is_rank()) host_launch_become_node(...);  ranks 1 ..
- *     return host_launch_mpi(argc, argv, &options, &error);
+ *     if (host_launch_rank() >= 0)
+ *         return host_launch_become(host_launch_rank(), argv, &error);
+ *     return host_launch_mpi(argv, &options, &error);
  */
 #ifndef HOST_LAUNCH_H
 #define HOST_LAUNCH_H

@@ -3,7 +3,7 @@
  *
  * Memory: none.  Work: a line a node or a row.
  *
- *     host_report_run(stdout, &options, &result, &alone);
+ *     host_report_run(stdout, &options, &result, NULL);
  *     host_report_map(stdout, &result);
  */
 #ifndef HOST_REPORT_H

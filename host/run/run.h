@@ -6,7 +6,8 @@
  *
  *     host_run_defaults(&options);
  *     options.input = "bunny.xyz";
- *     if (host_run(&options, &result, &error) != 0) ... error.text
+ *     if (host_run(&options, &result, &error) != 0)
+ *         return error.code;
  */
 #ifndef HOST_RUN_H
 #define HOST_RUN_H

@@ -2,8 +2,8 @@
  *
  * Memory: about 1 KiB a node while it is written.  Work: O(nodes).
  *
- *     host_stats_write("run.json", &result, &error);
- *     host_output_commit(&error);
+ *     if (host_stats_write("run.json", &result, &error) == 0)
+ *         return host_output_commit(&error);
  */
 #ifndef HOST_STATS_H
 #define HOST_STATS_H

@@ -11,9 +11,10 @@
  * Memory: none of its own.  Work: constant a message; one pass over the nodes
  * at each check, every 20 ms.
  *
- *     host_detector_begin(service);
- *     status = host_detector_pong(service, &message, &error);
- *     status = host_detector_check(service, now_us, &error);
+ *     host_detector_begin(&service, now_us);
+ *     if (message.type == NODE_PONG)
+ *         status = host_detector_pong(&service, &message, &error);
+ *     status = host_detector_check(&service, now_us, &error);
  */
 #ifndef HOST_FAILURE_DETECTOR_H
 #define HOST_FAILURE_DETECTOR_H

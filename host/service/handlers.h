@@ -3,8 +3,8 @@
  * Memory: none of its own.  Work: about 6 ns a tetrahedron, constant for the
  * rest.
  *
- *     while (cube_read(cube, &message) && status == 0) {
- *         status = host_handle(service, &message, &error);
+ *     while (status == 0 && cube_read(cube, &message)) {
+ *         status = host_handle(&service, &message, &error);
  *         cube_release(cube);
  *     }
  */

@@ -7,10 +7,11 @@
  * host_ledger_abandon, one pass over the tetrahedra, and host_ledger_next,
  * which passes over the bricks once between two calls of the former.
  *
- *     while (host_ledger_next(&ledger, order, &first, &last)) ...
- *     epoch = host_ledger_open(&ledger, node, first, last);
- *     if (host_ledger_current(&ledger, node, epoch))
- *         host_ledger_commit(&ledger, node, brick);
+ *     while (host_ledger_next(&ledger, &order, &first, &last))
+ *         epoch = host_ledger_open(&ledger, node, first, last);
+ *     if (host_ledger_current(&ledger, node, epoch) &&
+ *         host_ledger_commit(&ledger, node, brick) != 0)
+ *         return HOST_CUBE;
  */
 #ifndef HOST_LEDGER_H
 #define HOST_LEDGER_H

@@ -5,8 +5,8 @@
  *
  * Memory: none of its own.  Work: every function returns at once, but for idle.
  *
- *     machine = host_cluster_machine(&cluster);
- *     while (working) { poll; serve; machine.idle(machine.context, due_us); }
+ *     uint64_t due_us = machine.now_us(machine.context) + 1000;
+ *     machine.idle(machine.context, due_us);
  *     machine.stop(machine.context);
  */
 #ifndef HOST_MACHINE_H

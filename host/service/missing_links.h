@@ -18,9 +18,10 @@
  * links until every wire has been up; at the end of a search such a pass for
  * each hop from the gateway.
  *
- *     searching = host_missing_links_check(service, now_us, patience_us);
- *     host_missing_links_heard(service, node, answer.links);
- *     host_missing_links_look(service, elapsed_us);
+ *     host_missing_links_heard(&service, node, links);
+ *     host_missing_links_look(&service, elapsed_us);
+ *     if (host_missing_links_check(&service, now_us, patience_us))
+ *         return 0; // they are searched: nobody is to be blamed yet
  */
 #ifndef HOST_MISSING_LINKS_H
 #define HOST_MISSING_LINKS_H

@@ -10,8 +10,11 @@
  * Memory: the cube's windows, 3 KiB a node, a bit a brick, the spilled faces
  * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
  *
- *     host_service_run(&service, &error);
- *     service.report[i].finished.statistics ...; tets: vertex numbers
+ *     struct host_service service = {.machine = &machine, .order = &order,
+ *                                    .tets = &tets, .setup = setup};
+ *     if (host_service_start(&service, &error) == 0 &&
+ *         host_service_run(&service, &error) == 0)
+ *         busy_us = service.report[0].statistics.busy_us;
  *     host_service_end(&service);
  */
 #ifndef HOST_SERVICE_H

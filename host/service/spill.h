@@ -5,9 +5,10 @@
  * Memory: blocks of 512 bytes up to blocks_memory, and 24 bytes a list; beyond
  * it, disk.  Work: constant a block.
  *
- *     host_spill_put(&spill, node, faces, count, &error);
+ *     if (host_spill_put(&spill, node, faces, count, &error) != 0)
+ *         return error.code;
  *     list = host_spill_detach(&spill, node, brick);
- *     n = host_spill_take(&spill, &list, faces, 128, &error);
+ *     return host_spill_take(&spill, &list, faces, 128, &count, &error);
  */
 #ifndef HOST_SPILL_H
 #define HOST_SPILL_H

@@ -6,8 +6,9 @@
  * seed, as a rule.
  *
  *     host_sim_plan_draw(&plan, 17, 0);
- *     status = host_sim_run(&plan, &outcome, &error);
- *     outcome.trace is the same whenever the plan is.
+ *     if (host_sim_run(&plan, &outcome, &error) != 0)
+ *         return error.code;
+ *     uint64_t trace = outcome.trace; // the same whenever the plan is
  */
 #ifndef HOST_SIM_H
 #define HOST_SIM_H

@@ -4,9 +4,8 @@
  *
  * Memory: the table.  Work: a step a fault.
  *
- *     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+ *     for (int k = 0; k < HOST_SIM_FAULTS; k++)
  *         puts(host_sim_kinds[k].name);
- *     }
  */
 #ifndef HOST_SIM_FAULTS_H
 #define HOST_SIM_FAULTS_H

@@ -3,9 +3,8 @@
  *
  * Memory: the struct.  Work: none to speak of.
  *
- *     host_sim_plan_draw(&plan, seed, 0);
+ *     host_sim_plan_draw(&plan, 17, 0);
  *     host_sim_plan_print(stdout, &plan);
- *     host_sim_run(&plan, &outcome, &error);
  */
 #ifndef HOST_SIM_PLAN_H
 #define HOST_SIM_PLAN_H

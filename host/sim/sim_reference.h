@@ -4,8 +4,8 @@
  *
  * Memory: a few times the points.  Work: that of the triangulator.
  *
- *     host_reference(&points, &tets, &error);
- *     host_digest(&tets, &digest);
+ *     if (host_reference(&points, &tets, &error) == 0)
+ *         host_digest(&tets, &digest);
  */
 #ifndef HOST_SIM_REFERENCE_H
 #define HOST_SIM_REFERENCE_H

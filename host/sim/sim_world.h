@@ -6,7 +6,8 @@
  * Memory: the nodes' arenas, and the bytes of each wire.  Work: a heap of
  * nodes, log n a step, besides the nodes' own.
  *
- *     host_world_open(&world, &options, &error);
+ *     if (host_world_open(&world, &options, &error) != 0)
+ *         return error.code;
  *     struct host_machine machine = host_world_machine(&world);
  *     machine.idle(machine.context, 1000);
  *     host_world_close(&world);

@@ -8,11 +8,12 @@
  * Memory: CUBE_HOST_WIRES_MAX pipes of 64 KiB.  Work: constant a call,
  * but for check, which looks at every rank of this machine.
  *
- *     host_ranks_open(&ranks, &error);                  after MPI_Init
+ *     MPI_Init(NULL, NULL);
  *     ranks.cubes_due = 1;
- *     host_ranks_begin(&ranks, nodes, memory, window, &error);
- *     machine = host_ranks_machine(&ranks);  ... its stop ends that cube ...
- *     host_ranks_close(&ranks, 0);                      and MPI_Finalize
+ *     if (host_ranks_open(&ranks, &error) == 0 &&
+ *         host_ranks_begin(&ranks, nodes, memory, window, &error) == 0)
+ *         machine = host_ranks_machine(&ranks); // whose stop ends that cube
+ *     host_ranks_close(&ranks, 0);              // and MPI
  */
 #ifndef HOST_MPI_RANKS_H
 #define HOST_MPI_RANKS_H
