@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "incode/predicates/predicates.h"
+#include "incode/front/owner.h"
 
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error)
@@ -114,17 +114,11 @@ int host_ledger_finish(struct host_ledger *ledger, uint32_t node)
 /* The brick that owns a tetrahedron. */
 static uint32_t owner(const struct host_order *order, const uint32_t v[4])
 {
-    uint32_t smallest = v[0];
-    double low[3], other[3];
-    host_vertex(order, v[0], low);
-    for (int i = 1; i < 4; i++) {
-        host_vertex(order, v[i], other);
-        if (incode_lexicographic(other, low) < 0) {
-            smallest = v[i];
-            memcpy(low, other, sizeof low);
-        }
-    }
-    return smallest / INCODE_BRICK_POINTS;
+    double at[4][3];
+    for (int i = 0; i < 4; i++)
+        host_vertex(order, v[i], at[i]);
+    const double *const p[4] = {at[0], at[1], at[2], at[3]};
+    return v[incode_owner(p)] / INCODE_BRICK_POINTS;
 }
 
 uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
