@@ -167,8 +167,8 @@ $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 
 # The program with a fault in it, for the test that the simulation finds it.
 planted: $(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch
-$(BUILD)/tests/incode-twice: planted = incode/star.c -DINCODE_PLANT_TWICE
-$(BUILD)/tests/incode-twice: incode/star.c
+$(BUILD)/tests/incode-twice: planted = incode/triangulator.c -DINCODE_PLANT_TWICE
+$(BUILD)/tests/incode-twice: incode/triangulator.c
 $(BUILD)/tests/incode-lost-batch: planted = \
 	host/service/handlers.c -DINCODE_PLANT_LOST_BATCH
 $(BUILD)/tests/incode-lost-batch: host/service/handlers.c

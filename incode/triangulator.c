@@ -1,21 +1,17 @@
 #include "triangulator.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "incode/predicates/check.h"
 #include "state.h"
 
+static_assert((int)INCODE_HINT_NONE == INCODE_LOCAL_NONE, "hints are indices");
+static_assert((int)INCODE_TASKS == INCODE_SEARCHES, "a search for each task");
+
 /* ---- memory ---- */
 
-enum {
-    COPIES_MIN = 16,
-    FRAMES_MIN = 48,
-    FACES_MIN = 4096,
-    BRICKS_MIN = 512,
-    FRAMES_MAX = INCODE_NO_FRAME - 1,
-    FETCH_AHEAD = 32,  /* bricks */
-    LOOKAHEAD_MAX = 48 /* bricks */
-};
+enum { LOOKAHEAD_MAX = 48 /* bricks */ };
 
 static size_t round_up(size_t bytes)
 {
@@ -26,27 +22,29 @@ static size_t round_up(size_t bytes)
 static uint32_t copies_of(size_t bytes)
 {
     size_t copies = bytes >> 15;
-    return copies < COPIES_MIN                 ? COPIES_MIN
+    return copies < INCODE_COPIES_MIN          ? INCODE_COPIES_MIN
            : copies > INCODE_NEIGHBOURS_COPIES ? INCODE_NEIGHBOURS_COPIES
                                                : (uint32_t)copies;
 }
 
-static size_t control_bytes(size_t bytes)
-{
-    struct incode_neighbours *v = NULL;
-    return round_up(sizeof(struct incode_triangulator)) +
-           copies_of(bytes) * sizeof *v->point;
-}
+/* How an arena is divided. */
+struct shares {
+    struct incode_front_share front;
+    struct incode_maker_share maker;
+};
 
 /* The active face list takes three eighths of what the control block leaves
  * (the front of a region of 1,250,000 points, with a tenth to spare), the
  * bricks a sixteenth, page frames the rest. */
-static bool fill_map(struct incode_map *map, size_t bytes)
+static bool divide(struct shares *s, struct incode_map *map, size_t bytes)
 {
     memset(map, 0, sizeof *map);
-    map->control = control_bytes(bytes);
+    s->maker = (struct incode_maker_share){copies_of(bytes), 0};
+    size_t copies = incode_maker_bytes(&s->maker);
+    map->control = round_up(sizeof(struct incode_triangulator)) + copies;
     map->local_points = sizeof(struct incode_local_points);
-    map->tasks = sizeof(struct incode_task) * INCODE_TASKS;
+    map->tasks = (sizeof(struct incode_task) + sizeof(struct incode_search)) *
+                 INCODE_TASKS;
     if (bytes < map->control)
         return false;
     size_t rest = bytes - map->control;
@@ -54,25 +52,24 @@ static bool fill_map(struct incode_map *map, size_t bytes)
     size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
     map->afl_faces = rest * 3 / 8 / face;
     map->brick_entries = rest / 16 / brick;
-    if (map->afl_faces < FACES_MIN)
-        map->afl_faces = FACES_MIN;
-    if (map->brick_entries < BRICKS_MIN)
-        map->brick_entries = BRICKS_MIN;
-    size_t both = incode_afl_bytes((uint32_t)map->afl_faces,
-                                   (uint32_t)map->brick_entries);
+    if (map->afl_faces < INCODE_FACES_MIN)
+        map->afl_faces = INCODE_FACES_MIN;
+    if (map->brick_entries < INCODE_ENTRIES_MIN)
+        map->brick_entries = INCODE_ENTRIES_MIN;
+    s->front = (struct incode_front_share){(uint32_t)map->afl_faces,
+                                           (uint32_t)map->brick_entries};
+    size_t both = incode_front_bytes(&s->front);
     map->bricks = map->brick_entries * brick;
     map->afl = both - map->bricks;
     size_t used = map->control + round_up(both);
     if (bytes < used)
         return false;
-    size_t frames = (bytes - used) / sizeof(struct incode_frame);
-    frames = frames > FRAMES_MAX ? FRAMES_MAX : frames;
-    while (frames > 0 && incode_pager_bytes((uint32_t)frames) > bytes - used)
-        frames--;
-    map->frame_count = frames;
-    map->frames = incode_pager_bytes((uint32_t)frames);
+    s->maker.frames =
+        incode_maker_frames(s->maker.copies, bytes - used + copies);
+    map->frame_count = s->maker.frames;
+    map->frames = incode_maker_bytes(&s->maker) - copies;
     map->total = used + map->frames;
-    return frames >= FRAMES_MIN;
+    return map->frame_count >= INCODE_FRAMES_MIN;
 }
 
 size_t incode_arena_min(const struct incode_setup *setup)
@@ -80,9 +77,18 @@ size_t incode_arena_min(const struct incode_setup *setup)
     (void)setup;
     size_t bytes = sizeof(struct incode_triangulator);
     struct incode_map map;
-    while (!fill_map(&map, bytes))
+    struct shares shares;
+    while (!divide(&shares, &map, bytes))
         bytes += 1024;
     return bytes;
+}
+
+static uint32_t lookahead_of(const struct incode_maker *m)
+{
+    uint32_t bricks = m->pager.frame_count / 24;
+    if (m->tree.pages <= m->pager.frame_count)
+        return m->tree.bricks; /* none pushes another out */
+    return bricks < 1 ? 1 : bricks > LOOKAHEAD_MAX ? LOOKAHEAD_MAX : bricks;
 }
 
 struct incode_triangulator *
@@ -90,8 +96,9 @@ incode_triangulator_init(void *arena, size_t bytes,
                          const struct incode_setup *setup,
                          const struct incode_outside *outside, const char **why)
 {
+    struct shares shares;
     struct incode_map map;
-    if (!fill_map(&map, bytes)) {
+    if (!divide(&shares, &map, bytes)) {
         *why = "the node's memory is too small for this index";
         return NULL;
     }
@@ -100,474 +107,271 @@ incode_triangulator_init(void *arena, size_t bytes,
         return NULL;
     }
     struct incode_triangulator *t = arena;
-    memset(t, 0, sizeof *t);
-    t->setup = *setup;
-    t->outside = *outside;
+    struct incode_points points = {.bricks = setup->bricks,
+                                   .index = setup->index,
+                                   .shuffle_seed = setup->shuffle_seed};
+    memcpy(points.lo, setup->lo, sizeof points.lo);
+    memcpy(points.hi, setup->hi, sizeof points.hi);
+    memcpy(points.cells, setup->cells, sizeof points.cells);
+    uint8_t *front = (uint8_t *)arena + round_up(sizeof *t);
+    uint8_t *maker = front + round_up(incode_front_bytes(&shares.front));
     t->map = map;
-    uint8_t *memory = (uint8_t *)arena + map.control;
-    incode_afl_init(&t->afl, memory, (uint32_t)map.afl_faces,
-                    (uint32_t)map.brick_entries);
-    memory += round_up(map.afl + map.bricks);
-    incode_pager_init(&t->pager, memory, (uint32_t)map.frame_count,
-                      setup->bricks);
-    t->pager.request = outside->request;
-    t->pager.context = outside->context;
-    t->pager.shuffle = setup->shuffle_seed;
-    uint32_t cells = setup->index == INCODE_GRID
-                         ? setup->cells[0] * setup->cells[1] * setup->cells[2]
-                         : 0;
-    incode_tree_init(&t->tree, setup->bricks, cells);
-    t->walker = (struct incode_walker){&t->pager, &t->tree, &t->stats.tally,
-                                       &t->stats.candidates};
-    t->local.pages_max = (uint32_t)map.frame_count / 2;
-    incode_local_reset(&t->local);
-    t->neighbours.centre = INCODE_NONE;
-    t->neighbours.point = (void *)((uint8_t *)arena + round_up(sizeof *t));
-    t->neighbours.room = copies_of(bytes);
-    t->spread = 1.6;
-    t->reach = 2;
-    t->window = 4;
-    t->lookahead = (uint32_t)map.frame_count / 24;
-    t->lookahead = t->lookahead < 1               ? 1
-                   : t->lookahead > LOOKAHEAD_MAX ? LOOKAHEAD_MAX
-                                                  : t->lookahead;
-    if (t->tree.pages <= map.frame_count)
-        t->lookahead = setup->bricks; /* none pushes another out */
-    t->room_faces = 2 * INCODE_STAR_FACES + 4 * INCODE_STAR_BUILT;
-    t->room_bricks = (uint32_t)map.brick_entries / 4;
-    t->finished = true;
+    t->ahead = 0;
+    incode_front_init(&t->front, front, &shares.front, setup->bricks,
+                      (enum incode_face_rule)setup->face_rule, &outside->front);
+    incode_maker_init(&t->maker, maker, &shares.maker, &points,
+                      &outside->pages);
+    t->lookahead = lookahead_of(&t->maker);
     return t;
 }
 
 void incode_triangulator_start(struct incode_triangulator *t,
                                const struct incode_job *job)
 {
-    INCODE_ASSERT(job->first <= job->last && job->last <= t->setup.bricks);
-    t->job = *job;
-    incode_afl_clear(&t->afl);
-    t->current = t->ahead = 0;
-    t->spill_from = t->setup.bricks;
-    t->spill_cursor = INCODE_NONE;
-    t->spill_count = 0;
-    t->spilled_any = t->unspill_pending = false;
-    t->foreign = t->finished = false;
-    t->hub_count = 0;
-    t->draining = INCODE_NONE;
-    memset(t->tasks, 0, sizeof t->tasks);
-    t->fault = NULL;
+    t->ahead = 0;
+    t->maker.fault = NULL;
+    incode_front_start(&t->front, job);
 }
 
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes)
 {
-    return incode_pager_deliver(&t->pager, page, data, bytes);
+    return incode_pager_deliver(&t->maker.pager, page, data, bytes);
 }
 
 int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 const struct incode_face *faces, size_t count,
                                 bool last)
 {
-    if (!t->unspill_pending || brick != t->unspill_brick)
-        return -1;
-    struct incode_touched *entry = NULL;
-    for (size_t i = 0; i < count; i++) {
-        const uint32_t *f = faces[i].v;
-        if (f[0] / INCODE_BRICK_POINTS != brick)
-            return -1;
-        if (t->afl.count + 1 >= t->afl.capacity ||
-            t->afl.touched_count + 1 >= t->afl.touched_capacity) {
-            t->fault = "the active face list of one brick does not fit; give "
-                       "the nodes more memory";
-            return 0;
-        }
-        if (f[1] != INCODE_NONE) {
-            incode_afl_toggle(&t->afl, f[0], f[1], f[2]);
-            continue;
-        }
-        entry = incode_afl_touch(&t->afl, brick);
-        entry->reached |= UINT64_C(1) << (f[0] % INCODE_BRICK_POINTS);
-    }
-    if (last) {
-        t->unspill_pending = false;
-        if (t->spill_from == t->setup.bricks)
-            t->spilled_any = false;
-    }
-    return 0;
+    return incode_front_unspill(&t->front, brick, faces, count, last);
 }
 
-/* ---- tasks ---- */
+/* ---- what the front asks, the maker answers ---- */
 
-static uint64_t bit_of(uint32_t v)
+struct corners {
+    const double *p[4];
+};
+
+static inline struct corners corners_of(const struct incode_answer *a)
 {
-    return UINT64_C(1) << (v % INCODE_BRICK_POINTS);
+    return (struct corners){{a->p[0], a->p[1], a->p[2], a->p[3]}};
 }
 
-static enum incode_step run(struct incode_triangulator *t,
-                            struct incode_task *task, bool seed)
+/* One face of the star: that under search goes first, then the last one opened.
+ */
+static enum incode_outcome advance(struct incode_triangulator *t, unsigned task)
 {
-    uint32_t v = task->v;
-    bool fresh = task->retries == 0;
-    t->built_max = t->spill_from < t->setup.bricks ? INCODE_SPILL_BUILT
-                                                   : INCODE_STAR_BUILT;
-    size_t room = t->outside.emit_room(t->outside.context);
-    if (t->built_max > room)
-        t->built_max = (uint32_t)room;
+    struct incode_answer a;
+    struct incode_star_face face;
     enum incode_outcome r;
-    if (seed || task->kind == INCODE_TASK_SEED)
-        r = incode_seed_run(t, task);
-    else if (t->setup.index == INCODE_KD)
-        r = incode_star_close(t, task);
-    else
-        r = incode_face_pursue(t, task);
-    t->stats.vertices += fresh;
-    task->retries++;
-    struct incode_touched *entry =
-        incode_afl_touch(&t->afl, v / INCODE_BRICK_POINTS);
-    if (r == INCODE_WAIT || r == INCODE_MORE) {
-        entry->waiting |= bit_of(v);
-        if (task->born == 0)
-            task->born = ++t->clock;
-        if (r == INCODE_MORE) {
-            task->page = INCODE_NONE;
-            return INCODE_WORKED;
+    if (t->maker.search[task].stage != INCODE_SEARCH_NONE) {
+        r = incode_maker_resume(&t->maker, task, &a);
+        if (r != INCODE_OK || !incode_star_find(&t->front, a.f[1], a.f[2]))
+            return r == INCODE_MORE ? INCODE_OK : r;
+    } else {
+        (void)incode_star_take(&t->front, &face);
+        r = incode_maker_apex(&t->maker, task, face.b, face.c, face.hint, &a);
+        if (r != INCODE_OK) {
+            incode_star_put(&t->front, &face);
+            return r == INCODE_MORE ? INCODE_OK : r;
         }
-        t->stats.vertices_waited += fresh;
-        t->stats.page_faults++;
-        /* Without credit for its page the task can only be tried again. */
-        return incode_pager_loading(&t->pager, task->page) ? INCODE_WORKED
-                                                           : INCODE_WAITING;
     }
-    entry->waiting &= ~bit_of(v);
+    incode_star_build(&t->front, a.f, corners_of(&a).p, a.near);
+    return INCODE_OK;
+}
+
+#ifdef INCODE_PLANT_TWICE /* a fault that the simulation has to find */
+static void plant(struct incode_triangulator *t)
+{
+    const struct incode_star *star = &t->front.star;
+    if (star->faces > 0 && t->maker.pager.shuffle != 0)
+        incode_afl_toggle(&t->front.afl, star->v, star->b[0], star->c[0]);
+}
+#endif
+
+/* Closes the star of a vertex as far as it goes. */
+static enum incode_outcome close_star(struct incode_triangulator *t,
+                                      unsigned task)
+{
+    struct incode_front *front = &t->front;
+    uint32_t v = front->task[task].v;
+    if (!incode_star_open(front, v))
+        return INCODE_OK;
+    enum incode_outcome r = incode_maker_centre(&t->maker, task, v);
+    while (r == INCODE_OK && front->star.faces > 0) {
+        if (incode_star_is_enough(front)) {
+            r = INCODE_AGAIN;
+            break;
+        }
+        r = advance(t, task);
+        if (r == INCODE_OK && incode_star_is_full(front))
+            r = INCODE_AGAIN; /* the list will find it crowded */
+    }
+#ifdef INCODE_PLANT_TWICE
+    plant(t);
+#endif
+    incode_star_shut(front);
+    return r;
+}
+
+/* The paper's InCoDe, face by face: any open face of the vertex.  It stays open
+ * until its answer comes, as another search may close it meanwhile. */
+static enum incode_outcome pursue_face(struct incode_triangulator *t,
+                                       unsigned task)
+{
+    struct incode_answer a;
+    uint32_t f[3];
+    if (t->maker.search[task].stage == INCODE_SEARCH_NONE &&
+        !incode_front_face(&t->front, t->front.task[task].v, f))
+        return INCODE_OK;
+    enum incode_outcome r = incode_maker_face(&t->maker, task, f, &a);
+    if (t->maker.search[task].advanced)
+        t->front.task[task].retries = 1; /* so it needs no room to itself */
     if (r == INCODE_OK)
-        INCODE_ASSERT(task->kind == INCODE_TASK_IDLE || t->fault != NULL);
-    task->kind = INCODE_TASK_IDLE;
-    task->born = 0;
-    if (!incode_own(t, v) && entry->faces == 0 && entry->waiting == 0)
-        incode_afl_drop(&t->afl, entry->brick);
-    return INCODE_WORKED;
+        incode_front_use(&t->front, a.f, corners_of(&a).p);
+    return r;
 }
 
-static struct incode_task *idle_task(struct incode_triangulator *t)
+static enum incode_outcome build_first(struct incode_triangulator *t,
+                                       unsigned task)
 {
-    for (int i = 0; i < INCODE_TASKS; i++)
-        if (t->tasks[i].kind == INCODE_TASK_IDLE)
-            return &t->tasks[i];
-    return NULL;
+    struct incode_answer a;
+    uint32_t v = t->front.task[task].v;
+    /* Other stars go on while a seed waits for a page. */
+    if (incode_front_is_reached(&t->front, v))
+        return INCODE_OK;
+    enum incode_outcome r = incode_maker_first(&t->maker, task, v, &a);
+    if (r == INCODE_OK && t->maker.fault == NULL)
+        incode_front_seed(&t->front, a.f, corners_of(&a).p);
+    return r;
 }
 
-/* A task whose page has come, the oldest first; *alone: one has waited so
- * often that nothing else may run before it. */
-static struct incode_task *ready_task(struct incode_triangulator *t,
-                                      bool *alone)
+/* ---- steps ---- */
+
+static enum incode_step run(struct incode_triangulator *t, unsigned task)
 {
-    struct incode_task *oldest = NULL, *ready = NULL;
-    for (int i = 0; i < INCODE_TASKS; i++) {
-        struct incode_task *task = &t->tasks[i];
-        if (task->kind == INCODE_TASK_IDLE)
-            continue;
-        if (oldest == NULL || task->born < oldest->born)
-            oldest = task;
-        if (!incode_pager_loading(&t->pager, task->page) &&
-            (ready == NULL || task->born < ready->born))
-            ready = task;
+    enum incode_outcome r;
+    incode_front_run(&t->front);
+    if (t->front.task[task].seed)
+        r = build_first(t, task);
+    else if (t->maker.index == INCODE_KD)
+        r = close_star(t, task);
+    else
+        r = pursue_face(t, task);
+    if (r != INCODE_WAIT && r != INCODE_MORE) {
+        incode_front_done(&t->front, task);
+        return INCODE_WORKED;
     }
-    *alone = oldest != NULL && oldest->retries > INCODE_PATIENCE;
-    if (*alone && ready != oldest)
-        return NULL;
-    return ready;
-}
-
-static enum incode_step run_new(struct incode_triangulator *t, uint32_t v,
-                                bool seed)
-{
-    struct incode_task *task = idle_task(t);
-    if (task == NULL)
-        return INCODE_WAITING;
-    task->v = v;
-    task->retries = 0;
-    task->born = 0;
-    task->kind = INCODE_TASK_STAR;
-    return run(t, task, seed);
-}
-
-/* A task whose brick has been spilled meanwhile is void: its faces are gone
- * with it and come back with it. */
-static void drop_spilled_tasks(struct incode_triangulator *t)
-{
-    for (int i = 0; i < INCODE_TASKS; i++) {
-        struct incode_task *task = &t->tasks[i];
-        if (task->kind != INCODE_TASK_IDLE &&
-            incode_position(t, task->v / INCODE_BRICK_POINTS) >= t->spill_from)
-            task->kind = INCODE_TASK_IDLE;
+    incode_front_suspend(&t->front, task, r == INCODE_WAIT);
+    if (r == INCODE_MORE) {
+        t->maker.search[task].page = INCODE_NONE;
+        return INCODE_WORKED;
     }
-}
-
-/* ---- order of work ---- */
-
-/* Asks for the nearest spilled brick.  From then on its toggles stay in memory
- * and add to those that return; it is not worked on before all are there. */
-static void fetch_spilled(struct incode_triangulator *t)
-{
-    if (t->unspill_pending || !incode_front_flush(t))
-        return;
-    uint32_t brick = (t->job.first + t->spill_from) % t->setup.bricks;
-    if (!t->outside.unspill(t->outside.context, brick))
-        return;
-    t->unspill_brick = brick;
-    t->unspill_pending = true;
-    t->spill_from++;
-}
-
-/* Brings spilled bricks back before they are needed while there is room. */
-static void fetch_ahead(struct incode_triangulator *t)
-{
-    if (t->spill_from < t->setup.bricks && t->spill_cursor == INCODE_NONE &&
-        t->spill_from - t->current < FETCH_AHEAD &&
-        t->afl.count < t->afl.capacity / 2 &&
-        t->afl.touched_count < t->afl.touched_capacity / 2)
-        fetch_spilled(t);
+    /* Without credit for its page the task can only be tried again. */
+    return incode_maker_waiting(&t->maker, UINT32_C(1) << task) != 0
+               ? INCODE_WORKED
+               : INCODE_WAITING;
 }
 
 /* Asks for the pages of bricks that will be worked on next, and of what lies
  * around them. */
-static bool count_brick(struct incode_walker *walker, struct incode_query *q,
-                        const struct incode_frame *frame, uint32_t brick,
-                        uint32_t leaves, void *context)
-{
-    uint32_t *left = context;
-    (void)walker, (void)q, (void)frame, (void)brick, (void)leaves;
-    return --*left > 0;
-}
-
 static void look_ahead(struct incode_triangulator *t)
 {
-    uint32_t own = t->job.last - t->job.first;
-    if (t->ahead < t->current)
-        t->ahead = t->current;
-    if (t->ahead >= own || t->ahead >= t->current + t->lookahead)
+    const struct incode_front *front = &t->front;
+    uint32_t own = front->job.last - front->job.first;
+    if (t->ahead < front->current)
+        t->ahead = front->current;
+    if (t->ahead >= own || t->ahead >= front->current + t->lookahead)
         return;
-    uint32_t brick = t->job.first + t->ahead;
-    const struct incode_frame *f = incode_pager_get(&t->pager, brick);
-    if (f == NULL) {
-        for (uint32_t i = 1; i < t->lookahead && t->ahead + i < own; i++)
-            if (incode_pager_get(&t->pager, brick + i) == NULL &&
-                !incode_pager_loading(&t->pager, brick + i))
-                break; /* no more can be asked for at present */
-        return;
-    }
-    struct incode_query q;
-    memset(&q, 0, sizeof q);
-    q.question = INCODE_QUERY_BOX;
-    q.boxed = q.ahead = true;
-    uint32_t leaves = (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
-    double extent = 0;
-    for (int d = 0; d < 3; d++) {
-        q.lo[d] = q.hi[d] = f->leaf_lo[d][0];
-        for (uint32_t leaf = 0; leaf < leaves; leaf++) {
-            double lo = f->leaf_lo[d][leaf], hi = f->leaf_hi[d][leaf];
-            extent = hi - lo > extent ? hi - lo : extent;
-            q.lo[d] = lo < q.lo[d] ? lo : q.lo[d];
-            q.hi[d] = hi > q.hi[d] ? hi : q.hi[d];
-        }
-    }
-    for (int d = 0; d < 3; d++) {
-        q.lo[d] -= extent * t->spread;
-        q.hi[d] += extent * t->spread;
-    }
-    /* No more than a share of the frames: it would push out what is at work. */
-    uint32_t left = (uint32_t)t->map.frame_count / 8;
-    if (incode_walk(&t->walker, &q, count_brick, &left) != INCODE_WALK_WAIT)
-        t->ahead++;
+    uint32_t more = own - t->ahead - 1;
+    if (more >= t->lookahead)
+        more = t->lookahead - 1;
+    t->ahead +=
+        incode_maker_prefetch(&t->maker, front->job.first + t->ahead, more);
 }
 
-/* Passes the current brick: all its lists are empty and all its vertices
- * reached, so none of its stars will open again but those of hubs. */
-static enum incode_step pass_brick(struct incode_triangulator *t)
+static enum incode_turn next(struct incode_triangulator *t, unsigned *task)
 {
-    uint32_t brick = t->job.first + t->current;
-    if (!incode_front_has_hub(t, brick)) {
-        t->outside.commit(t->outside.context, brick);
-        incode_afl_drop(&t->afl, brick);
+    look_ahead(t);
+    enum incode_turn turn = incode_front_next(&t->front, task);
+    if (turn == INCODE_TURN_COUNT) {
+        uint32_t count = incode_maker_count(&t->maker, *task);
+        turn = count == 0 ? INCODE_TURN_WAIT
+                          : incode_front_count(&t->front, count, task);
     }
-    t->current++;
-    return INCODE_WORKED;
-}
-
-static enum incode_step work_on_current(struct incode_triangulator *t)
-{
-    uint32_t brick = t->job.first + t->current;
-    const struct incode_frame *f = incode_pager_get(&t->pager, brick);
-    if (f == NULL)
-        return INCODE_WAITING;
-    const struct incode_touched *entry = incode_afl_find(&t->afl, brick);
-    uint64_t all = f->count == INCODE_BRICK_POINTS
-                       ? ~UINT64_C(0)
-                       : (UINT64_C(1) << f->count) - 1;
-    uint64_t reached = entry == NULL ? 0 : entry->reached;
-    if (entry != NULL && (entry->faces > 0 || entry->waiting != 0))
-        return INCODE_WAITING;
-    if ((all & ~reached) == 0)
-        return pass_brick(t);
-    uint32_t slot = (uint32_t)__builtin_ctzll(all & ~reached);
-    return run_new(t, brick * INCODE_BRICK_POINTS + slot, true);
-}
-
-static bool is_returning(const struct incode_triangulator *t, uint32_t brick)
-{
-    return t->unspill_pending && t->unspill_brick == brick;
-}
-
-/* The next vertex with open faces in the window of own bricks. */
-static bool next_own(struct incode_triangulator *t, uint32_t *v)
-{
-    uint32_t own = t->job.last - t->job.first;
-    for (uint32_t i = 0; i < t->window; i++) {
-        uint32_t position = t->current + i;
-        if (position >= own || position >= t->spill_from ||
-            is_returning(t, t->job.first + position))
-            return false;
-        struct incode_touched *entry =
-            incode_afl_find(&t->afl, t->job.first + position);
-        if (entry == NULL)
-            continue;
-        uint64_t ready = entry->pending & ~entry->waiting;
-        if (ready == 0)
-            continue;
-        *v = entry->brick * INCODE_BRICK_POINTS +
-             (uint32_t)__builtin_ctzll(ready);
-        return true;
-    }
-    return false;
-}
-
-/* The next vertex with open faces anywhere, the lowest position first, so that
- * what is left lies ahead and can be spilled.  Bricks without faces are
- * forgotten on the way. */
-static bool next_foreign(struct incode_triangulator *t, uint32_t *v)
-{
-    const struct incode_touched *best = NULL;
-    uint32_t least = 0;
-    for (uint32_t i = 0; i < t->afl.touched_max; i++) {
-        const struct incode_touched *entry = &t->afl.touched[i];
-        if (!incode_touched_used(entry) || is_returning(t, entry->brick))
-            continue;
-        if (entry->faces == 0 && entry->waiting == 0)
-            incode_afl_drop(&t->afl, entry->brick);
-        else if ((entry->pending & ~entry->waiting) != 0 &&
-                 (best == NULL || incode_position(t, entry->brick) < least)) {
-            best = entry;
-            least = incode_position(t, entry->brick);
-        }
-    }
-    if (best == NULL)
-        return false;
-    t->current = least;
-    *v = best->brick * INCODE_BRICK_POINTS +
-         (uint32_t)__builtin_ctzll(best->pending & ~best->waiting);
-    return true;
-}
-
-/* Everything is closed: the hubs' bricks are complete, too. */
-static enum incode_step finish(struct incode_triangulator *t)
-{
-    while (t->hub_count > 0) {
-        uint32_t brick = t->hubs[--t->hub_count] / INCODE_BRICK_POINTS;
-        if (incode_own_brick(t, brick) && !incode_front_has_hub(t, brick))
-            t->outside.commit(t->outside.context, brick);
-    }
-    for (uint32_t i = 0; i < t->afl.touched_max; i++)
-        if (incode_touched_used(&t->afl.touched[i]))
-            incode_afl_drop(&t->afl, t->afl.touched[i].brick);
-    INCODE_ASSERT(t->afl.count == 0 && t->afl.touched_count == 0);
-    t->finished = true;
-    return INCODE_FINISHED;
-}
-
-static enum incode_step work(struct incode_triangulator *t, bool waiting)
-{
-    uint32_t own = t->job.last - t->job.first, v;
-    if (t->current >= own && !t->foreign)
-        t->foreign = true;
-    if (!t->foreign) {
-        if (t->current >= t->spill_from)
-            fetch_spilled(t);
-        if (is_returning(t, t->job.first + t->current))
-            return INCODE_WAITING;
-        if (next_own(t, &v))
-            return run_new(t, v, false);
-        return work_on_current(t);
-    }
-    if (t->afl.count > 0 && next_foreign(t, &v))
-        return run_new(t, v, false);
-    if (waiting || t->unspill_pending)
-        return INCODE_WAITING;
-    INCODE_ASSERT(t->afl.count == 0);
-    if (!t->spilled_any)
-        return finish(t);
-    fetch_spilled(t);
-    return INCODE_WAITING;
-}
-
-enum { EMIT_ROOM_MIN = 8 }; /* tetrahedra */
-
-static bool any_task(const struct incode_triangulator *t)
-{
-    for (int i = 0; i < INCODE_TASKS; i++)
-        if (t->tasks[i].kind != INCODE_TASK_IDLE)
-            return true;
-    return false;
+    if (turn == INCODE_TURN_TASK)
+        incode_maker_forget(&t->maker, *task);
+    return turn;
 }
 
 static enum incode_step step(struct incode_triangulator *t)
 {
-    bool alone;
-    if (!incode_front_room(t)) {
-        drop_spilled_tasks(t);
-        return t->spill_cursor != INCODE_NONE ? INCODE_WORKED : INCODE_WAITING;
-    }
-    if (t->outside.emit_room(t->outside.context) < EMIT_ROOM_MIN)
-        return INCODE_WAITING;
-    if (incode_front_drain(t))
+    unsigned task;
+    uint32_t waiting = incode_maker_waiting(&t->maker, t->front.busy);
+    enum incode_turn turn = incode_front_turn(&t->front, waiting, &task);
+    if (turn == INCODE_TURN_NEXT)
+        turn = next(t, &task);
+    switch (turn) {
+    case INCODE_TURN_RESUME:
+    case INCODE_TURN_TASK:
+        return run(t, task);
+    case INCODE_TURN_WORKED:
         return INCODE_WORKED;
-    struct incode_task *task = ready_task(t, &alone);
-    if (task != NULL)
-        return run(t, task, false);
-    if (alone)
+    case INCODE_TURN_END:
+        return INCODE_FINISHED;
+    case INCODE_TURN_NEXT:
+    case INCODE_TURN_COUNT:
+    case INCODE_TURN_WAIT:
+    default:
         return INCODE_WAITING;
-    look_ahead(t);
-    fetch_ahead(t);
-    return work(t, any_task(t));
+    }
 }
 
 enum incode_step incode_triangulator_step(struct incode_triangulator *t)
 {
-    if (t->fault != NULL)
+    if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;
-    if (t->finished)
+    if (t->front.finished)
         return INCODE_FINISHED;
-    bool released = incode_pager_release(&t->pager, false);
+    bool released = incode_pager_release(&t->maker.pager, false);
     enum incode_step r = step(t);
-    if (t->fault != NULL)
+    if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;
     if (r == INCODE_WAITING &&
-        (released || incode_pager_release(&t->pager, true)))
+        (released || incode_pager_release(&t->maker.pager, true)))
         return INCODE_WORKED;
     return r;
 }
 
 /* ---- reports ---- */
 
-const struct incode_statistics *
-incode_triangulator_statistics(const struct incode_triangulator *t)
+void incode_triangulator_statistics(const struct incode_triangulator *t,
+                                    struct incode_statistics *s)
 {
-    struct incode_statistics *s = (struct incode_statistics *)&t->stats;
-    s->page_requests = t->pager.requests;
-    s->page_evictions = t->pager.evictions;
-    s->afl_max = t->afl.count_max;
-    s->memory_high_water =
-        t->map.total - (t->map.frame_count - t->pager.frames_used) *
-                           sizeof(struct incode_frame);
-    return s;
+    const struct incode_front *front = &t->front;
+    const struct incode_maker *maker = &t->maker;
+    const struct incode_pager *pager = &maker->pager;
+    *s = (struct incode_statistics){
+        .tetrahedra_built = front->counts.built,
+        .tetrahedra_kept = front->counts.kept,
+        .make_tetra_calls = maker->counts.calls,
+        .hull_facets = front->counts.hull_facets,
+        .candidates = maker->counts.candidates,
+        .tree_searches = maker->counts.tree_searches,
+        .seeds = front->counts.seeds,
+        .vertices = front->counts.vertices,
+        .vertices_waited = front->counts.waited,
+        .page_requests = pager->requests,
+        .page_faults = front->counts.faults,
+        .page_evictions = pager->evictions,
+        .afl_max = front->afl.count_max,
+        .afl_spilled = front->counts.spilled,
+        .memory_high_water =
+            t->map.total - (t->map.frame_count - pager->frames_used) *
+                               sizeof(struct incode_frame),
+        .tally = maker->counts.tally};
+    memcpy(s->candidates_histogram, maker->counts.histogram,
+           sizeof s->candidates_histogram);
 }
 
 const struct incode_map *
@@ -578,5 +382,5 @@ incode_triangulator_map(const struct incode_triangulator *t)
 
 const char *incode_triangulator_fault(const struct incode_triangulator *t)
 {
-    return t->fault;
+    return t->front.fault != NULL ? t->front.fault : t->maker.fault;
 }

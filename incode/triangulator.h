@@ -1,6 +1,7 @@
 /* A node's triangulator: closes the star of every vertex of its bricks and
  * hands out the tetrahedra that are its own, with points that come page by
- * page and a front that may spill.
+ * page and a front that may spill.  It is a maker and a front joined: what the
+ * front asks, the maker answers.
  *
  * Memory: one arena, divided by incode_triangulator_init alone (memory map:
  * struct incode_map).  Work: a call of incode_triangulator_step closes at most
@@ -18,11 +19,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "incode/front/job.h"
+#include "incode/pages/pager.h"
 #include "incode/pages/pages.h"
 #include "incode/predicates/predicates.h"
-
-enum incode_index { INCODE_NAIVE, INCODE_GRID, INCODE_KD };
-enum incode_face_rule { INCODE_FACE_OWN, INCODE_FACE_PAPER };
 
 /* What every node of a run is told once. */
 struct incode_setup {
@@ -36,12 +36,6 @@ struct incode_setup {
     uint32_t reserved2;
 };
 
-/* The vertices of bricks [first, last) are this node's own. */
-struct incode_job {
-    uint32_t first, last;
-    double lo[3], hi[3]; /* the region's box, for the face rule `paper` */
-};
-
 enum incode_step {
     INCODE_WORKED,   /* call again */
     INCODE_WAITING,  /* nothing to do until a page or a spilled list arrives,
@@ -50,30 +44,10 @@ enum incode_step {
     INCODE_BROKEN    /* an invariant failed: see `fault` */
 };
 
-struct incode_face {
-    uint32_t v[3]; /* key first: the list it belongs to */
-};
-
 /* How the triangulator reaches the world.  All calls return at once. */
 struct incode_outside {
-    void *context;
-    /* Asks for a page; the frame is reserved.  False: no credit now, the
-     * triangulator asks again later. */
-    bool (*request)(void *context, uint32_t page);
-    /* Room for results: how many tetrahedra emit would take now. */
-    size_t (*emit_room)(void *context);
-    /* Tetrahedra (vertex, apexes[i][0..2]), each of positive orientation. */
-    void (*emit)(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
-                 size_t count);
-    /* Brick committed: all tetrahedra whose lexicographically smallest vertex
-     * lies in it have been emitted before this call. */
-    void (*commit)(void *context, uint32_t brick);
-    /* Spilled toggles, to be kept in order with their brick (= v[0] / 64);
-     * v[1] = INCODE_NONE: vertex v[0] was reached.  False: no room now. */
-    bool (*spill)(void *context, const struct incode_face *faces, size_t count);
-    /* Asks for a brick's spilled toggles; they come by
-     * incode_triangulator_unspill, the last call with `last` set. */
-    bool (*unspill)(void *context, uint32_t brick);
+    struct incode_page_source pages;   /* what its maker asks for */
+    struct incode_front_outside front; /* what its front gives and takes back */
 };
 
 /* The memory map: bytes of each table, summing to at most the arena. */
@@ -124,8 +98,8 @@ int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
 
 enum incode_step incode_triangulator_step(struct incode_triangulator *t);
 
-const struct incode_statistics *
-incode_triangulator_statistics(const struct incode_triangulator *t);
+void incode_triangulator_statistics(const struct incode_triangulator *t,
+                                    struct incode_statistics *s);
 const struct incode_map *
 incode_triangulator_map(const struct incode_triangulator *t);
 const char *incode_triangulator_fault(const struct incode_triangulator *t);

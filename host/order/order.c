@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "incode/pages/cells.h"
 #include "incode/predicates/predicates.h"
 #include "kd_build.h"
 #include "host/base/memory.h"

@@ -101,8 +101,9 @@ static int work(struct reference *r)
 static int triangulate(struct reference *r, void *arena, size_t bytes,
                        const struct incode_setup *setup)
 {
-    const struct incode_outside outside = {r,      request, emit_room, emit,
-                                           commit, spill,   unspill};
+    const struct incode_outside outside = {
+        .pages = {r, request},
+        .front = {r, emit_room, emit, commit, spill, unspill}};
     const char *why = NULL;
     r->t = incode_triangulator_init(arena, bytes, setup, &outside, &why);
     if (r->t == NULL) {

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "incode/pages/pages.h"
+#include "incode/pages/bricks.h"
 
 static uint32_t power_below(uint32_t n)
 {

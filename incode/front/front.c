@@ -1,32 +1,84 @@
+#include "front.h"
+
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "incode/state.h"
 
 /* Which faces are pursued, in whose list they wait, and where the list goes
  * when it does not fit.  A face belongs to its lowest own vertex that is no
  * hub; a face without such a vertex (it has only hubs of its own, or the rule
  * `paper` pursues it) to its lowest vertex that is no hub, or to its lowest. */
 
-static bool is_hub(const struct incode_triangulator *t, uint32_t v)
+enum { WINDOW = 4 /* bricks */ };
+
+static const char *const TOO_SMALL =
+    "the active face list of one brick does not fit; give the nodes more "
+    "memory";
+
+/* ---- memory ---- */
+
+size_t incode_front_bytes(const struct incode_front_share *share)
 {
-    for (uint32_t i = 0; i < t->hub_count; i++)
-        if (t->hubs[i] == v)
+    return incode_afl_bytes(share->faces, share->entries);
+}
+
+void incode_front_init(struct incode_front *front, void *memory,
+                       const struct incode_front_share *share, uint32_t bricks,
+                       enum incode_face_rule rule,
+                       const struct incode_front_outside *outside)
+{
+    INCODE_ASSERT(share->faces >= INCODE_FACES_MIN &&
+                  share->entries >= INCODE_ENTRIES_MIN && bricks > 0);
+    memset(front, 0, sizeof *front);
+    front->bricks = bricks;
+    front->face_rule = rule;
+    front->outside = *outside;
+    incode_afl_init(&front->afl, memory, share->faces, share->entries);
+    front->window = WINDOW;
+    front->room_faces = 2 * INCODE_STAR_FACES + 4 * INCODE_STAR_BUILT;
+    front->room_entries = share->entries / 4;
+    front->finished = true;
+}
+
+void incode_front_start(struct incode_front *front,
+                        const struct incode_job *job)
+{
+    INCODE_ASSERT(job->first <= job->last && job->last <= front->bricks);
+    front->job = *job;
+    incode_afl_clear(&front->afl);
+    front->current = 0;
+    front->spill_from = front->bricks;
+    front->spill_cursor = INCODE_NONE;
+    front->spill_count = 0;
+    front->spilled_any = front->unspill_pending = false;
+    front->foreign = front->finished = false;
+    front->hub_count = 0;
+    front->draining = INCODE_NONE;
+    front->busy = 0;
+    front->fault = NULL;
+}
+
+/* ---- faces ---- */
+
+static bool is_hub(const struct incode_front *front, uint32_t v)
+{
+    for (uint32_t i = 0; i < front->hub_count; i++)
+        if (front->hubs[i] == v)
             return true;
     return false;
 }
 
-bool incode_front_has_hub(const struct incode_triangulator *t, uint32_t brick)
+bool incode_front_has_hub(const struct incode_front *front, uint32_t brick)
 {
-    for (uint32_t i = 0; i < t->hub_count; i++)
-        if (t->hubs[i] / INCODE_BRICK_POINTS == brick)
+    for (uint32_t i = 0; i < front->hub_count; i++)
+        if (front->hubs[i] / INCODE_BRICK_POINTS == brick)
             return true;
     return false;
 }
 
 /* Does the triangle's box meet the region's?  A function of the face alone, so
  * that both its tetrahedra agree. */
-static bool in_region(const struct incode_triangulator *t,
+static bool in_region(const struct incode_front *front,
                       const double *const p[3])
 {
     for (int d = 0; d < 3; d++) {
@@ -34,18 +86,18 @@ static bool in_region(const struct incode_triangulator *t,
         double lo = a < b ? a : b, hi = a < b ? b : a;
         lo = c < lo ? c : lo;
         hi = c > hi ? c : hi;
-        if (hi < t->job.lo[d] || lo > t->job.hi[d])
+        if (hi < front->job.lo[d] || lo > front->job.hi[d])
             return false;
     }
     return true;
 }
 
-static unsigned key_of(const struct incode_triangulator *t, const uint32_t f[3])
+static unsigned key_of(const struct incode_front *front, const uint32_t f[3])
 {
     unsigned best = 0;
     int best_class = 4;
     for (unsigned i = 0; i < 3; i++) {
-        bool own = incode_own(t, f[i]), hub = is_hub(t, f[i]);
+        bool own = incode_own(front, f[i]), hub = is_hub(front, f[i]);
         int class = (own && !hub) ? 0 : !hub ? 1 : 2;
         if (class < best_class || (class == best_class && f[i] < f[best])) {
             best = i;
@@ -55,113 +107,124 @@ static unsigned key_of(const struct incode_triangulator *t, const uint32_t f[3])
     return best;
 }
 
-bool incode_front_key_slow(const struct incode_triangulator *t,
+bool incode_front_key_slow(const struct incode_front *front,
                            const uint32_t f[3], const double *const p[3],
                            unsigned *turn)
 {
-    if (!incode_own(t, f[0]) && !incode_own(t, f[1]) && !incode_own(t, f[2]) &&
-        (t->setup.face_rule != INCODE_FACE_PAPER || !in_region(t, p)))
+    if (!incode_own(front, f[0]) && !incode_own(front, f[1]) &&
+        !incode_own(front, f[2]) &&
+        (front->face_rule != INCODE_FACE_PAPER || !in_region(front, p)))
         return false;
-    *turn = key_of(t, f);
+    *turn = key_of(front, f);
     return true;
 }
 
-static void spill_one(struct incode_triangulator *t, const uint32_t f[3])
+static void spill_one(struct incode_front *front, const uint32_t f[3])
 {
-    INCODE_ASSERT(t->spill_count < INCODE_SPILL_FACES);
-    memcpy(t->spill[t->spill_count++].v, f, sizeof t->spill[0].v);
-    t->spilled_any = true;
-    t->stats.afl_spilled++;
-    if (t->spill_count == INCODE_SPILL_FACES)
-        (void)incode_front_flush(t);
+    INCODE_ASSERT(front->spill_count < INCODE_SPILL_FACES);
+    memcpy(front->spill[front->spill_count++].v, f, sizeof front->spill[0].v);
+    front->spilled_any = true;
+    front->counts.spilled++;
+    if (front->spill_count == INCODE_SPILL_FACES)
+        (void)incode_front_flush(front);
 }
 
-bool incode_front_flush(struct incode_triangulator *t)
+bool incode_front_flush(struct incode_front *front)
 {
-    if (t->spill_count == 0)
+    if (front->spill_count == 0)
         return true;
-    if (!t->outside.spill(t->outside.context, t->spill, t->spill_count))
+    if (!front->outside.spill(front->outside.context, front->spill,
+                              front->spill_count))
         return false;
-    t->spill_count = 0;
+    front->spill_count = 0;
     return true;
 }
 
-static bool is_spilled(const struct incode_triangulator *t, uint32_t brick)
+static bool is_spilled(const struct incode_front *front, uint32_t brick)
 {
-    return incode_position(t, brick) >= t->spill_from;
+    return incode_position(front, brick) >= front->spill_from;
 }
 
-void incode_front_toggle(struct incode_triangulator *t, const uint32_t f[3])
+void incode_front_toggle(struct incode_front *front, const uint32_t f[3])
 {
-    if (is_spilled(t, f[0] / INCODE_BRICK_POINTS))
-        spill_one(t, f);
+    if (is_spilled(front, f[0] / INCODE_BRICK_POINTS))
+        spill_one(front, f);
     else
-        incode_afl_toggle(&t->afl, f[0], f[1], f[2]);
+        incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
 }
 
-void incode_front_reached(struct incode_triangulator *t, uint32_t v)
+void incode_front_reached(struct incode_front *front, uint32_t v)
 {
     uint32_t brick = v / INCODE_BRICK_POINTS;
-    if (!incode_own_brick(t, brick))
+    if (!incode_own_brick(front, brick))
         return;
-    if (is_spilled(t, brick)) {
+    if (is_spilled(front, brick)) {
         const uint32_t f[3] = {v, INCODE_NONE, INCODE_NONE};
-        spill_one(t, f);
+        spill_one(front, f);
         return;
     }
-    struct incode_touched *entry = incode_afl_touch(&t->afl, brick);
+    struct incode_touched *entry = incode_afl_touch(&front->afl, brick);
     entry->reached |= UINT64_C(1) << (v % INCODE_BRICK_POINTS);
+}
+
+bool incode_front_is_reached(const struct incode_front *front, uint32_t v)
+{
+    const struct incode_touched *entry =
+        incode_afl_find(&front->afl, v / INCODE_BRICK_POINTS);
+    return entry != NULL &&
+           (entry->reached >> v % INCODE_BRICK_POINTS & 1) != 0;
 }
 
 /* ---- hubs ---- */
 
 /* Puts the open face (v, b, c) into the list where it belongs now. */
-static void list_again(struct incode_triangulator *t, uint32_t v, uint32_t b,
+static void list_again(struct incode_front *front, uint32_t v, uint32_t b,
                        uint32_t c)
 {
     const uint32_t f[3] = {v, b, c};
-    unsigned turn = key_of(t, f);
+    unsigned turn = key_of(front, f);
     const uint32_t g[3] = {f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]};
-    incode_front_toggle(t, g);
+    incode_front_toggle(front, g);
 }
 
 /* Makes the vertex with a crowded list a hub; false: there is none. */
-static bool find_hub(struct incode_triangulator *t)
+static bool find_hub(struct incode_front *front)
 {
-    uint32_t v = t->afl.crowded;
+    uint32_t v = front->afl.crowded;
     if (v == INCODE_NONE)
         return false;
     uint32_t brick = v / INCODE_BRICK_POINTS;
-    if (t->unspill_pending && t->unspill_brick == brick)
+    if (front->unspill_pending && front->unspill_brick == brick)
         return false; /* some of its list is still on its way */
-    t->afl.crowded = INCODE_NONE;
-    if (is_hub(t, v) || is_spilled(t, brick) || t->hub_count == INCODE_HUBS)
+    front->afl.crowded = INCODE_NONE;
+    if (is_hub(front, v) || is_spilled(front, brick) ||
+        front->hub_count == INCODE_HUBS)
         return false;
-    t->hubs[t->hub_count++] = t->draining = v;
+    front->hubs[front->hub_count++] = front->draining = v;
     return true;
 }
 
-bool incode_front_drain(struct incode_triangulator *t)
+bool incode_front_drain(struct incode_front *front)
 {
-    if (t->draining == INCODE_NONE && !find_hub(t))
+    if (front->draining == INCODE_NONE && !find_hub(front))
         return false;
     /* Faces of three hubs stay: too few to fill the array. */
     enum { FACES = 128 };
-    uint32_t v = t->draining, pairs[FACES][2], stay = 0;
+    uint32_t v = front->draining, pairs[FACES][2], stay = 0;
     bool more;
-    uint32_t n = incode_afl_take(&t->afl, v, pairs, FACES, &more);
+    uint32_t n = incode_afl_take(&front->afl, v, pairs, FACES, &more);
     for (uint32_t i = 0; i < n; i++) {
         const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
-        if (key_of(t, f) == 0)
+        if (key_of(front, f) == 0)
             memcpy(pairs[stay++], f + 1, sizeof pairs[0]);
         else
-            list_again(t, f[0], f[1], f[2]);
+            list_again(front, f[0], f[1], f[2]);
     }
     INCODE_ASSERT(stay < FACES);
     for (uint32_t i = 0; i < stay; i++)
-        list_again(t, v, pairs[i][0], pairs[i][1]);
+        list_again(front, v, pairs[i][0], pairs[i][1]);
     if (!more)
-        t->draining = INCODE_NONE;
+        front->draining = INCODE_NONE;
     return true;
 }
 
@@ -169,17 +232,17 @@ bool incode_front_drain(struct incode_triangulator *t)
 
 /* The position from which on bricks are to be spilled: half way between the
  * one at work and the farthest one touched. */
-static uint32_t spill_position(const struct incode_triangulator *t)
+static uint32_t spill_position(const struct incode_front *front)
 {
-    uint32_t nearest = t->current, farthest = 0;
-    for (uint32_t i = 0; i < t->afl.touched_max; i++) {
-        const struct incode_touched *entry = &t->afl.touched[i];
+    uint32_t nearest = front->current, farthest = 0;
+    for (uint32_t i = 0; i < front->afl.touched_max; i++) {
+        const struct incode_touched *entry = &front->afl.touched[i];
         if (!incode_touched_used(entry))
             continue;
-        uint32_t position = incode_position(t, entry->brick);
-        if (t->foreign && position < nearest)
+        uint32_t position = incode_position(front, entry->brick);
+        if (front->foreign && position < nearest)
             nearest = position;
-        if (position < t->spill_from && position > farthest)
+        if (position < front->spill_from && position > farthest)
             farthest = position;
     }
     if (farthest < nearest)
@@ -189,7 +252,7 @@ static uint32_t spill_position(const struct incode_triangulator *t)
 
 /* Moves a brick's faces and marks out, as far as there is room for them; true:
  * all of them. */
-static bool evict_brick(struct incode_triangulator *t,
+static bool evict_brick(struct incode_front *front,
                         const struct incode_touched *entry)
 {
     uint32_t brick = entry->brick;
@@ -197,15 +260,15 @@ static bool evict_brick(struct incode_triangulator *t,
         uint32_t v = brick * INCODE_BRICK_POINTS + slot, pairs[8][2];
         bool more = true;
         while (more) {
-            if (t->spill_count > 0 && !incode_front_flush(t))
+            if (front->spill_count > 0 && !incode_front_flush(front))
                 return false;
-            uint32_t n = incode_afl_take(&t->afl, v, pairs, 8, &more);
+            uint32_t n = incode_afl_take(&front->afl, v, pairs, 8, &more);
             for (uint32_t i = 0; i < n; i++) {
-                if (v == t->draining) {
-                    list_again(t, v, pairs[i][0], pairs[i][1]);
+                if (v == front->draining) {
+                    list_again(front, v, pairs[i][0], pairs[i][1]);
                 } else {
                     const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
-                    spill_one(t, f);
+                    spill_one(front, f);
                 }
             }
         }
@@ -214,52 +277,84 @@ static bool evict_brick(struct incode_triangulator *t,
         uint32_t slot = (uint32_t)__builtin_ctzll(left);
         const uint32_t f[3] = {brick * INCODE_BRICK_POINTS + slot, INCODE_NONE,
                                INCODE_NONE};
-        spill_one(t, f);
+        spill_one(front, f);
     }
-    incode_afl_drop(&t->afl, brick);
+    incode_afl_drop(&front->afl, brick);
     return true;
 }
 
 /* Evicts one brick beyond the threshold, or notes that none is left. */
-static void evict_next(struct incode_triangulator *t)
+static void evict_next(struct incode_front *front)
 {
-    while (t->spill_cursor < t->afl.touched_max) {
-        const struct incode_touched *entry = &t->afl.touched[t->spill_cursor];
-        if (incode_touched_used(entry) && is_spilled(t, entry->brick)) {
-            (void)evict_brick(t, entry);
+    while (front->spill_cursor < front->afl.touched_max) {
+        const struct incode_touched *entry =
+            &front->afl.touched[front->spill_cursor];
+        if (incode_touched_used(entry) && is_spilled(front, entry->brick)) {
+            (void)evict_brick(front, entry);
             return;
         }
-        t->spill_cursor++;
+        front->spill_cursor++;
     }
-    t->spill_cursor = INCODE_NONE;
+    front->spill_cursor = INCODE_NONE;
 }
 
-static bool has_room(const struct incode_triangulator *t)
+static bool has_room(const struct incode_front *front)
 {
-    return t->afl.capacity - t->afl.count >= t->room_faces &&
-           t->afl.touched_capacity - t->afl.touched_count >= t->room_bricks;
+    return front->afl.capacity - front->afl.count >= front->room_faces &&
+           front->afl.touched_capacity - front->afl.touched_count >=
+               front->room_entries;
 }
 
-bool incode_front_room(struct incode_triangulator *t)
+bool incode_front_room(struct incode_front *front)
 {
-    INCODE_ASSERT(t->fault == NULL);
-    if (t->spill_count > 0 && !incode_front_flush(t))
+    INCODE_ASSERT(front->fault == NULL);
+    if (front->spill_count > 0 && !incode_front_flush(front))
         return false;
-    if (t->spill_cursor != INCODE_NONE) {
-        evict_next(t);
+    if (front->spill_cursor != INCODE_NONE) {
+        evict_next(front);
         return false;
     }
-    if (has_room(t))
+    if (has_room(front))
         return true;
-    if (t->unspill_pending) /* what returns must be whole before it moves */
+    if (front->unspill_pending) /* what returns must be whole before it moves */
         return false;
-    uint32_t from = spill_position(t);
-    if (from >= t->spill_from) {
-        t->fault = "the active face list of one brick does not fit; give the "
-                   "nodes more memory";
+    uint32_t from = spill_position(front);
+    if (from >= front->spill_from) {
+        front->fault = TOO_SMALL;
         return false;
     }
-    t->spill_from = from;
-    t->spill_cursor = 0;
+    front->spill_from = from;
+    front->spill_cursor = 0;
     return false;
+}
+
+int incode_front_unspill(struct incode_front *front, uint32_t brick,
+                         const struct incode_face *faces, size_t count,
+                         bool last)
+{
+    if (!front->unspill_pending || brick != front->unspill_brick)
+        return -1;
+    struct incode_touched *entry = NULL;
+    for (size_t i = 0; i < count; i++) {
+        const uint32_t *f = faces[i].v;
+        if (f[0] / INCODE_BRICK_POINTS != brick)
+            return -1;
+        if (front->afl.count + 1 >= front->afl.capacity ||
+            front->afl.touched_count + 1 >= front->afl.touched_capacity) {
+            front->fault = TOO_SMALL;
+            return 0;
+        }
+        if (f[1] != INCODE_NONE) {
+            incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
+            continue;
+        }
+        entry = incode_afl_touch(&front->afl, brick);
+        entry->reached |= UINT64_C(1) << (f[0] % INCODE_BRICK_POINTS);
+    }
+    if (last) {
+        front->unspill_pending = false;
+        if (front->spill_from == front->bricks)
+            front->spilled_any = false;
+    }
+    return 0;
 }

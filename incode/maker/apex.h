@@ -9,10 +9,10 @@
 #ifndef INCODE_APEX_H
 #define INCODE_APEX_H
 
-#include "incode/state.h"
+#include "search.h"
 
 struct incode_make {
-    struct incode_triangulator *t;
+    struct incode_maker *maker;
     const double *pv, *pb, *pc;
     double store[4][3];  /* those, and the best */
     uint32_t b, c;       /* indices among the local points */
@@ -40,11 +40,16 @@ void incode_make_sphere(struct incode_make *make);
 
 /* Begins the search beyond the local points, with the best so far. */
 void incode_search_from(struct incode_make *make, struct incode_search *s);
-/* The last look: every point that the best so far does not clearly beat, or
- * every point if there is none. */
-void incode_search_last(struct incode_search *s);
-/* The next box of a search for a first candidate. */
-void incode_search_box(struct incode_triangulator *t, struct incode_search *s);
+enum incode_near {
+    INCODE_NEAR_FOUND, /* *apex is certain */
+    INCODE_NEAR_HULL,  /* no point lies beyond the face */
+    INCODE_NEAR_SEARCH /* only the whole set can tell: *s is begun */
+};
+/* MakeTetra among the local points for the face (vertex, b, c); b, c and *apex
+ * are indices among them. */
+enum incode_near incode_apex_near(struct incode_maker *m, uint32_t b,
+                                  uint32_t c, uint32_t *apex,
+                                  struct incode_search *s);
 
 /* ---- around.c ---- */
 

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "apex.h"
-#include "simd.h"
+#include "incode/predicates/simd.h"
 
 /* MakeTetra among the bricks around, where the local points do not suffice.
  * For a regular face, points are ordered along its pencil of spheres: one pass
@@ -29,7 +29,7 @@ static void set_walls(double wall[8], const struct incode_neighbours *list,
 }
 
 /* Box after box, up to that of the list, for a first candidate. */
-static enum incode_walk find_first(struct incode_triangulator *t,
+static enum incode_walk find_first(struct incode_maker *m,
                                    struct incode_search *s, incode_visit *visit,
                                    void *context)
 {
@@ -37,10 +37,10 @@ static enum incode_walk find_first(struct incode_triangulator *t,
     enum incode_walk r = INCODE_WALK_DONE;
     while (r == INCODE_WALK_DONE && q->best == INCODE_NONE && !q->round) {
         s->radius *= 2;
-        incode_search_box(t, s);
-        if (!q->boxed || !incode_neighbours_holds(&t->neighbours, q->lo, q->hi))
+        incode_search_box(m, s);
+        if (!q->boxed || !incode_neighbours_holds(&m->neighbours, q->lo, q->hi))
             return INCODE_WALK_STOP;
-        r = incode_neighbours_visit(&t->neighbours, &t->walker, q, visit,
+        r = incode_neighbours_visit(&m->neighbours, &m->walker, q, visit,
                                     context);
         if (r != INCODE_WALK_DONE)
             break;
@@ -55,20 +55,20 @@ static enum incode_walk find_first(struct incode_triangulator *t,
 
 static bool search_spheres(struct incode_make *n, struct incode_search *s)
 {
-    struct incode_triangulator *t = n->t;
-    const struct incode_neighbours *list = &t->neighbours;
+    struct incode_maker *m = n->maker;
+    const struct incode_neighbours *list = &m->neighbours;
     struct incode_query *q = &s->query;
     alignas(64) double wall[8];
     enum incode_walk r = INCODE_WALK_DONE;
     if (q->best == INCODE_NONE) {
-        r = find_first(t, s, incode_visit_points, NULL);
+        r = find_first(m, s, incode_visit_points, NULL);
         if (r == INCODE_WALK_DONE)
             incode_search_last(s);
     }
     bool whole = q->boxed && incode_neighbours_holds(list, q->lo, q->hi);
     /* Without a ball of its own, a sphere does not fit. */
     if (r != INCODE_WALK_DONE || (!whole && (!q->round || q->lens)) ||
-        incode_neighbours_visit(list, &t->walker, q, incode_visit_points,
+        incode_neighbours_visit(list, &m->walker, q, incode_visit_points,
                                 NULL) != INCODE_WALK_DONE)
         return false;
     if (whole)
@@ -269,11 +269,11 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
                     const struct incode_neighbours_ball *ball,
                     const uint32_t *index, uint32_t count, struct hits *hits)
 {
-    struct incode_neighbours *list = &n->t->neighbours;
-    struct incode_pager *pager = &n->t->pager;
+    struct incode_neighbours *list = &n->maker->neighbours;
+    struct incode_pager *pager = &n->maker->pager;
     uint32_t brick[BATCH], met = 0;
     uint64_t in[BATCH];
-    n->t->stats.candidates += (uint64_t)count * INCODE_BRICK_POINTS;
+    n->maker->counts.candidates += (uint64_t)count * INCODE_BRICK_POINTS;
     for (uint32_t i = 0; i < count; i++) {
         brick[met] = list->brick[index[i]];
         if (list->copy[index[i]] == INCODE_NO_COPY) {
@@ -300,7 +300,7 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
 static bool look_around(struct incode_make *n, struct incode_query *q,
                         struct hits *hits)
 {
-    const struct incode_neighbours *list = &n->t->neighbours;
+    const struct incode_neighbours *list = &n->maker->neighbours;
     uint32_t index[INCODE_NEIGHBOURS_BRICKS + INCODE_NEIGHBOURS_PADDING];
     struct incode_neighbours_ball ball;
     uint32_t count = incode_neighbours_in_ball(list, q, &ball, index);
@@ -338,7 +338,7 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
 static bool settle(struct incode_make *n, struct incode_query *q, double t,
                    const struct hits *hits)
 {
-    struct incode_tally *tally = &n->t->stats.tally;
+    struct incode_tally *tally = &n->maker->counts.tally;
     double last = incode_pencil_later(&n->pencil, q->t);
     bool placed = t <= last, any = placed;
     for (uint32_t i = 0; i < hits->count; i++) {
@@ -359,7 +359,7 @@ static bool settle(struct incode_make *n, struct incode_query *q, double t,
 
 static void set_query(struct incode_make *n, struct incode_query *q)
 {
-    const struct incode_local_points *local = &n->t->local;
+    const struct incode_local_points *local = &n->maker->local;
     memcpy(q->pv, n->pv, sizeof q->pv);
     q->question = INCODE_QUERY_APEX;
     q->v = local->vertex;
@@ -378,23 +378,23 @@ static void set_query(struct incode_make *n, struct incode_query *q)
 
 static bool search_pencil(struct incode_make *n, struct incode_search *s)
 {
-    struct incode_triangulator *t = n->t;
+    struct incode_maker *m = n->maker;
     struct incode_query *q = &s->query;
     struct hits hits;
     alignas(64) double wall[8];
     double at = __builtin_inf();
     set_query(n, q);
     if (n->best == INCODE_LOCAL_NONE) {
-        double radius = t->local.radius;
+        double radius = m->local.radius;
         s->radius = radius > DBL_MIN ? radius : DBL_MIN;
-        if (find_first(t, s, visit_first, &n->pencil) != INCODE_WALK_DONE)
+        if (find_first(m, s, visit_first, &n->pencil) != INCODE_WALK_DONE)
             return false;
         draw_in(q, &n->pencil, incode_pencil_later(&n->pencil, q->t));
     } else {
         double r[3];
         for (int d = 0; d < 3; d++)
-            q->best_p[d] = t->local.p[d][n->best];
-        q->best = t->local.id[n->best];
+            q->best_p[d] = m->local.p[d][n->best];
+        q->best = m->local.id[n->best];
         incode_query_relative(r, q, q->best_p);
         if (!incode_pencil_place(&n->pencil, r, &at))
             return false; /* too near the face's plane */
@@ -402,23 +402,23 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     }
     if (!look_around(n, q, &hits) || !settle(n, q, at, &hits))
         return false;
-    set_walls(wall, &t->neighbours, q->pv, q->scale);
+    set_walls(wall, &m->neighbours, q->pv, q->scale);
     return incode_cap_fits(wall, &n->pencil,
                            incode_pencil_later(&n->pencil, q->t));
 }
 
 bool incode_apex_around(struct incode_make *n, struct incode_search *s)
 {
-    struct incode_triangulator *t = n->t;
-    uint64_t before = t->stats.candidates;
+    struct incode_maker *m = n->maker;
+    uint64_t before = m->counts.candidates;
     bool found = false;
-    if (t->neighbours.count > 0 && n->regular && !n->degenerate.known)
+    if (m->neighbours.count > 0 && n->regular && !n->degenerate.known)
         found = search_pencil(n, s);
     if (!found) {
         incode_search_from(n, s);
-        if (t->neighbours.count > 0)
+        if (m->neighbours.count > 0)
             found = search_spheres(n, s);
     }
-    s->looked = t->local.near + t->stats.candidates - before;
+    s->looked = m->local.near + m->counts.candidates - before;
     return found;
 }

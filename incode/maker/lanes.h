@@ -9,7 +9,7 @@
 #define INCODE_LANES_H
 
 #include "incode/predicates/double_double.h"
-#include "simd.h"
+#include "incode/predicates/simd.h"
 
 struct incode_lanes {
     incode_vd hi, lo;

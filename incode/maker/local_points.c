@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "simd.h"
+#include "incode/predicates/simd.h"
 
 #define INFINITE __builtin_inff()
 

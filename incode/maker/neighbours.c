@@ -3,7 +3,7 @@
 #include <float.h>
 #include <string.h>
 
-#include "simd.h"
+#include "incode/predicates/simd.h"
 
 /* ---- the list ---- */
 

@@ -124,7 +124,7 @@ static uint16_t take_frame(struct incode_pager *pager)
 static void ask(struct incode_pager *pager, uint32_t page)
 {
     if (pager->loading + pager->held >= pager->loading_max ||
-        !pager->request(pager->context, page))
+        !pager->source.request(pager->source.context, page))
         return;
     uint16_t i = take_frame(pager);
     INCODE_ASSERT(i != INCODE_NO_FRAME);

@@ -56,6 +56,14 @@ static inline void incode_frame_box(const struct incode_frame *f, double lo[3],
     }
 }
 
+/* Where pages come from. */
+struct incode_page_source {
+    void *context;
+    /* Asks for a page; the frame is reserved.  False: no credit now, it is
+     * asked for again later. */
+    bool (*request)(void *context, uint32_t page);
+};
+
 struct incode_pager {
     struct incode_frame *frames;
     uint64_t *used; /* when each was last; WAITING more where it is not ready */
@@ -68,8 +76,7 @@ struct incode_pager {
     uint32_t bricks;  /* pages below this are bricks */
     uint16_t free;    /* frames from here on were never used */
     uint64_t shuffle; /* state of the test's shuffle; 0: none */
-    bool (*request)(void *context, uint32_t page);
-    void *context;
+    struct incode_page_source source;
     uint64_t requests, evictions;
     uint32_t frames_used; /* high water */
 };

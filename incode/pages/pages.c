@@ -35,23 +35,3 @@ uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page)
     }
     return level;
 }
-
-uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p)
-{
-    /* Halves first: hi - lo of two finite numbers may overflow. */
-    double side = 0.5 * hi - 0.5 * lo;
-    double t = (0.5 * p - 0.5 * lo) / side * (double)cells;
-    if (!(t > 0)) { /* below the box, or a side of no length: NaN */
-        return 0;
-    }
-    return t < (double)cells ? (uint32_t)t : cells - 1;
-}
-
-uint32_t incode_cell_of(const double lo[3], const double hi[3],
-                        const uint32_t cells[3], const double p[3])
-{
-    uint32_t ix = incode_cell_along(lo[0], hi[0], cells[0], p[0]);
-    uint32_t iy = incode_cell_along(lo[1], hi[1], cells[1], p[1]);
-    uint32_t iz = incode_cell_along(lo[2], hi[2], cells[2], p[2]);
-    return (iz * cells[1] + iy) * cells[0] + ix;
-}

@@ -2,8 +2,7 @@
  * tree of boxes over them, 32 children a page.  Both kinds are 1,536 bytes, so
  * one pager serves both and the number of points has no bound but 2^32.
  *
- * Vertex number = 64 * brick + slot.  Every brick is full but the last of each
- * region.  Level 0 pages are bricks; page i of level k+1 holds the boxes of the
+ * Level 0 pages are bricks; page i of level k+1 holds the boxes of the
  * children [32 i, 32 i + 32) of level k.  The root is the one page of the
  * highest level, which is at least 1.
  *
@@ -16,9 +15,10 @@
 
 #include <stdint.h>
 
+#include "bricks.h"
+
 enum {
-    INCODE_BRICK_POINTS = 64, /* points a brick, at most */
-    INCODE_LEAF_POINTS = 8,   /* points a leaf box inside a brick */
+    INCODE_LEAF_POINTS = 8, /* points a leaf box inside a brick */
     INCODE_BRICK_LEAVES = 8,
     INCODE_FANOUT = 32, /* children a box page, at most */
     INCODE_PAGE_BYTES = 1536,
@@ -26,7 +26,9 @@ enum {
     INCODE_PAGE_WORDS = 384 /* uint32 a page of the uniform grid's lists */
 };
 
-#define INCODE_NONE UINT32_MAX
+/* How points are searched: all of them in turn, by the uniform grid, whose
+ * lists have pages of their own, or by the tree. */
+enum incode_index { INCODE_NAIVE, INCODE_GRID, INCODE_KD };
 
 /* A brick: coordinates of slots [0, count); the rest repeats the last point. */
 struct incode_brick {
@@ -71,14 +73,5 @@ void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
 
 /* Level of a page, or tree->levels for the uniform grid's pages. */
 uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page);
-
-/* Cell of coordinate p along one side [lo, hi] of the uniform grid:
- * floor((p - lo) / (hi - lo) * cells), clamped to [0, cells).  It never falls
- * as p grows, and no finite input overflows it. */
-uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p);
-
-/* Cell of a point: (iz * cells[1] + iy) * cells[0] + ix. */
-uint32_t incode_cell_of(const double lo[3], const double hi[3],
-                        const uint32_t cells[3], const double p[3]);
 
 #endif

@@ -214,13 +214,10 @@ static bool worker_start(void *self, size_t bytes,
                          struct node_counted *counted, struct node_fault *fault)
 {
     struct worker *w = self;
-    const struct incode_outside outside = {w,
-                                           outside_request,
-                                           outside_emit_room,
-                                           outside_emit,
-                                           outside_commit,
-                                           outside_spill,
-                                           outside_unspill};
+    const struct incode_outside outside = {
+        .pages = {w, outside_request},
+        .front = {w, outside_emit_room, outside_emit, outside_commit,
+                  outside_spill, outside_unspill}};
     uint8_t *memory = self;
     size_t own = node_aligned(sizeof *w), boxes = outbox_bytes(bytes);
     const char *why = NULL;
@@ -477,7 +474,7 @@ static void worker_totals(const void *self,
     }
     totals->bytes_in = w->bytes_in;
     totals->bytes_out = w->bytes_out;
-    totals->statistics = *incode_triangulator_statistics(w->triangulator);
+    incode_triangulator_statistics(w->triangulator, &totals->statistics);
     totals->memory_high_water = node_aligned(sizeof *w) + w->outbox_bytes +
                                 totals->statistics.memory_high_water;
 }

@@ -215,9 +215,10 @@ static inline void solo_start(struct solo *s, uint32_t region)
     s->face_count = 0;
     s->wanted = INCODE_NONE;
     if (s->pressure != 0)
-        s->t->room_faces = s->t->afl.capacity - s->pressure;
+        s->t->front.room_faces = s->t->front.afl.capacity - s->pressure;
     if (s->brick_pressure != 0)
-        s->t->room_bricks = s->t->afl.touched_capacity - s->brick_pressure;
+        s->t->front.room_entries =
+            s->t->front.afl.touched_capacity - s->brick_pressure;
 }
 
 /* Steps until the job is done, or `steps` times. */
@@ -228,7 +229,8 @@ static inline bool solo_step(struct solo *s, uint64_t steps)
         enum incode_step r = incode_triangulator_step(s->t);
         if (r == INCODE_BROKEN)
             fail_msg("%s", incode_triangulator_fault(s->t));
-        s->hubs = s->t->hub_count > s->hubs ? s->t->hub_count : s->hubs;
+        s->hubs =
+            s->t->front.hub_count > s->hubs ? s->t->front.hub_count : s->hubs;
         if (r == INCODE_FINISHED)
             return true;
         bool came = false;
@@ -257,7 +259,7 @@ static inline void solo_region(struct solo *s, uint32_t region)
         s->committed[b] = 0;
     }
     assert_int_equal(s->face_count, 0);
-    assert_int_equal(s->t->afl.count, 0);
+    assert_int_equal(s->t->front.afl.count, 0);
 }
 
 static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
@@ -281,9 +283,10 @@ static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
     assert_non_null(s->arena);
     assert_non_null(s->committed);
     memset(s->arena, 0xa5, s->memory + SOLO_GUARD);
-    const struct incode_outside outside = {
-        s,           solo_request, solo_emit_room, solo_emit,
-        solo_commit, solo_spill,   solo_unspill};
+    const struct incode_outside outside = {.pages = {s, solo_request},
+                                           .front = {s, solo_emit_room,
+                                                     solo_emit, solo_commit,
+                                                     solo_spill, solo_unspill}};
     const char *why = "";
     s->t = incode_triangulator_init(s->arena, s->memory, &s->setup, &outside,
                                     &why);
@@ -297,17 +300,17 @@ static inline void solo_run(struct solo *s, const double *xyz, uint64_t n)
     solo_open(s, xyz, n);
     for (uint32_t r = 0; r < s->regions; r++)
         solo_region(s, r);
-    const struct incode_statistics *stats =
-        incode_triangulator_statistics(s->t);
-    assert_int_equal(stats->tetrahedra_kept >= s->tets.count, 1);
-    assert_in_range(stats->memory_high_water, 1, s->memory);
-    s->built = stats->tetrahedra_built;
-    s->spilled = stats->afl_spilled;
-    s->hulls = stats->hull_facets;
-    s->seeds = stats->seeds;
-    s->evictions = stats->page_evictions;
+    struct incode_statistics stats;
+    incode_triangulator_statistics(s->t, &stats);
+    assert_int_equal(stats.tetrahedra_kept >= s->tets.count, 1);
+    assert_in_range(stats.memory_high_water, 1, s->memory);
+    s->built = stats.tetrahedra_built;
+    s->spilled = stats.afl_spilled;
+    s->hulls = stats.hull_facets;
+    s->seeds = stats.seeds;
+    s->evictions = stats.page_evictions;
     s->far_calls =
-        stats->candidates_histogram[22] + stats->candidates_histogram[23];
+        stats.candidates_histogram[22] + stats.candidates_histogram[23];
     for (size_t i = 0; i < SOLO_GUARD; i++)
         assert_int_equal(s->arena[s->memory + i], 0xa5);
     host_tetrahedra_map(&s->tets, s->order.row);

@@ -12,6 +12,7 @@
 
 #include "host/order/order.h"
 #include "host/order/duplicates.h"
+#include "incode/pages/cells.h"
 
 static uint64_t state = 7;
 

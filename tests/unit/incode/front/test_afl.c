@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "incode/front/afl.h"
-#include "incode/pages/pages.h"
+#include "incode/pages/bricks.h"
 
 enum { FACES = 300, BRICKS = 40, GUARD = 64 };
 

@@ -256,8 +256,8 @@ static void trace(uint32_t frames, uint32_t pages, bool shuffled)
     struct model m = {.frames = frames,
                       .loading_max = pager.loading_max,
                       .shuffled = shuffled};
-    pager.request = request;
-    pager.context = &m;
+    pager.source.request = request;
+    pager.source.context = &m;
     pager.shuffle = shuffled ? 99 : 0;
     assert_in_range(pager.loading_max, 1, frames);
     for (int step = 0; step < 20000; step++) {
@@ -312,8 +312,8 @@ static void large_numbers(void **unused)
     struct incode_pager pager;
     struct model m = {.credit = true};
     incode_pager_init(&pager, memory, FRAMES, 0);
-    pager.request = request;
-    pager.context = &m;
+    pager.source.request = request;
+    pager.source.context = &m;
     for (uint32_t k = 0; k < 1000; k++) {
         uint32_t page = UINT32_MAX - 1 - k * UINT32_C(4096);
         assert_null(incode_pager_get(&pager, page));

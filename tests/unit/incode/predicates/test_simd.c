@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "incode/maker/simd.h"
+#include "incode/predicates/simd.h"
 
 enum {
     ROUNDS = 20000,

@@ -1,4 +1,4 @@
-#include "cells.h"
+#include "cell_search.h"
 
 #include <stdalign.h>
 #include <string.h>
@@ -7,54 +7,12 @@
 
 /* ---- where cells lie ---- */
 
-/* Along dimension d, a coordinate that no point of the cells from `cell` on
- * lies below.  The cell function itself is asked, and it never falls as the
- * coordinate grows, so rounding cannot make the bound wrong, only wide. */
-static double floor_of(const struct incode_grid *g, int d, uint32_t cell)
-{
-    double lo = g->lo[d], hi = g->hi[d];
-    if (cell == 0)
-        return lo;
-    double side = 0.5 * hi - 0.5 * lo;
-    double wall = 2 * (0.5 * lo + side * ((double)cell / g->cells[d]));
-    double slack =
-        0x1p-50 * (__builtin_fabs(lo) + __builtin_fabs(hi)) + 0x1p-1070;
-    for (int i = 0; i < 4; i++, slack *= 64) {
-        double bound = wall - slack;
-        if (!(bound > lo))
-            return lo;
-        if (incode_cell_along(lo, hi, g->cells[d], bound) < cell)
-            return bound;
-    }
-    return lo;
-}
-
-/* The same from above, for the cells up to `cell`. */
-static double ceiling_of(const struct incode_grid *g, int d, uint32_t cell)
-{
-    double lo = g->lo[d], hi = g->hi[d];
-    if (cell + 1 >= g->cells[d])
-        return hi;
-    double side = 0.5 * hi - 0.5 * lo;
-    double wall = 2 * (0.5 * lo + side * ((double)(cell + 1) / g->cells[d]));
-    double slack =
-        0x1p-50 * (__builtin_fabs(lo) + __builtin_fabs(hi)) + 0x1p-1070;
-    for (int i = 0; i < 4; i++, slack *= 64) {
-        double bound = wall + slack;
-        if (!(bound < hi))
-            return hi;
-        if (incode_cell_along(lo, hi, g->cells[d], bound) > cell)
-            return bound;
-    }
-    return hi;
-}
-
 struct range {
     uint32_t first, last;
 };
 
 /* The cells of dimension d within `reach` of the centre. */
-static struct range range_of(const struct incode_cells *c,
+static struct range range_of(const struct incode_cell_search *c,
                              const struct incode_grid *g, int d, uint32_t reach)
 {
     uint32_t at = c->centre[d], last = g->cells[d] - 1;
@@ -79,13 +37,13 @@ static uint32_t passing(const struct incode_query *q,
 static void set_range(struct lane_boxes *boxes, const struct incode_grid *g,
                       int d, struct range range)
 {
-    boxes->lo[d][0] = floor_of(g, d, range.first);
-    boxes->hi[d][0] = ceiling_of(g, d, range.last);
+    boxes->lo[d][0] = incode_cells_floor(g, d, range.first);
+    boxes->hi[d][0] = incode_cells_ceiling(g, d, range.last);
 }
 
 /* Whether the question still concerns what lies beyond `reach`: six slabs of
  * the whole box, one beyond each side. */
-static bool more_beyond(const struct incode_cells *c,
+static bool more_beyond(const struct incode_cell_search *c,
                         const struct incode_grid *g,
                         const struct incode_query *q)
 {
@@ -102,9 +60,10 @@ static bool more_beyond(const struct incode_cells *c,
                 boxes.hi[e][count] = g->hi[e];
             }
             if (side == 0)
-                boxes.hi[d][count] = ceiling_of(g, d, range.first - 1);
+                boxes.hi[d][count] =
+                    incode_cells_ceiling(g, d, range.first - 1);
             else
-                boxes.lo[d][count] = floor_of(g, d, range.last + 1);
+                boxes.lo[d][count] = incode_cells_floor(g, d, range.last + 1);
             count++;
         }
     }
@@ -112,18 +71,6 @@ static bool more_beyond(const struct incode_cells *c,
 }
 
 /* ---- points ---- */
-
-static bool get_word(const struct incode_grid *g, uint32_t base, uint32_t i,
-                     uint32_t *word, uint32_t *missing)
-{
-    uint32_t page = base + i / INCODE_PAGE_WORDS;
-    const struct incode_frame *f = incode_pager_get(g->walker->pager, page);
-    *missing = page;
-    if (f == NULL)
-        return false;
-    *word = f->page.words.word[i % INCODE_PAGE_WORDS];
-    return true;
-}
 
 enum { LANES = 8, ASK_AHEAD = 16 };
 
@@ -135,7 +82,7 @@ struct batch {
 
 /* Up to 8 points of the list from c->list on; false: a page is missing after
  * those. */
-static bool fill_batch(const struct incode_cells *c,
+static bool fill_batch(const struct incode_cell_search *c,
                        const struct incode_grid *g, struct batch *batch,
                        uint32_t *missing)
 {
@@ -145,12 +92,12 @@ static bool fill_batch(const struct incode_cells *c,
     batch->count = 0;
     while (batch->count < LANES && c->list + batch->count < c->end) {
         uint32_t id;
-        if (!get_word(g, g->walker->tree->list_base, c->list + batch->count,
-                      &id, missing))
+        if (!incode_cells_word(g, g->tree->list_base, c->list + batch->count,
+                               &id, missing))
             return false;
         if (f == NULL || id / INCODE_BRICK_POINTS != brick) {
             brick = id / INCODE_BRICK_POINTS;
-            f = incode_pager_get(g->walker->pager, brick);
+            f = incode_pager_get(g->pager, brick);
             *missing = brick;
             if (f == NULL)
                 return false;
@@ -164,13 +111,13 @@ static bool fill_batch(const struct incode_cells *c,
     return true;
 }
 
-static void look_at(struct incode_cells *c, const struct incode_grid *g,
+static void look_at(struct incode_cell_search *c, struct incode_walker *walker,
                     struct incode_query *q, const struct batch *batch)
 {
-    struct incode_tally *tally = g->walker->tally;
+    struct incode_tally *tally = walker->tally;
     const double *const axis[3] = {batch->p[0], batch->p[1], batch->p[2]};
     uint32_t lanes = incode_query_lanes(q, axis);
-    *g->walker->candidates += batch->count;
+    *walker->candidates += batch->count;
     for (unsigned i = 0; i < batch->count; i++) {
         uint32_t id = batch->id[i];
         bool maybe = (lanes >> i & 1) != 0;
@@ -188,33 +135,35 @@ static void look_at(struct incode_cells *c, const struct incode_grid *g,
 }
 
 /* Asks for the bricks of the next points, which will be missing, too. */
-static void ask_ahead(const struct incode_cells *c, const struct incode_grid *g)
+static void ask_ahead(const struct incode_cell_search *c,
+                      const struct incode_grid *g)
 {
     uint32_t id, page;
     for (uint32_t i = c->list; i < c->end && i < c->list + ASK_AHEAD; i++) {
-        if (!get_word(g, g->walker->tree->list_base, i, &id, &page))
+        if (!incode_cells_word(g, g->tree->list_base, i, &id, &page))
             return;
-        (void)incode_pager_get(g->walker->pager, id / INCODE_BRICK_POINTS);
+        (void)incode_pager_get(g->pager, id / INCODE_BRICK_POINTS);
     }
 }
 
 /* The rest of the piece at work. */
-static enum incode_walk finish_piece(struct incode_cells *c,
+static enum incode_walk finish_piece(struct incode_cell_search *c,
                                      const struct incode_grid *g,
+                                     struct incode_walker *walker,
                                      struct incode_query *q, uint32_t *work)
 {
     while (c->list < c->end) {
         struct batch batch;
         bool all = fill_batch(c, g, &batch, &q->missing);
         if (batch.count > 0)
-            look_at(c, g, q, &batch);
+            look_at(c, walker, q, &batch);
         c->list += batch.count;
         if (!all) {
             ask_ahead(c, g);
             return INCODE_WALK_WAIT;
         }
         *work += batch.count;
-        if (*work >= INCODE_CELLS_WORK)
+        if (*work >= INCODE_CELL_SEARCH_WORK)
             return INCODE_WALK_STOP;
     }
     return INCODE_WALK_DONE;
@@ -242,14 +191,14 @@ static bool is_within(struct range range, uint32_t i)
 
 /* Takes the next piece of the row, from c->x on, as far as the question
  * concerns it; INCODE_WALK_STOP: none is left. */
-static enum incode_walk next_piece(struct incode_cells *c,
+static enum incode_walk next_piece(struct incode_cell_search *c,
                                    const struct incode_grid *g,
                                    struct incode_query *q, struct shell *s)
 {
     bool crosses = c->any_done && is_within(s->inner[1], c->y) &&
                    is_within(s->inner[2], c->z);
     uint32_t row = (c->z * g->cells[1] + c->y) * g->cells[0];
-    uint32_t base = g->walker->tree->cells_base;
+    uint32_t base = g->tree->cells_base;
     while (c->x <= s->outer[0].last) {
         uint32_t last = s->outer[0].last;
         if (crosses && is_within(s->inner[0], c->x)) {
@@ -265,10 +214,10 @@ static enum incode_walk next_piece(struct incode_cells *c,
             if (!whole && passing(q, &s->box, 1) == 0)
                 break;
             uint32_t from, to;
-            if (!get_word(g, base, row + c->x, &from, &q->missing) ||
-                !get_word(g, base, row + last + 1, &to, &q->missing))
+            if (!incode_cells_word(g, base, row + c->x, &from, &q->missing) ||
+                !incode_cells_word(g, base, row + last + 1, &to, &q->missing))
                 return INCODE_WALK_WAIT;
-            if (to - from > INCODE_CELLS_PIECE && last > c->x) {
+            if (to - from > INCODE_CELL_SEARCH_PIECE && last > c->x) {
                 last = c->x + (last - c->x) / 2;
                 continue;
             }
@@ -299,8 +248,8 @@ static bool passes(const struct incode_grid *g, const struct incode_query *q,
             boxes.hi[e][k] = e > d ? s->box.hi[e][0] : s->hi[e];
         }
         uint32_t at = i + (k < count ? k : 0);
-        boxes.lo[d][k] = floor_of(g, d, at);
-        boxes.hi[d][k] = ceiling_of(g, d, at);
+        boxes.lo[d][k] = incode_cells_floor(g, d, at);
+        boxes.hi[d][k] = incode_cells_ceiling(g, d, at);
     }
     tested->first = i;
     tested->end = i + count;
@@ -309,8 +258,9 @@ static bool passes(const struct incode_grid *g, const struct incode_query *q,
     return (tested->mask & 1) != 0;
 }
 
-static enum incode_walk run_row(struct incode_cells *c,
+static enum incode_walk run_row(struct incode_cell_search *c,
                                 const struct incode_grid *g,
+                                struct incode_walker *walker,
                                 struct incode_query *q, struct shell *s)
 {
     if (c->x == s->outer[0].first && !passes(g, q, s, &s->rows, 1, c->y))
@@ -321,15 +271,16 @@ static enum incode_walk run_row(struct incode_cells *c,
         if (r == INCODE_WALK_STOP)
             return INCODE_WALK_DONE;
         if (r == INCODE_WALK_DONE)
-            r = finish_piece(c, g, q, &s->work);
+            r = finish_piece(c, g, walker, q, &s->work);
         if (r != INCODE_WALK_DONE)
             return r;
     }
 }
 
 /* One layer of cells from row c->y on. */
-static enum incode_walk run_layer(struct incode_cells *c,
+static enum incode_walk run_layer(struct incode_cell_search *c,
                                   const struct incode_grid *g,
+                                  struct incode_walker *walker,
                                   struct incode_query *q, struct shell *s)
 {
     if (c->y == s->outer[1].first && c->x == s->outer[0].first &&
@@ -338,8 +289,8 @@ static enum incode_walk run_layer(struct incode_cells *c,
     set_range(&s->box, g, 2, (struct range){c->z, c->z});
     s->rows.end = 0;
     for (; c->y <= s->outer[1].last; c->y++) {
-        enum incode_walk r = run_row(c, g, q, s);
-        if (r == INCODE_WALK_DONE && s->work >= INCODE_CELLS_WORK)
+        enum incode_walk r = run_row(c, g, walker, q, s);
+        if (r == INCODE_WALK_DONE && s->work >= INCODE_CELL_SEARCH_WORK)
             r = INCODE_WALK_STOP;
         if (r != INCODE_WALK_DONE)
             return r;
@@ -348,8 +299,9 @@ static enum incode_walk run_layer(struct incode_cells *c,
     return INCODE_WALK_DONE;
 }
 
-static enum incode_walk run_shell(struct incode_cells *c,
+static enum incode_walk run_shell(struct incode_cell_search *c,
                                   const struct incode_grid *g,
+                                  struct incode_walker *walker,
                                   struct incode_query *q)
 {
     struct shell s;
@@ -357,12 +309,12 @@ static enum incode_walk run_shell(struct incode_cells *c,
     for (int d = 0; d < 3; d++) {
         s.outer[d] = range_of(c, g, d, c->reach);
         s.inner[d] = range_of(c, g, d, c->done);
-        s.lo[d] = floor_of(g, d, s.outer[d].first);
-        s.hi[d] = ceiling_of(g, d, s.outer[d].last);
+        s.lo[d] = incode_cells_floor(g, d, s.outer[d].first);
+        s.hi[d] = incode_cells_ceiling(g, d, s.outer[d].last);
     }
-    enum incode_walk r = finish_piece(c, g, q, &s.work);
+    enum incode_walk r = finish_piece(c, g, walker, q, &s.work);
     for (; r == INCODE_WALK_DONE && c->z <= s.outer[2].last; c->z++) {
-        r = run_layer(c, g, q, &s);
+        r = run_layer(c, g, walker, q, &s);
         if (r != INCODE_WALK_DONE)
             break;
         c->y = s.outer[1].first;
@@ -371,7 +323,8 @@ static enum incode_walk run_shell(struct incode_cells *c,
     return r;
 }
 
-static void start_shell(struct incode_cells *c, const struct incode_grid *g)
+static void start_shell(struct incode_cell_search *c,
+                        const struct incode_grid *g)
 {
     c->x = range_of(c, g, 0, c->reach).first;
     c->y = range_of(c, g, 1, c->reach).first;
@@ -379,8 +332,9 @@ static void start_shell(struct incode_cells *c, const struct incode_grid *g)
     c->list = c->end = 0;
 }
 
-void incode_cells_begin(struct incode_cells *c, const struct incode_grid *grid,
-                        const struct incode_query *q)
+void incode_cell_search_begin(struct incode_cell_search *c,
+                              const struct incode_grid *grid,
+                              const struct incode_query *q)
 {
     memset(c, 0, sizeof *c);
     for (int d = 0; d < 3; d++) {
@@ -392,11 +346,12 @@ void incode_cells_begin(struct incode_cells *c, const struct incode_grid *grid,
     start_shell(c, grid);
 }
 
-enum incode_walk incode_cells_run(struct incode_cells *c,
-                                  const struct incode_grid *grid,
-                                  struct incode_query *q)
+enum incode_walk incode_cell_search_run(struct incode_cell_search *c,
+                                        const struct incode_grid *grid,
+                                        struct incode_walker *walker,
+                                        struct incode_query *q)
 {
-    enum incode_walk r = run_shell(c, grid, q);
+    enum incode_walk r = run_shell(c, grid, walker, q);
     if (r != INCODE_WALK_DONE || !more_beyond(c, grid, q))
         return r;
     INCODE_ASSERT(c->reach < UINT32_C(1) << 30);

@@ -4,33 +4,27 @@
  * pages of the grid's two lists and from their bricks; the search can be
  * suspended at a missing page, and resumed there.
  *
- * Memory: struct incode_cells.  Work: INCODE_CELLS_WORK rows and points a call
- * and at most one shell; a shell's rows of cells are tested whole against the
- * sphere, and halved as long as they hold many points.
+ * Memory: struct incode_cell_search.  Work: INCODE_CELL_SEARCH_WORK rows and
+ * points a call and at most one shell; a shell's rows of cells are tested whole
+ * against the sphere, and halved as long as they hold many points.
  *
- *     incode_cells_begin(&c, &grid, &q);
- *     while ((r = incode_cells_run(&c, &grid, &q)) != INCODE_WALK_DONE)
+ *     incode_cell_search_begin(&c, &grid, &q);
+ *     while ((r = incode_cell_search_run(&c, &grid, &q)) != INCODE_WALK_DONE)
  *         INCODE_WALK_WAIT: come back when page q.missing is there;
  *         INCODE_WALK_STOP: come back when you like;
  */
-#ifndef INCODE_CELLS_H
-#define INCODE_CELLS_H
+#ifndef INCODE_CELL_SEARCH_H
+#define INCODE_CELL_SEARCH_H
 
+#include "incode/pages/cells.h"
 #include "query.h"
 
 enum {
-    INCODE_CELLS_WORK = 4096,
-    INCODE_CELLS_PIECE = 24 /* points of a row that need no halving */
+    INCODE_CELL_SEARCH_WORK = 4096,
+    INCODE_CELL_SEARCH_PIECE = 24 /* points of a row that need no halving */
 };
 
-/* The grid: cells over the tight box [lo, hi] of all points. */
-struct incode_grid {
-    struct incode_walker *walker;
-    const double *lo, *hi;
-    const uint32_t *cells;
-};
-
-struct incode_cells {
+struct incode_cell_search {
     uint32_t centre[3];   /* the cell that the shells lie around */
     uint32_t done, reach; /* shells up to done are through, reach is at work */
     bool any_done;        /* done counts */
@@ -41,12 +35,14 @@ struct incode_cells {
 };
 
 /* Begins at an INCODE_QUERY_APEX whose face is set. */
-void incode_cells_begin(struct incode_cells *c, const struct incode_grid *grid,
-                        const struct incode_query *q);
+void incode_cell_search_begin(struct incode_cell_search *c,
+                              const struct incode_grid *grid,
+                              const struct incode_query *q);
 
 /* INCODE_WALK_DONE: q->best is the apex, or INCODE_NONE at a hull facet. */
-enum incode_walk incode_cells_run(struct incode_cells *c,
-                                  const struct incode_grid *grid,
-                                  struct incode_query *q);
+enum incode_walk incode_cell_search_run(struct incode_cell_search *c,
+                                        const struct incode_grid *grid,
+                                        struct incode_walker *walker,
+                                        struct incode_query *q);
 
 #endif

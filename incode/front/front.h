@@ -1,0 +1,305 @@
+/* The front: which faces are open, in which order vertices are closed, and
+ * which tetrahedra are kept.  It holds the active face list, spills what does
+ * not fit, and asks for apexes; who answers, from what points, it does not
+ * know.
+ *
+ * Memory: struct incode_front, about 25 KB, and the share of an arena that
+ * incode_front_bytes states, for the active face list.  Work: constant a call,
+ * but for a face put into or taken out of a list, which looks at the faces of
+ * one vertex; a call never does more than one star's work.
+ *
+ *     incode_front_init(&front, memory, &share, bricks, rule, &outside);
+ *     incode_front_start(&front, &job);
+ *     while ((turn = incode_front_turn(&front, 0, &task)) != INCODE_TURN_END)
+ *         run the task, or let incode_front_next begin one;
+ *
+ * A task is a vertex that is worked on; it may be suspended and resumed.  In a
+ * task, either the whole star is opened, its faces are taken one by one, and
+ * each answer is built:
+ *
+ *     incode_star_open(&front, v);
+ *     while (incode_star_take(&front, &face)) incode_star_build(&front, ...);
+ *     incode_star_shut(&front);
+ *
+ * or one face is looked at, and its answer used some time later, if the face is
+ * still open then: incode_front_face, incode_front_use.
+ */
+#ifndef INCODE_FRONT_H
+#define INCODE_FRONT_H
+
+#include <stdalign.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "afl.h"
+#include "incode/pages/bricks.h"
+#include "job.h"
+
+enum {
+    INCODE_STAR_FACES = 256, /* open faces at one vertex held at hand */
+    INCODE_STAR_BUILT = 256, /* tetrahedra a step, at most */
+    INCODE_TASKS = 16,       /* vertices that wait for an answer */
+    INCODE_SPILL_FACES = 1024,
+    INCODE_SPILL_BUILT = 128, /* tetrahedra a step while faces are spilled */
+    INCODE_HUBS = 32,
+    INCODE_PATIENCE = 8, /* retries before a task runs alone */
+    INCODE_FACES_MIN = 4096,
+    INCODE_ENTRIES_MIN = 512,
+    INCODE_HINT_NONE = 0xffff
+};
+
+struct incode_task {
+    uint32_t v;
+    uint32_t retries;
+    uint64_t born; /* when it was first suspended, or 0 */
+    bool seed;     /* no tetrahedron has v: a first one is wanted */
+};
+
+/* A face (v, b, c) of the star at v.  hint: what the answerer has noted of b
+ * and c, or INCODE_HINT_NONE. */
+struct incode_star_face {
+    uint32_t b, c;
+    uint16_t hint[2];
+};
+
+struct incode_star {
+    uint32_t v, faces, built;
+    bool more; /* further faces of v are in the active face list */
+    alignas(64) uint32_t b[INCODE_STAR_FACES];
+    alignas(64) uint32_t c[INCODE_STAR_FACES];
+    uint16_t ib[INCODE_STAR_FACES], ic[INCODE_STAR_FACES];
+    uint32_t kept;
+    uint32_t apexes[INCODE_STAR_BUILT][3];
+};
+
+struct incode_front_counts {
+    uint64_t built, kept; /* tetrahedra */
+    uint64_t hull_facets, seeds, spilled;
+    uint64_t vertices; /* tasks begun */
+    uint64_t waited;   /* of these were suspended */
+    uint64_t faults;   /* suspensions for what was not there */
+};
+
+struct incode_front {
+    uint32_t bricks; /* of all regions */
+    enum incode_face_rule face_rule;
+    struct incode_front_outside outside;
+    struct incode_job job;
+    struct incode_afl afl;
+    struct incode_front_counts counts;
+    const char *fault; /* NULL, or a static string */
+
+    /* Order of work (positions: bricks counted from the job's first). */
+    uint32_t current;    /* own bricks before this position are passed */
+    uint32_t window;     /* positions worked on together */
+    uint32_t spill_from; /* faces of positions from here on are spilled */
+    bool foreign;        /* own bricks are passed, others' faces remain */
+    bool finished;
+    uint32_t busy; /* tasks that are suspended, one bit each */
+    uint64_t clock;
+    struct incode_task task[INCODE_TASKS];
+
+    /* Spilling. */
+    struct incode_face spill[INCODE_SPILL_FACES];
+    uint32_t spill_count;
+    uint32_t spill_cursor; /* hash head under eviction, or INCODE_NONE */
+    bool unspill_pending, spilled_any;
+    uint32_t unspill_brick;
+
+    uint32_t hubs[INCODE_HUBS], hub_count;
+    uint32_t draining; /* a hub whose list is not yet empty, or INCODE_NONE */
+
+    uint32_t room_faces, room_entries; /* kept free before a star */
+    uint32_t built_max;
+    struct incode_star star;
+};
+
+/* ---- memory ---- */
+
+/* What a front is given beside its struct. */
+struct incode_front_share {
+    uint32_t faces; /* open at a time, INCODE_FACES_MIN at least */
+    uint32_t
+        entries; /* bricks touched at a time, INCODE_ENTRIES_MIN at least */
+};
+
+/* Bytes of such a share. */
+size_t incode_front_bytes(const struct incode_front_share *share);
+
+/* memory: aligned to 64 bytes, incode_front_bytes of the share.  bricks: of the
+ * whole set, 1 at least. */
+void incode_front_init(struct incode_front *front, void *memory,
+                       const struct incode_front_share *share, uint32_t bricks,
+                       enum incode_face_rule rule,
+                       const struct incode_front_outside *outside);
+
+/* Begins a job; the one before must be finished or is abandoned. */
+void incode_front_start(struct incode_front *front,
+                        const struct incode_job *job);
+
+/* Spilled toggles of the brick that was asked for come back; -1: it was not. */
+int incode_front_unspill(struct incode_front *front, uint32_t brick,
+                         const struct incode_face *faces, size_t count,
+                         bool last);
+
+/* ---- order of work (order.c) ---- */
+
+enum incode_turn {
+    INCODE_TURN_WORKED, /* something was done: take a turn again */
+    INCODE_TURN_WAIT,   /* nothing to do until an answer, a spilled list or
+                           room outside comes */
+    INCODE_TURN_RESUME, /* task *task may go on */
+    INCODE_TURN_NEXT,   /* none may: ask incode_front_next */
+    INCODE_TURN_TASK,   /* task *task is new */
+    INCODE_TURN_COUNT,  /* how many vertices are in brick *brick? */
+    INCODE_TURN_END     /* the job is done, every brick committed */
+};
+
+/* Begins a step.  waiting: the suspended tasks, one bit each, whose answers are
+ * not there yet. */
+enum incode_turn incode_front_turn(struct incode_front *front, uint32_t waiting,
+                                   unsigned *task);
+
+/* The next vertex to work on: INCODE_TURN_TASK and *which the task, or
+ * INCODE_TURN_COUNT and *which the brick, or INCODE_TURN_WAIT, _WORKED or _END.
+ */
+enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which);
+
+/* The answer to INCODE_TURN_COUNT: passes the brick, or begins a task at one of
+ * its vertices that no tetrahedron has. */
+enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
+                                    uint32_t *which);
+
+/* A task runs: sets how many tetrahedra it may build. */
+void incode_front_run(struct incode_front *front);
+
+/* It is suspended, for an answer that is not there (fault) or of its own
+ * accord. */
+void incode_front_suspend(struct incode_front *front, unsigned task,
+                          bool fault);
+
+/* It is over. */
+void incode_front_done(struct incode_front *front, unsigned task);
+
+/* ---- faces (front.c) ---- */
+
+static inline bool incode_own_brick(const struct incode_front *front,
+                                    uint32_t brick)
+{
+    return brick - front->job.first < front->job.last - front->job.first;
+}
+
+static inline bool incode_own(const struct incode_front *front, uint32_t v)
+{
+    return incode_own_brick(front, v / INCODE_BRICK_POINTS);
+}
+
+/* Bricks counted from the job's first, the others after its last. */
+static inline uint32_t incode_position(const struct incode_front *front,
+                                       uint32_t brick)
+{
+    return brick >= front->job.first ? brick - front->job.first
+                                     : brick + front->bricks - front->job.first;
+}
+
+/* Which of v's vertices has the face in its list: *turn is its index; false:
+ * the face is not pursued.  p: the coordinates of its vertices. */
+bool incode_front_key_slow(const struct incode_front *front,
+                           const uint32_t v[3], const double *const p[3],
+                           unsigned *turn);
+
+static inline bool incode_front_key(const struct incode_front *front,
+                                    const uint32_t v[3],
+                                    const double *const p[3], unsigned *turn)
+{
+    if (front->hub_count != 0 || !incode_own(front, v[0]) ||
+        !incode_own(front, v[1]) || !incode_own(front, v[2]))
+        return incode_front_key_slow(front, v, p, turn);
+    unsigned least = v[1] < v[0];
+    *turn = v[2] < v[least] ? 2 : least;
+    return true;
+}
+
+/* Toggles a face whose key is not the vertex at work. */
+void incode_front_toggle(struct incode_front *front, const uint32_t v[3]);
+/* Notes that a tetrahedron has this vertex. */
+void incode_front_reached(struct incode_front *front, uint32_t v);
+/* Whether one has. */
+bool incode_front_is_reached(const struct incode_front *front, uint32_t v);
+/* Makes room for one star, spilling what comes last; false: the caller waits,
+ * or, with front->fault set, is broken. */
+bool incode_front_room(struct incode_front *front);
+/* Sends what waits in the spill buffer; false: no room for it outside. */
+bool incode_front_flush(struct incode_front *front);
+/* Where a vertex has too many open faces, makes it a hub and moves some of them
+ * to its neighbours' lists, so that the front at it stays as short as the work
+ * around it; nothing else may run before all are moved.  False: there is
+ * nothing to do.  Needs the room of a star. */
+bool incode_front_drain(struct incode_front *front);
+/* Whether a vertex of the brick is a hub. */
+bool incode_front_has_hub(const struct incode_front *front, uint32_t brick);
+
+/* ---- stars (star.c) ---- */
+
+/* Takes the open faces of a vertex out of the list; false: it has none. */
+bool incode_star_open(struct incode_front *front, uint32_t v);
+
+/* Whether the star is to be put off: it is nearly full, or has built enough. */
+static inline bool incode_star_is_full(const struct incode_front *front)
+{
+    return front->star.faces > INCODE_STAR_FACES - 4;
+}
+
+static inline bool incode_star_is_enough(const struct incode_front *front)
+{
+    return front->star.built >= front->built_max;
+}
+
+/* Takes one face out of the star, the last one opened; false: there is none. */
+static inline bool incode_star_take(struct incode_front *front,
+                                    struct incode_star_face *face)
+{
+    struct incode_star *star = &front->star;
+    if (star->faces == 0)
+        return false;
+    uint32_t i = --star->faces;
+    *face = (struct incode_star_face){
+        star->b[i], star->c[i], {star->ib[i], star->ic[i]}};
+    return true;
+}
+
+/* Puts one that has no answer yet back. */
+void incode_star_put(struct incode_front *front,
+                     const struct incode_star_face *face);
+
+/* Takes (v, b, c) out of the star; false: it has been closed meanwhile. */
+bool incode_star_find(struct incode_front *front, uint32_t b, uint32_t c);
+
+/* Builds the tetrahedron v of positive orientation, v[0] the star's vertex,
+ * beside the face (v[0], v[1], v[2]) that was taken out: it is emitted if it is
+ * the region's own, and its other faces toggle.  v[3] = INCODE_NONE: there is
+ * none, the face is of the hull, and p and hint do not count.  p: coordinates;
+ * hint: of each vertex. */
+void incode_star_build(struct incode_front *front, const uint32_t v[4],
+                       const double *const p[4], const uint16_t hint[4]);
+
+/* Puts what is left of the star back and emits what it has kept. */
+void incode_star_shut(struct incode_front *front);
+
+/* ---- one face at a time (star.c) ---- */
+
+/* An open face of a vertex, which stays open; false: there is none. */
+bool incode_front_face(struct incode_front *front, uint32_t v,
+                       uint32_t face[3]);
+
+/* Builds the tetrahedron v beside the face (v[0], v[1], v[2]), v[3] =
+ * INCODE_NONE at the hull, if that is still open. */
+void incode_front_use(struct incode_front *front, const uint32_t v[4],
+                      const double *const p[4]);
+
+/* Builds a first tetrahedron at v[0]. */
+void incode_front_seed(struct incode_front *front, const uint32_t v[4],
+                       const double *const p[4]);
+
+#endif

@@ -1,0 +1,278 @@
+#include "front.h"
+
+#include "incode/predicates/check.h"
+
+/* The order of work: own bricks in their order, in each the vertices with open
+ * faces, then those that no tetrahedron has; last, what is open elsewhere.
+ * What is spilled is brought back before it is needed. */
+
+enum {
+    FETCH_AHEAD = 32,  /* bricks */
+    EMIT_ROOM_MIN = 8, /* tetrahedra */
+    ALL_TASKS = (1 << INCODE_TASKS) - 1
+};
+
+/* ---- tasks ---- */
+
+static uint64_t bit_of(uint32_t v)
+{
+    return UINT64_C(1) << (v % INCODE_BRICK_POINTS);
+}
+
+static enum incode_turn begin_task(struct incode_front *front, uint32_t v,
+                                   bool seed, uint32_t *which)
+{
+    uint32_t idle = ~front->busy & ALL_TASKS;
+    if (idle == 0)
+        return INCODE_TURN_WAIT;
+    *which = (uint32_t)__builtin_ctz(idle);
+    front->task[*which] = (struct incode_task){.v = v, .seed = seed};
+    return INCODE_TURN_TASK;
+}
+
+void incode_front_run(struct incode_front *front)
+{
+    front->built_max = front->spill_from < front->bricks ? INCODE_SPILL_BUILT
+                                                         : INCODE_STAR_BUILT;
+    size_t room = front->outside.emit_room(front->outside.context);
+    if (front->built_max > room)
+        front->built_max = (uint32_t)room;
+}
+
+/* The brick of a task that has run; one that ran for the first time counts. */
+static struct incode_touched *count_run(struct incode_front *front,
+                                        struct incode_task *task)
+{
+    front->counts.vertices += task->born == 0;
+    task->retries++;
+    return incode_afl_touch(&front->afl, task->v / INCODE_BRICK_POINTS);
+}
+
+void incode_front_suspend(struct incode_front *front, unsigned task, bool fault)
+{
+    struct incode_task *t = &front->task[task];
+    front->counts.waited += fault && t->born == 0;
+    front->counts.faults += fault;
+    count_run(front, t)->waiting |= bit_of(t->v);
+    if (t->born == 0)
+        t->born = ++front->clock;
+    front->busy |= UINT32_C(1) << task;
+}
+
+void incode_front_done(struct incode_front *front, unsigned task)
+{
+    struct incode_task *t = &front->task[task];
+    struct incode_touched *entry = count_run(front, t);
+    entry->waiting &= ~bit_of(t->v);
+    front->busy &= ~(UINT32_C(1) << task);
+    if (!incode_own(front, t->v) && entry->faces == 0 && entry->waiting == 0)
+        incode_afl_drop(&front->afl, entry->brick);
+}
+
+/* A task that may go on, the oldest first; INCODE_TURN_WAIT: one has been
+ * suspended so often that nothing else may run before it. */
+static enum incode_turn ready_task(const struct incode_front *front,
+                                   uint32_t waiting, unsigned *task)
+{
+    const struct incode_task *oldest = NULL, *ready = NULL;
+    for (uint32_t left = front->busy; left != 0; left &= left - 1) {
+        unsigned i = (unsigned)__builtin_ctz(left);
+        const struct incode_task *t = &front->task[i];
+        if (oldest == NULL || t->born < oldest->born)
+            oldest = t;
+        if ((waiting >> i & 1) == 0 && (ready == NULL || t->born < ready->born))
+            ready = t;
+    }
+    bool alone = oldest != NULL && oldest->retries > INCODE_PATIENCE;
+    if (alone && ready != oldest)
+        return INCODE_TURN_WAIT;
+    if (ready == NULL)
+        return INCODE_TURN_NEXT;
+    *task = (unsigned)(ready - front->task);
+    return INCODE_TURN_RESUME;
+}
+
+/* A task whose brick has been spilled meanwhile is void: its faces are gone
+ * with it and come back with it. */
+static void drop_spilled_tasks(struct incode_front *front)
+{
+    for (uint32_t left = front->busy; left != 0; left &= left - 1) {
+        unsigned i = (unsigned)__builtin_ctz(left);
+        uint32_t brick = front->task[i].v / INCODE_BRICK_POINTS;
+        if (incode_position(front, brick) >= front->spill_from)
+            front->busy &= ~(UINT32_C(1) << i);
+    }
+}
+
+enum incode_turn incode_front_turn(struct incode_front *front, uint32_t waiting,
+                                   unsigned *task)
+{
+    if (front->finished)
+        return INCODE_TURN_END;
+    if (!incode_front_room(front)) {
+        drop_spilled_tasks(front);
+        return front->spill_cursor != INCODE_NONE ? INCODE_TURN_WORKED
+                                                  : INCODE_TURN_WAIT;
+    }
+    if (front->outside.emit_room(front->outside.context) < EMIT_ROOM_MIN)
+        return INCODE_TURN_WAIT;
+    if (incode_front_drain(front))
+        return INCODE_TURN_WORKED;
+    return ready_task(front, waiting, task);
+}
+
+/* ---- the next vertex ---- */
+
+/* Asks for the nearest spilled brick.  From then on its toggles stay in memory
+ * and add to those that return; it is not worked on before all are there. */
+static void fetch_spilled(struct incode_front *front)
+{
+    if (front->unspill_pending || !incode_front_flush(front))
+        return;
+    uint32_t brick = (front->job.first + front->spill_from) % front->bricks;
+    if (!front->outside.unspill(front->outside.context, brick))
+        return;
+    front->unspill_brick = brick;
+    front->unspill_pending = true;
+    front->spill_from++;
+}
+
+/* Brings spilled bricks back before they are needed while there is room. */
+static void fetch_ahead(struct incode_front *front)
+{
+    if (front->spill_from < front->bricks &&
+        front->spill_cursor == INCODE_NONE &&
+        front->spill_from - front->current < FETCH_AHEAD &&
+        front->afl.count < front->afl.capacity / 2 &&
+        front->afl.touched_count < front->afl.touched_capacity / 2)
+        fetch_spilled(front);
+}
+
+static bool is_returning(const struct incode_front *front, uint32_t brick)
+{
+    return front->unspill_pending && front->unspill_brick == brick;
+}
+
+/* The next vertex with open faces in the window of own bricks. */
+static bool next_own(struct incode_front *front, uint32_t *v)
+{
+    uint32_t own = front->job.last - front->job.first;
+    for (uint32_t i = 0; i < front->window; i++) {
+        uint32_t position = front->current + i;
+        if (position >= own || position >= front->spill_from ||
+            is_returning(front, front->job.first + position))
+            return false;
+        struct incode_touched *entry =
+            incode_afl_find(&front->afl, front->job.first + position);
+        if (entry == NULL)
+            continue;
+        uint64_t ready = entry->pending & ~entry->waiting;
+        if (ready == 0)
+            continue;
+        *v = entry->brick * INCODE_BRICK_POINTS +
+             (uint32_t)__builtin_ctzll(ready);
+        return true;
+    }
+    return false;
+}
+
+/* The next vertex with open faces anywhere, the lowest position first, so that
+ * what is left lies ahead and can be spilled.  Bricks without faces are
+ * forgotten on the way. */
+static bool next_foreign(struct incode_front *front, uint32_t *v)
+{
+    const struct incode_touched *best = NULL;
+    uint32_t least = 0;
+    for (uint32_t i = 0; i < front->afl.touched_max; i++) {
+        const struct incode_touched *entry = &front->afl.touched[i];
+        if (!incode_touched_used(entry) || is_returning(front, entry->brick))
+            continue;
+        if (entry->faces == 0 && entry->waiting == 0)
+            incode_afl_drop(&front->afl, entry->brick);
+        else if ((entry->pending & ~entry->waiting) != 0 &&
+                 (best == NULL ||
+                  incode_position(front, entry->brick) < least)) {
+            best = entry;
+            least = incode_position(front, entry->brick);
+        }
+    }
+    if (best == NULL)
+        return false;
+    front->current = least;
+    *v = best->brick * INCODE_BRICK_POINTS +
+         (uint32_t)__builtin_ctzll(best->pending & ~best->waiting);
+    return true;
+}
+
+/* Everything is closed: the hubs' bricks are complete, too. */
+static enum incode_turn finish(struct incode_front *front)
+{
+    while (front->hub_count > 0) {
+        uint32_t brick = front->hubs[--front->hub_count] / INCODE_BRICK_POINTS;
+        if (incode_own_brick(front, brick) &&
+            !incode_front_has_hub(front, brick))
+            front->outside.commit(front->outside.context, brick);
+    }
+    for (uint32_t i = 0; i < front->afl.touched_max; i++)
+        if (incode_touched_used(&front->afl.touched[i]))
+            incode_afl_drop(&front->afl, front->afl.touched[i].brick);
+    INCODE_ASSERT(front->afl.count == 0 && front->afl.touched_count == 0);
+    front->finished = true;
+    return INCODE_TURN_END;
+}
+
+enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
+{
+    uint32_t own = front->job.last - front->job.first, v;
+    fetch_ahead(front);
+    if (front->current >= own && !front->foreign)
+        front->foreign = true;
+    if (!front->foreign) {
+        if (front->current >= front->spill_from)
+            fetch_spilled(front);
+        if (is_returning(front, front->job.first + front->current))
+            return INCODE_TURN_WAIT;
+        if (next_own(front, &v))
+            return begin_task(front, v, false, which);
+        *which = front->job.first + front->current;
+        return INCODE_TURN_COUNT;
+    }
+    if (front->afl.count > 0 && next_foreign(front, &v))
+        return begin_task(front, v, false, which);
+    if (front->busy != 0 || front->unspill_pending)
+        return INCODE_TURN_WAIT;
+    INCODE_ASSERT(front->afl.count == 0);
+    if (!front->spilled_any)
+        return finish(front);
+    fetch_spilled(front);
+    return INCODE_TURN_WAIT;
+}
+
+/* Passes the current brick: all its lists are empty and all its vertices
+ * reached, so none of its stars will open again but those of hubs. */
+static enum incode_turn pass_brick(struct incode_front *front)
+{
+    uint32_t brick = front->job.first + front->current;
+    if (!incode_front_has_hub(front, brick)) {
+        front->outside.commit(front->outside.context, brick);
+        incode_afl_drop(&front->afl, brick);
+    }
+    front->current++;
+    return INCODE_TURN_WORKED;
+}
+
+enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
+                                    uint32_t *which)
+{
+    INCODE_ASSERT(count >= 1 && count <= INCODE_BRICK_POINTS);
+    uint32_t brick = front->job.first + front->current;
+    const struct incode_touched *entry = incode_afl_find(&front->afl, brick);
+    uint64_t all = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - count);
+    uint64_t reached = entry == NULL ? 0 : entry->reached;
+    if (entry != NULL && (entry->faces > 0 || entry->waiting != 0))
+        return INCODE_TURN_WAIT;
+    if ((all & ~reached) == 0)
+        return pass_brick(front);
+    uint32_t slot = (uint32_t)__builtin_ctzll(all & ~reached);
+    return begin_task(front, brick * INCODE_BRICK_POINTS + slot, true, which);
+}

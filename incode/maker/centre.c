@@ -1,0 +1,133 @@
+#include "search.h"
+
+/* The points around a vertex, brought to hand, and the bricks around its own.
+ */
+
+enum { NEAR_WANTED = 96, COPY_TRIES = 64 };
+
+/* Half-width of the box of local points: the extent of the leaf, times what has
+ * lately given the wanted number of points around a vertex. */
+static double first_radius(const struct incode_maker *m, const double lo[3],
+                           const double hi[3])
+{
+    double extent = 0;
+    for (int d = 0; d < 3; d++)
+        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
+    if (!(extent > 0)) {
+        for (int d = 0; d < 3; d++) {
+            double e = m->hi[d] * 0x1p-10 - m->lo[d] * 0x1p-10;
+            extent = e > extent ? e : extent;
+        }
+    }
+    double radius = extent * m->spread;
+    radius = radius > 0x1p-1070 ? radius : 0x1p-1070; /* it must grow by 4s */
+    return radius < 0x1p1000 ? radius : 0x1p1000;
+}
+
+static void learn_spread(struct incode_maker *m, uint32_t points)
+{
+    if (points > NEAR_WANTED * 9 / 8)
+        m->spread *= 0.98;
+    else if (points < NEAR_WANTED * 7 / 8)
+        m->spread *= 1.02;
+    m->spread = m->spread < 0.25 ? 0.25 : m->spread > 16 ? 16 : m->spread;
+}
+
+/* Brings the points around the leaf of a vertex to hand. */
+static enum incode_outcome copy_around_leaf(struct incode_maker *m,
+                                            struct incode_search *s, uint32_t v,
+                                            const struct incode_frame *f)
+{
+    struct incode_local_points *local = &m->local;
+    uint32_t leaf = v % INCODE_BRICK_POINTS / INCODE_LEAF_POINTS;
+    double lo[3], hi[3];
+    for (int d = 0; d < 3; d++) {
+        lo[d] = f->leaf_lo[d][leaf];
+        hi[d] = f->leaf_hi[d][leaf];
+    }
+    double radius = first_radius(m, lo, hi);
+    for (int tries = 0;; tries++) {
+        enum incode_local_outcome r =
+            incode_local_around(local, &m->walker, &m->neighbours,
+                                v / INCODE_LEAF_POINTS, lo, hi, radius);
+        s->page = local->query.missing;
+        if (r == INCODE_LOCAL_WAIT)
+            return INCODE_WAIT;
+        if (r == INCODE_LOCAL_READY || tries == COPY_TRIES)
+            return INCODE_OK;
+        radius *= 0.75;
+        m->spread *= 0.9;
+    }
+}
+
+enum {
+    NEIGHBOURS_WANTED = 64, /* bricks, at least */
+    NEIGHBOURS_TRIES = 12
+};
+
+/* Lists the bricks around that of a vertex: more of them where there are few,
+ * none where there are too many whatever the box. */
+static enum incode_outcome list_bricks(struct incode_maker *m,
+                                       struct incode_search *s, uint32_t brick,
+                                       const struct incode_frame *f)
+{
+    struct incode_neighbours *list = &m->neighbours;
+    double lo[3], hi[3], extent = 0;
+    bool full = false;
+    incode_frame_box(f, lo, hi);
+    for (int d = 0; d < 3; d++)
+        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
+    for (int tries = 0; tries < NEIGHBOURS_TRIES; tries++) {
+        double radius = extent * m->reach, around_lo[3], around_hi[3];
+        bool all = true;
+        for (int d = 0; d < 3; d++) {
+            around_lo[d] = lo[d] - radius;
+            around_hi[d] = hi[d] + radius;
+            all = all && around_lo[d] <= m->lo[d] && around_hi[d] >= m->hi[d];
+        }
+        enum incode_listed r = incode_neighbours_make(
+            list, &m->walker, brick, around_lo, around_hi, &s->page);
+        if (r == INCODE_LIST_WAIT)
+            return INCODE_WAIT;
+        if (r == INCODE_LISTED &&
+            (full || all || list->count >= NEIGHBOURS_WANTED))
+            break;
+        full = full || r == INCODE_LIST_FULL;
+        m->reach *= full ? 0.75 : 1.25;
+        m->reach = m->reach < 0x1p-10  ? 0x1p-10
+                   : m->reach > 0x1p10 ? 0x1p10
+                                       : m->reach;
+    }
+    for (int d = 0; d < 3; d++) {
+        if (list->box_lo[d] <= m->lo[d])
+            list->box_lo[d] = -__builtin_inf();
+        if (list->box_hi[d] >= m->hi[d])
+            list->box_hi[d] = __builtin_inf();
+    }
+    return INCODE_OK;
+}
+
+enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
+                                        uint32_t v)
+{
+    struct incode_search *s = &m->search[search];
+    struct incode_local_points *local = &m->local;
+    uint32_t brick = v / INCODE_BRICK_POINTS, slot = v % INCODE_BRICK_POINTS;
+    const struct incode_frame *f = incode_pager_get(&m->pager, brick);
+    s->page = brick;
+    if (f == NULL)
+        return INCODE_WAIT;
+    if (m->neighbours.centre != brick &&
+        list_bricks(m, s, brick, f) == INCODE_WAIT)
+        return INCODE_WAIT;
+    if (local->leaf != v / INCODE_LEAF_POINTS &&
+        copy_around_leaf(m, s, v, f) == INCODE_WAIT)
+        return INCODE_WAIT;
+    const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
+                         f->page.brick.z[slot]};
+    bool again = local->vertex == v; /* after a wait: nothing new to learn */
+    incode_local_centre(local, v, p, local->radius, m->lo, m->hi);
+    if (!again)
+        learn_spread(m, local->near);
+    return INCODE_OK;
+}

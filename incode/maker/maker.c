@@ -1,0 +1,131 @@
+#include "maker.h"
+
+#include <string.h>
+
+#include "incode/predicates/check.h"
+
+/* ---- memory ---- */
+
+static size_t copies_bytes(uint32_t copies)
+{
+    const struct incode_neighbours *list = NULL;
+    return copies * sizeof *list->point;
+}
+
+size_t incode_maker_bytes(const struct incode_maker_share *share)
+{
+    return copies_bytes(share->copies) + incode_pager_bytes(share->frames);
+}
+
+uint32_t incode_maker_frames(uint32_t copies, size_t bytes)
+{
+    if (bytes < copies_bytes(copies))
+        return 0;
+    bytes -= copies_bytes(copies);
+    size_t most = bytes / sizeof(struct incode_frame);
+    uint32_t frames =
+        most > INCODE_FRAMES_MAX ? INCODE_FRAMES_MAX : (uint32_t)most;
+    while (frames > 0 && incode_pager_bytes(frames) > bytes)
+        frames--;
+    return frames;
+}
+
+void incode_maker_init(struct incode_maker *m, void *memory,
+                       const struct incode_maker_share *share,
+                       const struct incode_points *points,
+                       const struct incode_page_source *source)
+{
+    INCODE_ASSERT(share->copies >= INCODE_COPIES_MIN &&
+                  share->copies <= INCODE_NEIGHBOURS_COPIES &&
+                  share->frames >= INCODE_FRAMES_MIN && points->bricks > 0);
+    memset(m, 0, sizeof *m);
+    m->index = points->index;
+    memcpy(m->lo, points->lo, sizeof m->lo);
+    memcpy(m->hi, points->hi, sizeof m->hi);
+    memcpy(m->cells, points->cells, sizeof m->cells);
+    m->neighbours.centre = INCODE_NONE;
+    m->neighbours.point = memory;
+    m->neighbours.room = share->copies;
+    incode_pager_init(&m->pager,
+                      (uint8_t *)memory + copies_bytes(share->copies),
+                      share->frames, points->bricks);
+    m->pager.source = *source;
+    m->pager.shuffle = points->shuffle_seed;
+    incode_tree_init(&m->tree, points->bricks,
+                     points->index == INCODE_GRID
+                         ? points->cells[0] * points->cells[1] *
+                               points->cells[2]
+                         : 0);
+    m->walker = (struct incode_walker){&m->pager, &m->tree, &m->counts.tally,
+                                       &m->counts.candidates};
+    m->local.pages_max = share->frames / 2;
+    incode_local_reset(&m->local);
+    m->spread = 1.6;
+    m->reach = 2;
+}
+
+void incode_maker_forget(struct incode_maker *m, unsigned slot)
+{
+    m->search[slot].stage = INCODE_SEARCH_NONE;
+}
+
+/* ---- pages ---- */
+
+uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots)
+{
+    uint32_t waiting = 0;
+    for (; slots != 0; slots &= slots - 1) {
+        unsigned slot = (unsigned)__builtin_ctz(slots);
+        if (incode_pager_loading(&m->pager, m->search[slot].page))
+            waiting |= UINT32_C(1) << slot;
+    }
+    return waiting;
+}
+
+uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick)
+{
+    const struct incode_frame *f = incode_pager_get(&m->pager, brick);
+    return f == NULL ? 0 : f->count;
+}
+
+static bool count_brick(struct incode_walker *walker, struct incode_query *q,
+                        const struct incode_frame *frame, uint32_t brick,
+                        uint32_t leaves, void *context)
+{
+    uint32_t *left = context;
+    (void)walker, (void)q, (void)frame, (void)brick, (void)leaves;
+    return --*left > 0;
+}
+
+bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
+                           uint32_t more)
+{
+    const struct incode_frame *f = incode_pager_get(&m->pager, brick);
+    if (f == NULL) {
+        for (uint32_t i = 1; i <= more; i++)
+            if (incode_pager_get(&m->pager, brick + i) == NULL &&
+                !incode_pager_loading(&m->pager, brick + i))
+                break; /* no more can be asked for at present */
+        return false;
+    }
+    struct incode_query q;
+    double extent = 0;
+    memset(&q, 0, sizeof q);
+    q.question = INCODE_QUERY_BOX;
+    q.boxed = q.ahead = true;
+    incode_frame_box(f, q.lo, q.hi);
+    uint32_t leaves = (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
+    for (int d = 0; d < 3; d++) {
+        for (uint32_t leaf = 0; leaf < leaves; leaf++) {
+            double e = f->leaf_hi[d][leaf] - f->leaf_lo[d][leaf];
+            extent = e > extent ? e : extent;
+        }
+    }
+    for (int d = 0; d < 3; d++) {
+        q.lo[d] -= extent * m->spread;
+        q.hi[d] += extent * m->spread;
+    }
+    /* No more than a share of the frames: it would push out what is at work. */
+    uint32_t left = m->pager.frame_count / 8;
+    return incode_walk(&m->walker, &q, count_brick, &left) != INCODE_WALK_WAIT;
+}

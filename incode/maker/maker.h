@@ -1,0 +1,214 @@
+/* MakeTetra: which apexes some faces have.  The maker holds the points, in
+ * pages that come on demand, and what it has learned of them: the local points
+ * of the vertex at work, the bricks around it, empty spheres, half-spaces and
+ * planes of the hull.  A search that misses a page is suspended, up to
+ * INCODE_SEARCHES of them at a time, and resumed when the page is there.  It
+ * knows no list of faces and no order of work.
+ *
+ * Memory: struct incode_maker, about 85 KB, and the share of an arena that
+ * incode_maker_bytes states: copies of neighbour bricks, frames of pages.
+ * Work: a call takes one search as far as its next missing page; with the
+ * indexes `naive` and `grid` it looks at no more than 256 pages of points or
+ * about 4,096 rows of cells and points.
+ *
+ *     incode_maker_init(&maker, memory, &share, &points, &source);
+ *     r = incode_maker_apexes(&maker, 0, faces, count, answers, &done);
+ *     if (r == INCODE_WAIT) deliver page maker.search[0].page and ask again;
+ */
+#ifndef INCODE_MAKER_H
+#define INCODE_MAKER_H
+
+#include "cell_search.h"
+#include "local_points.h"
+#include "query.h"
+
+enum {
+    INCODE_SEARCHES = 16, /* suspended at a time */
+    INCODE_HULL_PLANES = 8,
+    INCODE_HALF_SPACES = 8,
+    INCODE_COPIES_MIN = 16, /* of neighbour bricks; no more than
+                               INCODE_NEIGHBOURS_COPIES */
+    INCODE_FRAMES_MIN = 48, /* a search needs no more at once */
+    INCODE_FRAMES_MAX = INCODE_NO_FRAME - 1
+};
+
+/* The points as a whole. */
+struct incode_points {
+    uint32_t bricks;
+    enum incode_index index;
+    double lo[3], hi[3];   /* tight box of all points */
+    uint32_t cells[3];     /* index `grid`: cells in x, y, z; else 0 */
+    uint64_t shuffle_seed; /* 0: pages are ready as they arrive */
+};
+
+enum incode_outcome {
+    INCODE_OK,
+    INCODE_WAIT,  /* search.page is missing */
+    INCODE_AGAIN, /* unfinished, begin anew at the vertex without waiting */
+    INCODE_MORE   /* unfinished, go on without waiting */
+};
+
+enum incode_search_stage {
+    INCODE_SEARCH_NONE,
+    INCODE_SEARCH_POINTS, /* among points beyond those at hand */
+    INCODE_SEARCH_FOUND,  /* it is over, its answer not yet given */
+    INCODE_SEARCH_FIRST   /* of a first tetrahedron */
+};
+
+/* A first tetrahedron under way: see first.c. */
+struct incode_first {
+    enum incode_first_stage {
+        INCODE_FIRST_NEAREST,
+        INCODE_FIRST_CIRCLE,
+        INCODE_FIRST_APEX,
+        INCODE_FIRST_BACK
+    } stage;
+    uint32_t u, w, a;
+    double pu[3], pw[3], pa[3];
+};
+
+/* A search that can be suspended: box after box, then the sphere. */
+struct incode_search {
+    enum incode_search_stage stage;
+    uint32_t page; /* that it waits for */
+    struct incode_query query;
+    double radius;
+    bool final;
+    bool advanced;   /* `naive`, `grid`: it got on since it was asked */
+    bool degenerate; /* the face is of the hull's side up to rounding */
+    uint64_t looked; /* candidates so far */
+    union {
+        struct incode_first first;
+        struct {
+            struct incode_cell_search cells; /* index `grid` */
+            uint32_t sweep_left; /* index `naive`: bricks still to be seen, */
+            uint32_t sweep;      /* from this one on */
+        };
+    };
+};
+
+/* A plane with every point on it or below, and a point below. */
+struct incode_hull_plane {
+    double p[3][3], below[3];
+};
+
+struct incode_maker_counts {
+    uint64_t calls;         /* of MakeTetra */
+    uint64_t candidates;    /* points whose distance was evaluated */
+    uint64_t tree_searches; /* beyond the local points and neighbour bricks */
+    struct incode_tally tally;
+    uint64_t histogram[24]; /* calls by log2 of candidates, half octaves */
+};
+
+struct incode_maker {
+    enum incode_index index;
+    uint32_t sweep; /* index `naive`: the brick last looked at */
+    double lo[3], hi[3];
+    uint32_t cells[3];
+    struct incode_tree tree;
+    struct incode_pager pager;
+    struct incode_walker walker;
+    struct incode_maker_counts counts;
+    const char *fault; /* NULL, or a static string */
+    double spread;     /* radius of the local points, in the leaf's extent */
+    double reach;      /* of the neighbours, in the brick's extent */
+    struct incode_search search[INCODE_SEARCHES];
+    struct incode_hull_plane planes[INCODE_HULL_PLANES];
+    uint32_t plane_count, plane_next;
+    struct incode_half_space half_spaces[INCODE_HALF_SPACES];
+    uint32_t half_space_count, half_space_next;
+    struct incode_empty_spheres empty;
+    struct incode_neighbours neighbours;
+    struct incode_local_points local;
+};
+
+/* ---- memory ---- */
+
+/* What a maker is given beside its struct. */
+struct incode_maker_share {
+    uint32_t copies; /* INCODE_COPIES_MIN to INCODE_NEIGHBOURS_COPIES */
+    uint32_t frames; /* INCODE_FRAMES_MIN to INCODE_FRAMES_MAX */
+};
+
+/* Bytes of such a share. */
+size_t incode_maker_bytes(const struct incode_maker_share *share);
+
+/* The most frames that fit in so many bytes beside so many copies; 0: none. */
+uint32_t incode_maker_frames(uint32_t copies, size_t bytes);
+
+/* memory: aligned to 64 bytes, incode_maker_bytes of the share. */
+void incode_maker_init(struct incode_maker *m, void *memory,
+                       const struct incode_maker_share *share,
+                       const struct incode_points *points,
+                       const struct incode_page_source *source);
+
+/* ---- faces ---- */
+
+/* A tetrahedron f of positive orientation beside the face (f[0], f[1], f[2]),
+ * and the coordinates of its vertices; f[3] = INCODE_NONE: the face is of the
+ * hull, and only f counts.  near: where f[1], f[2] and f[3] are among the local
+ * points, or INCODE_LOCAL_NONE. */
+struct incode_answer {
+    uint32_t f[4];
+    uint16_t near[4];
+    double p[4][3];
+};
+
+/* Answers faces[*done] to faces[count - 1] (v[0], v[1], v[2]: the side where
+ * orient3d is positive is unknown), one after another, in search `slot`.
+ * INCODE_OK: all are answered; INCODE_WAIT, INCODE_MORE: call again with the
+ * same arguments, when page search[slot].page is there or at once.  Faces with
+ * the same first vertex, one after another, share its local points. */
+enum incode_outcome incode_maker_apexes(struct incode_maker *m, unsigned slot,
+                                        const uint32_t (*faces)[3],
+                                        uint32_t count,
+                                        struct incode_answer *answers,
+                                        uint32_t *done);
+
+/* Ends whatever search `slot` was doing. */
+void incode_maker_forget(struct incode_maker *m, unsigned slot);
+
+/* Index `kd`, step by step.  First, brings the points around a vertex to hand:
+ * INCODE_OK or INCODE_WAIT. */
+enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned slot,
+                                        uint32_t v);
+
+/* Then the apex of (v, b, c), with near[0] and near[1] where b and c are among
+ * the local points or INCODE_LOCAL_NONE; they are set.  INCODE_OK: *a is the
+ * answer; INCODE_MORE: go on by incode_maker_resume; INCODE_WAIT, INCODE_AGAIN:
+ * nothing is begun. */
+enum incode_outcome incode_maker_apex(struct incode_maker *m, unsigned slot,
+                                      uint32_t b, uint32_t c, uint16_t near[2],
+                                      struct incode_answer *a);
+
+/* Goes on with the search of an apex, after incode_maker_centre at the same
+ * vertex.  INCODE_OK: *a is the answer; INCODE_MORE: what was learned is no
+ * answer yet, ask for the face again by incode_maker_apex. */
+enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
+                                        struct incode_answer *a);
+
+/* Indexes `naive` and `grid`: begins the search of the apex of f, or goes on
+ * with that under way, whatever f is. */
+enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
+                                      const uint32_t f[3],
+                                      struct incode_answer *a);
+
+/* A first tetrahedron at v (MakeFirstTetra): INCODE_OK, with m->fault set where
+ * there is none, or INCODE_WAIT. */
+enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
+                                       uint32_t v, struct incode_answer *a);
+
+/* ---- pages ---- */
+
+/* Which of some searches, one bit each, wait for a page that is on its way. */
+uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots);
+
+/* Asks for the pages of a brick, of up to `more` after it, and of what lies
+ * around the first; true: all that can be has been done for it. */
+bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
+                           uint32_t more);
+
+/* Points of a brick, or 0: its page is missing and has been asked for. */
+uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick);
+
+#endif

@@ -1,0 +1,168 @@
+#include "search.h"
+
+#include <float.h>
+#include <string.h>
+
+#include "incode/predicates/check.h"
+
+bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],
+                        uint32_t *page)
+{
+    uint32_t brick = v / INCODE_BRICK_POINTS, slot = v % INCODE_BRICK_POINTS;
+    const struct incode_frame *f = incode_pager_get(&m->pager, brick);
+    *page = brick;
+    if (f == NULL)
+        return false;
+    INCODE_ASSERT(slot < f->count);
+    p[0] = f->page.brick.x[slot];
+    p[1] = f->page.brick.y[slot];
+    p[2] = f->page.brick.z[slot];
+    return true;
+}
+
+/* ---- hull planes ---- */
+
+bool incode_hull_known(struct incode_maker *m, const double pv[3],
+                       const double pb[3], const double pc[3])
+{
+    struct incode_tally *tally = &m->counts.tally;
+    for (uint32_t i = 0; i < m->plane_count; i++) {
+        const struct incode_hull_plane *h = &m->planes[i];
+        const double *a = h->p[0], *b = h->p[1], *c = h->p[2];
+        if (incode_orient3d(tally, a, b, c, pv) == 0 &&
+            incode_orient3d(tally, a, b, c, pb) == 0 &&
+            incode_orient3d(tally, a, b, c, pc) == 0)
+            return incode_orient3d(tally, pv, pb, pc, h->below) < 0;
+    }
+    return false;
+}
+
+void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
+                          const double below[3])
+{
+    struct incode_hull_plane *h = &m->planes[m->plane_next];
+    memcpy(h->p[0], q->pv, sizeof q->pv);
+    memcpy(h->p[1], q->pb, sizeof q->pb);
+    memcpy(h->p[2], q->pc, sizeof q->pc);
+    memcpy(h->below, below, sizeof h->below);
+    m->plane_next = (m->plane_next + 1) % INCODE_HULL_PLANES;
+    if (m->plane_count < INCODE_HULL_PLANES)
+        m->plane_count++;
+}
+
+/* Remembers a certified hull facet, if some local point is below it. */
+static void remember_plane(struct incode_maker *m, const struct incode_query *q)
+{
+    const struct incode_local_points *local = &m->local;
+    for (uint32_t i = 0; i < local->count; i++) {
+        double p[3] = {local->p[0][i], local->p[1][i], local->p[2][i]};
+        if (incode_orient3d(&m->counts.tally, q->pv, q->pb, q->pc, p) < 0) {
+            incode_hull_remember(m, q, p);
+            return;
+        }
+    }
+}
+
+/* ---- the search of the whole set ---- */
+
+/* The box of the next look: only points that are clearly beyond the face count
+ * there, so that those in its plane need not be told apart in vain. */
+void incode_search_box(struct incode_maker *m, struct incode_search *s)
+{
+    struct incode_query *q = &s->query;
+    bool all = true;
+    for (int d = 0; d < 3; d++) {
+        q->lo[d] = q->pv[d] - s->radius;
+        q->hi[d] = q->pv[d] + s->radius;
+        all = all && q->lo[d] <= m->lo[d] && q->hi[d] >= m->hi[d];
+    }
+    q->boxed = !all;
+    q->strictly_beyond = !s->degenerate;
+    q->cursor = 0;
+}
+
+void incode_search_last(struct incode_search *s)
+{
+    struct incode_query *q = &s->query;
+    s->final = true;
+    q->done = q->strictly_beyond = false;
+    q->cursor = 0;
+    incode_query_shrink(q);
+}
+
+void incode_search_begin(struct incode_maker *m, struct incode_search *s,
+                         const uint32_t f[3], const double pv[3],
+                         const double pb[3], const double pc[3], double radius)
+{
+    struct incode_query *q = &s->query;
+    memset(q, 0, sizeof *q);
+    q->question = INCODE_QUERY_APEX;
+    q->v = f[0];
+    q->b = f[1];
+    q->c = f[2];
+    memcpy(q->pv, pv, sizeof q->pv);
+    memcpy(q->pb, pb, sizeof q->pb);
+    memcpy(q->pc, pc, sizeof q->pc);
+    q->best = INCODE_NONE;
+    incode_query_face(q);
+    /* A radius that vanished among denormals could not grow again. */
+    s->radius = radius > DBL_MIN ? radius : DBL_MIN;
+    s->final = s->degenerate = false;
+    s->looked = 0;
+    incode_search_box(m, s);
+}
+
+void incode_count_candidates(struct incode_maker *m, uint64_t looked)
+{
+    uint64_t n = looked < 2 ? 2 : looked;
+    uint32_t octave = 63 - (uint32_t)__builtin_clzll(n);
+    uint32_t half = 2 * octave + (uint32_t)(n >> (octave - 1) & 1);
+    uint32_t last =
+        sizeof m->counts.histogram / sizeof m->counts.histogram[0] - 1;
+    m->counts.histogram[half < last ? half : last]++;
+}
+
+/* Where many points were looked at, the sphere found helps the next search. */
+void incode_search_learn(struct incode_maker *m, const struct incode_query *q)
+{
+    const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
+    if (q->best != INCODE_NONE && q->shrinking &&
+        q->looked >= INCODE_QUERY_CROWD)
+        incode_empty_spheres_add(&m->empty, p, q->scale);
+}
+
+enum incode_outcome incode_search_run(struct incode_maker *m,
+                                      struct incode_search *s)
+{
+    struct incode_query *q = &s->query;
+    for (;;) {
+        uint64_t before = m->counts.candidates;
+        enum incode_walk r =
+            incode_walk(&m->walker, q, incode_visit_points, NULL);
+        s->looked += m->counts.candidates - before;
+        if (r == INCODE_WALK_WAIT)
+            return INCODE_WAIT;
+        if (q->question == INCODE_QUERY_HALF_SPACE) {
+            m->half_spaces[m->half_space_next] = q->half_space;
+            m->half_space_next = (m->half_space_next + 1) % INCODE_HALF_SPACES;
+            if (m->half_space_count < INCODE_HALF_SPACES)
+                m->half_space_count++;
+            return INCODE_OK;
+        }
+        if (s->final) {
+            incode_count_candidates(m, s->looked);
+            if (q->best == INCODE_NONE)
+                remember_plane(m, q);
+            return INCODE_OK;
+        }
+        if (q->best != INCODE_NONE || !q->boxed) {
+            incode_search_last(s);
+            continue;
+        }
+        q->done = true;
+        memcpy(q->done_lo, q->lo, sizeof q->lo);
+        memcpy(q->done_hi, q->hi, sizeof q->hi);
+        s->radius *= s->degenerate ? 2 : 4;
+        incode_search_box(m, s);
+    }
+}

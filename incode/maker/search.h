@@ -1,0 +1,50 @@
+/* Searches of the whole set by the tree of boxes, the planes of the hull that
+ * are known, and what the maker counts; shared by its parts.
+ *
+ * Memory: struct incode_search.  Work: stated at each.
+ *
+ *     incode_search_begin(m, s, face, pv, pb, pc, radius);
+ *     while (incode_search_run(m, s) == INCODE_WAIT)
+ *         come back when page s->query.missing is there;
+ */
+#ifndef INCODE_SEARCH_H
+#define INCODE_SEARCH_H
+
+#include "maker.h"
+
+/* Begins the search of the apex of (v, b, c). */
+void incode_search_begin(struct incode_maker *m, struct incode_search *s,
+                         const uint32_t f[3], const double pv[3],
+                         const double pb[3], const double pc[3], double radius);
+
+/* Goes on with it: INCODE_OK with query.best (INCODE_NONE: a hull facet), or
+ * INCODE_WAIT for query.missing. */
+enum incode_outcome incode_search_run(struct incode_maker *m,
+                                      struct incode_search *s);
+
+/* The next box of a search for a first candidate. */
+void incode_search_box(struct incode_maker *m, struct incode_search *s);
+
+/* The last look: every point that the best so far does not clearly beat, or
+ * every point if there is none. */
+void incode_search_last(struct incode_search *s);
+
+/* Learns from the search of the apex of an open face that is over. */
+void incode_search_learn(struct incode_maker *m, const struct incode_query *q);
+
+/* Whether the face lies on a hull plane already certified, facing out. */
+bool incode_hull_known(struct incode_maker *m, const double pv[3],
+                       const double pb[3], const double pc[3]);
+
+/* Remembers a hull facet; below: a point strictly on its known side. */
+void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
+                          const double below[3]);
+
+/* The coordinates of a vertex; false: *page is missing. */
+bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],
+                        uint32_t *page);
+
+/* Notes a MakeTetra that is over: how many candidates it looked at. */
+void incode_count_candidates(struct incode_maker *m, uint64_t looked);
+
+#endif

@@ -1,0 +1,23 @@
+/* How vertices are numbered: in bricks of 64 in spatial order, so that
+ *
+ *     vertex = 64 * brick + slot
+ *
+ * Every brick is full but the last of each region.  Who has no page of points
+ * still knows what lies together.
+ *
+ * Memory: none.  Work: none.
+ *
+ *     uint32_t brick = vertex / INCODE_BRICK_POINTS;
+ *     uint32_t slot = vertex % INCODE_BRICK_POINTS;
+ */
+#ifndef INCODE_BRICKS_H
+#define INCODE_BRICKS_H
+
+#include <stdint.h>
+
+enum { INCODE_BRICK_POINTS = 64 /* points a brick, at most */ };
+
+/* No vertex, brick or page. */
+#define INCODE_NONE UINT32_MAX
+
+#endif
