@@ -4,6 +4,7 @@
  * Memory: none.  Work: a system call, or a pass over the program's segments.
  *
  *     board.fixed_bytes = process_static_bytes() + stack;
+ *     board.arena = process_arena(board.arena_bytes);
  *     now_us = process_clock_us(CLOCK_MONOTONIC);
  */
 #ifndef BOARDS_PROCESS_H

@@ -6,8 +6,9 @@
  * board holds besides (.data, .bss, stack).  Work: every function returns at
  * once, but for idle, which sleeps until its time is over or a byte comes.
  *
- *     node = node_start(&board, &why);
- *     while (node_step(node) != NODE_STOPPED) { }
+ *     struct node *node = node_start(&board, &why);
+ *     while (node_step(node) != NODE_STOPPED)
+ *         board.idle(board.context, node_wait_us(node));
  *     board.reset(board.context, 0);
  */
 #ifndef NODE_BOARD_H

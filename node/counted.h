@@ -5,7 +5,7 @@
  * Memory: the struct.  Work: that of cube_write.
  *
  *     if (node_counted_write(&counted, CUBE_HOST, NODE_SPILL, data, size) != 0)
- *         try again later;
+ *         return CUBE_AGAIN; // later
  */
 #ifndef NODE_COUNTED_H
 #define NODE_COUNTED_H

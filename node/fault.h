@@ -5,7 +5,7 @@
  *
  *     node_fault_set(&fault, "page # of # bytes was not requested", 17, 1536);
  *     if (node_fault_is_set(&fault))
- *         send(fault.text, fault.size);
+ *         cube_write(cube, CUBE_HOST, NODE_FAULT, fault.text, fault.size);
  */
 #ifndef NODE_FAULT_H
 #define NODE_FAULT_H

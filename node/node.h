@@ -6,9 +6,10 @@
  * Work: a step handles the frames that links hold, then lets the role
  * compute for a bounded while and send what may leave.
  *
- *     node = node_start(&board, &why);
+ *     struct node *node = node_start(&board, &why);
  *     while ((event = node_step(node)) != NODE_STOPPED)
- *         if (event == NODE_IDLE) board.idle(context, node_wait_us(node));
+ *         if (event == NODE_IDLE)
+ *             board.idle(board.context, node_wait_us(node));
  */
 #ifndef NODE_NODE_H
 #define NODE_NODE_H

@@ -4,9 +4,11 @@
  * Memory: NODE_OUTBOX_BYTES(slots), from the node's arena.  Work: constant a
  * call.
  *
- *     uint8_t *data = node_outbox_open(&box);
- *     ... fill ...; node_outbox_close(&box, NODE_SPILL, size);
- *     while (node_outbox_first(&box, &entry) && sent) node_outbox_drop(&box);
+ *     uint8_t *room = node_outbox_open(&box);
+ *     memcpy(room, data, size);
+ *     node_outbox_close(&box, NODE_SPILL, size);
+ *     while ((slot = node_outbox_first(&box)) != NULL && sent(slot))
+ *         node_outbox_drop(&box);
  */
 #ifndef NODE_OUTBOX_H
 #define NODE_OUTBOX_H

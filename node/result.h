@@ -11,9 +11,11 @@
  * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
  * read whatever its bytes are, without reading past its end.
  *
- *     node_result_begin(&writer, buffer, sizeof buffer);
+ *     node_result_begin(&writer, buffer, sizeof buffer - NODE_RESULT_SLACK);
  *     written = node_result_star(&writer, vertex, apexes, count);
- *     while (node_result_read(&reader, rows, 64, &n) == NODE_RESULT_ROWS) ...
+ *     node_result_open(&reader, buffer, writer.size, vertices);
+ *     while (node_result_read(&reader, rows, 64, &count) == NODE_RESULT_ROWS)
+ *         tetrahedra += count;
  */
 #ifndef NODE_RESULT_H
 #define NODE_RESULT_H

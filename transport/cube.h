@@ -17,9 +17,11 @@
  * free of deadlock with buffers of each channel's own).  Work: cube_poll
  * handles at most one window of frames a link.
  *
- *     cube_init(&cube, arena, bytes, &config);
- *     while (cube_read(&cube, &message)) { use; cube_release(&cube); }
- *     cube_write(&cube, CUBE_HOST, type, data, size) == 0 || try again later;
+ *     struct cube *cube = cube_init(arena, bytes, &config);
+ *     while (cube_poll(cube, now_us) > 0 && cube_read(cube, &message))
+ *         cube_release(cube);
+ *     if (cube_write(cube, CUBE_HOST, type, data, size) == CUBE_AGAIN)
+ *         return 0; // later
  */
 #ifndef TRANSPORT_CUBE_H
 #define TRANSPORT_CUBE_H

@@ -7,7 +7,7 @@
  * 8 KB on large machines, none where the processor computes it).  Work: linear
  * in the bytes given.
  *
- *     n = frame_encode(out, &header, payload);
+ *     size_t n = frame_encode(out, &header, payload);
  *     if (frame_open(&reader, in, n - 1, &header) == FRAME_GOOD)
  *         good = frame_take(&reader, &header, slot) == FRAME_GOOD;
  */

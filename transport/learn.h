@@ -6,7 +6,8 @@
  * LEARN_BYTES a link.
  *
  *     learner_init(&learner, pipes, links);
- *     while (!learner_poll(&learner, &learned)) { idle; }
+ *     while (!learner_poll(&learner, &learned))
+ *         wait();
  *     config.self = learned.self, config.dimension = learned.dimension;
  */
 #ifndef TRANSPORT_LEARN_H

@@ -10,9 +10,10 @@
  * is ever received that has no place.  Work: link_poll handles at most window +
  * 2 frames each way, and calls the pipe at most 2 window + 5 times.
  *
- *     link_init(&link, memory, bytes, &config);
- *     link_poll(&link, now_us);
- *     while (link_read(&link, &message)) { use; link_release(&link); }
+ *     struct link *link = link_init(memory, bytes, &config);
+ *     link_poll(link, now_us);
+ *     while (link_read(link, &message))
+ *         link_release(link);
  */
 #ifndef TRANSPORT_LINK_H
 #define TRANSPORT_LINK_H

@@ -15,9 +15,11 @@
  * and taken, and between two good records no more than SECURE_LOST_MAX bytes
  * are opened or skipped in vain.
  *
- *     secure_shake_init(&shake, suite, key, caller, nonce);
- *     while ((status = secure_shake(&shake, &pipe)) == 0) wait;
- *     if (status > 0) secure_records_start(&records, &shake, &pipe);
+ *     secure_shake_init(&shake, &suite, key, true, nonce);
+ *     while ((status = secure_shake(&shake, &pipe)) == 0)
+ *         wait();
+ *     if (status > 0)
+ *         secure_records_start(&records, &shake, &pipe);
  *     config.pipe = secure_records_pipe(&records);
  */
 #ifndef TRANSPORT_SECURE_H

@@ -2,7 +2,9 @@
  *
  * Memory: none; texts stay the caller's.  Work: a few writes.
  *
- *     fault = (struct linux_fault){"--key", path, "does not open", next,
+ *     fault = (struct linux_fault){"--key", path, "does not open",
+ *                                  "name a file that can be read", errno};
+ *     fault_print(&fault);
  * errno}; fault_print(&fault);
  */
 #ifndef BOARDS_LINUX_FAULT_H

@@ -2,7 +2,8 @@
  *
  * Memory: the caller's; texts stay those of the arguments.  Work: one pass.
  *
- *     if (!straps_read(argv + 1, &straps, &fault)) fault_print(&fault);
+ *     if (!straps_read(argv + 1, &straps, &fault))
+ *         fault_print(&fault);
  */
 #ifndef BOARDS_LINUX_STRAPS_H
 #define BOARDS_LINUX_STRAPS_H

@@ -4,9 +4,10 @@
  * tcp_wire, in memory that is given.  Work: as the drivers'.
  *
  *     linux_wire_inherit(&wire[0], fd);
- *     linux_wire_open(&wire[1], "call:10.0.0.7:7001", key, &net, &fault);
+ *     if (!linux_wire_open(&wire[1], "call:10.0.0.7:7001", key, &net, &fault))
+ *         return 1;
  *     board.pipes[0] = linux_wire_pipe(&wire[0]);
- *     linux_wires_idle(wire, count, wait_us);
+ *     linux_wires_idle(wire, 2, wait_us, 0);
  */
 #ifndef BOARDS_LINUX_WIRE_H
 #define BOARDS_LINUX_WIRE_H

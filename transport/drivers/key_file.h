@@ -4,8 +4,9 @@
  *
  * Memory: none.  Work: reads the first 64 bytes.
  *
- *     switch (key_file_read("cube.key", key)) {
- *     case KEY_FILE_UNREADABLE: perror("cube.key"); ...
+ *     enum key_file_state state = key_file_read("cube.key", key);
+ *     if (state != KEY_FILE_GOOD)
+ *         fputs(key_file_text(state).what, stderr);
  */
 #ifndef TRANSPORT_DRIVERS_KEY_FILE_H
 #define TRANSPORT_DRIVERS_KEY_FILE_H

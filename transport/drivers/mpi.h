@@ -16,10 +16,11 @@
  * synchronous, and no slot is used again before its message is complete.
  * Work: send and receive handle at most MPI_PIPE_SLOTS messages a call.
  *
- *     mpi_place_open(&place);                     after MPI_Init
- *     mpi_pipe_open(&pipe, &place, peer, tag);    rank and tag alike at both
- *     config.pipe = mpi_link_pipe(&pipe);         ends
- *     mpi_sleep(&place, &pipe, 1, wait_us);
+ *     if (mpi_place_open(&place) != 0) // after MPI_Init
+ *         return -1;
+ *     mpi_pipe_open(&pipe, &place, peer, tag); // both ends: one tag
+ *     config.pipe = mpi_link_pipe(&pipe);
+ *     mpi_sleep(&place, &pipe, 1, NULL, wait_us);
  */
 #ifndef TRANSPORT_DRIVERS_MPI_H
 #define TRANSPORT_DRIVERS_MPI_H

@@ -5,7 +5,7 @@
  *
  * Memory: the environment's.  Work: constant.
  *
- *     mpi_environment();       before MPI_Init, and before mpirun
+ *     mpi_environment(); // before MPI_Init, and before mpirun
  */
 #ifndef TRANSPORT_DRIVERS_MPI_ENVIRONMENT_H
 #define TRANSPORT_DRIVERS_MPI_ENVIRONMENT_H

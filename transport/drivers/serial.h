@@ -9,7 +9,8 @@
  *
  * Memory: struct serial_pipe.  Work: at most three system calls a function.
  *
- *     serial_raw(fd);
+ *     if (serial_raw(fd) != 0)
+ *         return -1;
  *     serial_pipe_init(&pipe, fd, 115200);
  *     config.pipe = serial_link_pipe(&pipe);
  */

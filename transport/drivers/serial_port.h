@@ -7,7 +7,8 @@
  * through /sys and /proc to open; none of it waits for the wire.
  *
  *     struct serial_port_settings s = {"usb:A50285BI", 921600, true, 1, 1};
- *     if (serial_port_open(&port, &s) != 0) puts(port.fault);
+ *     if (serial_port_open(&port, &s) != 0)
+ *         puts(port.fault);
  *     config.pipe = serial_link_pipe(&port.pipe);
  *     serial_port_close(&port);
  */

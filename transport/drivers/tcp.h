@@ -6,7 +6,8 @@
  * tcp_buffers tells what it gave).  Work: one system call a function, but for
  * tcp_pair.
  *
- *     tcp_pair(fds);
+ *     if (tcp_pair(fds) != 0)
+ *         return -1;
  *     tcp_pipe_init(&pipe, fds[0]);
  *     config.pipe = tcp_link_pipe(&pipe);
  */

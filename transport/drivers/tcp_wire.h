@@ -16,8 +16,8 @@
  * connections a call, and looks at each candidate once.
  *
  *     tcp_address_parse(&config.address, "[2001:db8::7]:7000");
- *     if (tcp_wire_open(&wire, &config) != 0) perror("wire");
- *     pipe = tcp_wire_pipe(&wire);
+ *     if (tcp_wire_open(&wire, &config) != 0)
+ *         return -1;
  *     count = tcp_wire_events(&wire, fds);
  *     wait_files(fds, count, tcp_wire_wait_us(&wire), 0);
  *     tcp_wire_heard(&wire, fds, count);

@@ -4,7 +4,7 @@
  *
  * Memory: GMP's.  Work: tens of products of a few hundred to 10,000 bits.
  *
- *     int sign = reference_in_sphere(p, true);        p: five points
+ *     int sign = reference_in_sphere(p, true); // p: five points
  */
 #ifndef TESTS_UNIT_EXACT_REFERENCE_H
 #define TESTS_UNIT_EXACT_REFERENCE_H
