@@ -1,5 +1,5 @@
-/* A whole cube in one process: the node program on pipes of memory that cut
- * and hold back bytes at random, and a plain host beside it.  Whatever the
+/* The node program on the simulator's cube, whose wires cut and hold back bytes
+ * at random, and a plain host beside it.  Whatever the
  * nodes, roles, windows and memories, the tetrahedra are the same, each brick
  * is committed once, and no node ever has more pages under way than agreed. */
 #include <setjmp.h>
@@ -12,17 +12,17 @@
 
 #include <cmocka.h>
 
-#include "host/mesh/gen.h"
-#include "host/service/ledger.h"
-#include "host/order/order.h"
-#include "host/service/spill.h"
-#include "host/mesh/tetrahedra.h"
 #include "host/check/verify.h"
+#include "host/mesh/gen.h"
+#include "host/mesh/tetrahedra.h"
+#include "host/order/order.h"
+#include "host/service/ledger.h"
+#include "host/service/spill.h"
+#include "host/sim/sim_world.h"
 #include "node/node.h"
 #include "node/result.h"
-#include "rings.h"
 
-enum { NODES = 8, LINKS = 4, QUEUE = 256, FIXED = 73728 };
+enum { NODES = 8, QUEUE = 256 };
 
 struct waiting {
     uint32_t pages[QUEUE], first, count;
@@ -34,13 +34,10 @@ struct waiting {
 
 static struct {
     unsigned nodes, dimension, workers;
-    struct ring_wire wire[NODES][LINKS]; /* by the lower end */
-    struct ring_end end[NODES][LINKS], host_end;
-    struct node_board board[NODES];
-    struct node *node[NODES];
-    bool stopped[NODES];
+    struct host_world sim;
+    struct host_machine machine;
     struct cube *cube;
-    void *memory[NODES + 1];
+    void *memory; /* of the host's cube */
     struct waiting waiting[NODES];
     struct host_order order;
     struct host_ledger ledger;
@@ -48,68 +45,45 @@ static struct {
     struct host_tetrahedra tets;
     struct node_setup_message setup;
     unsigned ready, finished;
-    uint64_t now_us;
 } world;
 
-static uint64_t now_us(void *context)
-{
-    (void)context;
-    return world.now_us;
-}
+static uint64_t state = 88172645463325252u;
 
-/* The wires of a hypercube, and the host's to node 0. */
-static void wire(void)
+static uint32_t draw(uint32_t below)
 {
-    unsigned dimension = world.dimension;
-    for (unsigned i = 0; i < world.nodes; i++) {
-        for (unsigned d = 0; d < dimension; d++) {
-            unsigned other = i ^ 1u << d;
-            world.end[i][d] = (struct ring_end){
-                &world.wire[i < other ? i : other][d], i > other};
-            world.end[i][d].wire->hesitates = true;
-            world.board[i].pipes[d] = ring_pipe(&world.end[i][d]);
-        }
-    }
-    world.end[0][dimension] = (struct ring_end){&world.wire[0][dimension], 0};
-    world.host_end = (struct ring_end){&world.wire[0][dimension], 1};
-    world.wire[0][dimension].hesitates = true;
-    world.board[0].pipes[dimension] = ring_pipe(&world.end[0][dimension]);
+    return (uint32_t)(sim_draw(&state) >> 32) % below;
 }
 
 static void start(unsigned window, size_t memory)
 {
+    /* Frames are sent in pieces, and some of them arrive so. */
+    const struct host_world_options options = {
+        .cube = {.dimension = world.dimension,
+                 .seed = draw(UINT32_MAX),
+                 .wire = {20000000, 10, 700, SIM_BYTES_MIN},
+                 .faults = {.chance = {[SIM_STALL] = 1e-3}, .stall_us = 100},
+                 .gather_us = 1},
+        .memory = memory,
+        .window = (uint8_t)window,
+        .step_us = 20,
+        .host_us = 25,
+        .time_us_max = UINT64_MAX,
+        .steps_max = UINT64_MAX,
+    };
+    struct host_error error = {0};
     struct cube_config config;
     memset(&config, 0, sizeof config);
-    wire();
-    for (unsigned i = 0; i < world.nodes; i++) {
-        struct node_board *board = &world.board[i];
-        const char *why = NULL;
-        world.memory[i] = aligned_alloc(64, memory - FIXED);
-        assert_non_null(world.memory[i]);
-        board->identity.self = (uint16_t)i;
-        board->identity.dimension = (uint8_t)world.dimension;
-        board->identity.window = (uint8_t)window;
-        board->identity.epoch = 100 + i;
-        board->now_us = now_us;
-        board->busy_us = now_us;
-        board->idle = ring_idle;
-        board->reset = ring_reset;
-        board->arena = world.memory[i];
-        board->arena_bytes = memory - FIXED;
-        board->fixed_bytes = FIXED;
-        world.node[i] = node_start(board, &why);
-        assert_null(why);
-        assert_non_null(world.node[i]);
-    }
+    assert_int_equal(host_world_open(&world.sim, &options, &error), 0);
+    world.machine = host_world_machine(&world.sim);
     config.self = CUBE_HOST;
     config.dimension = (uint8_t)world.dimension;
     config.window = (uint16_t)window;
-    config.epoch = 99;
-    config.pipes[0] = ring_pipe(&world.host_end);
+    config.epoch = world.machine.epoch;
+    config.pipes[0] = world.machine.pipe;
     size_t bytes = (cube_arena_bytes(&config) + 63) / 64 * 64;
-    world.memory[NODES] = aligned_alloc(64, bytes);
-    assert_non_null(world.memory[NODES]);
-    world.cube = cube_init(world.memory[NODES], bytes, &config);
+    world.memory = aligned_alloc(64, bytes);
+    assert_non_null(world.memory);
+    world.cube = cube_init(world.memory, bytes, &config);
     assert_non_null(world.cube);
 }
 
@@ -239,19 +213,19 @@ static void serve(uint16_t to)
     }
 }
 
-/* One step of everything, in a random order; the host sometimes looks away. */
+/* A while of the nodes; the host sometimes looks away. */
 static void step(void)
 {
     struct cube_message message;
-    world.now_us += draw(50);
-    for (unsigned k = 0; k < world.nodes; k++) {
-        unsigned i = draw(world.nodes);
-        world.stopped[i] =
-            world.stopped[i] || node_step(world.node[i]) == NODE_STOPPED;
-        assert_true(node_wait_us(world.node[i]) <= 1000000);
+    (void)world.machine.now_us(world.machine.context);
+    assert_null(world.sim.fault);
+    for (unsigned i = 0; i < world.nodes; i++) {
+        const struct host_world_node *node = &world.sim.node[i];
+        assert_true(node->state != HOST_WORLD_UP ||
+                    node_wait_us(node->node) <= 1000000);
     }
     if (draw(3) != 0) {
-        (void)cube_poll(world.cube, world.now_us);
+        (void)cube_poll(world.cube, world.sim.now_us);
         while (cube_read(world.cube, &message)) {
             take(&message);
             cube_release(world.cube);
@@ -282,21 +256,16 @@ static void give_jobs(void)
 
 static void stop(void)
 {
-    unsigned stopped = 0;
     while (cube_write(world.cube, CUBE_ALL, NODE_STOP, NULL, 0) != 0) {
         step();
     }
     bool closing = false;
-    for (unsigned steps = 0; stopped < world.nodes; steps++) {
+    for (unsigned steps = 0; world.sim.ended < world.nodes; steps++) {
         assert_true(steps < 1000000);
         step();
         if (!closing && cube_idle(world.cube)) {
-            cube_close(world.cube, world.now_us + 1000000);
+            cube_close(world.cube, world.sim.now_us + 1000000);
             closing = true;
-        }
-        stopped = 0;
-        for (unsigned i = 0; i < world.nodes; i++) {
-            stopped += world.stopped[i];
         }
     }
 }
@@ -359,9 +328,9 @@ static void run(const struct host_points *points, struct shape shape,
     host_tetrahedra_map(&world.tets, world.order.row);
     host_tetrahedra_sort(&world.tets);
     host_digest(&world.tets, digest);
-    for (unsigned i = 0; i <= NODES; i++) {
-        free(world.memory[i]);
-    }
+    assert_null(host_world_damage(&world.sim));
+    host_world_close(&world.sim);
+    free(world.memory);
     host_spill_free(&world.spill);
     host_ledger_free(&world.ledger);
     host_order_free(&world.order);
@@ -405,11 +374,12 @@ static void test_small(void **unused)
 {
     (void)unused;
     static _Alignas(64) uint8_t arena[4096];
+    struct sim_end nowhere = {NULL, NULL, NULL};
     struct node_board board;
     const char *why = NULL;
     memset(&board, 0, sizeof board);
     board.identity.epoch = 1;
-    board.pipes[0] = ring_pipe(&world.host_end);
+    board.pipes[0] = sim_pipe(&nowhere);
     board.arena = arena;
     board.arena_bytes = sizeof arena;
     assert_null(node_start(&board, &why));
