@@ -276,7 +276,6 @@ static void step(struct host_world *w, unsigned i)
         wake_at(w, i, UINT64_MAX);
         return;
     }
-    n->worked = event == NODE_IDLE ? 0 : n->worked + 1;
     cost = event == NODE_IDLE ? cost / 8 + 1 : cost;
     n->busy_us += cost;
     n->busy_until_us = w->now_us + cost;

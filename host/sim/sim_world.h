@@ -62,7 +62,6 @@ struct host_world_node {
     bool unplugged; /* its wires were cut while it is off */
     uint64_t wake_us, busy_until_us, busy_us, offset_us;
     uint32_t starts, place; /* in the heap */
-    uint32_t worked;        /* steps in a row that did something */
     unsigned links;
 };
 

@@ -1,293 +1,22 @@
-/* The host's service and a whole cube of nodes in one process and in virtual
- * time, on wires of memory, as real boards are: nobody tells the host that a
- * node has started again, is stopped or gone.  Whatever is lost, the digest is
- * that of the undisturbed run; where the cube cannot go on, the host says which
- * node and link it is. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include "host/mesh/gen.h"
-#include "host/run/run.h"
-#include "host/service/strategies/strategies.h"
-#include "node/node.h"
-#include "tests/unit/node/rings.h"
-
-enum {
-    DIMENSION = 3,
-    NODES = 8,
-    MEMORY = 1 << 20,
-    FIXED = 73728,
-    EVENTS = 8,
-    DEAD_US = 2000000
-};
-
-enum what { NOTHING, RESTART, STOP, CONTINUE, CUT, MEND };
-
-struct event {
-    enum what what;
-    double when; /* in the time that the undisturbed run takes */
-    unsigned node, link;
-};
-
-static struct {
-    struct ring_wire wire[NODES][DIMENSION + 1]; /* by the lower end */
-    struct ring_end end[NODES][DIMENSION + 1], host[2];
-    struct node_board board[NODES];
-    struct node *node[NODES];
-    bool stopped[NODES], ended[NODES];
-    uint16_t spare;
-    uint8_t absent_s;
-    uint32_t dead_us, epoch;
-    struct event events[EVENTS];
-    double host_fails; /* when; 0: never */
-    bool sick;         /* node 0 starts again whenever it has work */
-    unsigned busy;     /* its steps in a row that did something */
-    uint64_t now_us;
-} world;
-
-static uint64_t undisturbed_us;
-static struct host_digest expected;
-static struct host_points points;
-static struct host_run_result result;
-
-static uint64_t now_us(void *context)
-{
-    (void)context;
-    return world.now_us;
-}
-
-static struct ring_wire *wire_of(unsigned node, unsigned link)
-{
-    unsigned other = link == DIMENSION ? node : node ^ 1u << link;
-    return &world.wire[node < other ? node : other][link];
-}
-
-static void start_node(unsigned i)
-{
-    struct node_board *board = &world.board[i];
-    const char *why = NULL;
-    memset(board->arena, 0xa5, board->arena_bytes);
-    board->identity.epoch = ++world.epoch;
-    world.node[i] = node_start(board, &why);
-    assert_null(why);
-    assert_non_null(world.node[i]);
-    world.stopped[i] = world.ended[i] = false;
-}
-
-static void wire_up(void)
-{
-    for (unsigned i = 0; i < NODES; i++) {
-        for (unsigned d = 0; d <= DIMENSION; d++) {
-            world.end[i][d].wire = wire_of(i, d);
-            world.end[i][d].side = d < DIMENSION && (i >> d & 1) != 0;
-            world.board[i].pipes[d] = ring_pipe(&world.end[i][d]);
-        }
-    }
-    world.host[0] = (struct ring_end){wire_of(0, DIMENSION), 1};
-    world.host[1] = (struct ring_end){wire_of(world.spare, DIMENSION), 1};
-}
-
-static void start_world(void)
-{
-    wire_up();
-    for (unsigned i = 0; i < NODES; i++) {
-        struct node_board *board = &world.board[i];
-        board->identity.self = (uint16_t)i;
-        board->identity.dimension = DIMENSION;
-        board->identity.host_wire = i != 0 && i == world.spare;
-        board->identity.dead_us = world.dead_us;
-        board->now_us = now_us;
-        board->busy_us = now_us;
-        board->idle = ring_idle;
-        board->reset = ring_reset;
-        board->arena_bytes = MEMORY - FIXED;
-        board->arena = aligned_alloc(64, MEMORY - FIXED);
-        assert_non_null(board->arena);
-        board->fixed_bytes = FIXED;
-        start_node(i);
-    }
-}
-
-static void end_world(void)
-{
-    for (unsigned i = 0; i < NODES; i++) {
-        free(world.board[i].arena);
-    }
-}
-
-static void strike(struct event *event)
-{
-    switch (event->what) {
-    case RESTART:
-        start_node(event->node);
-        break;
-    case STOP:
-        world.stopped[event->node] = true;
-        break;
-    case CONTINUE:
-        world.stopped[event->node] = false;
-        break;
-    case CUT:
-        wire_of(event->node, event->link)->cut = true;
-        break;
-    case MEND:
-        wire_of(event->node, event->link)->cut = false;
-        break;
-    case NOTHING:
-        break;
-    }
-    event->what = NOTHING;
-}
-
-/* ---- the machine ---- */
-
-static void machine_idle(void *context, uint64_t wait_us)
-{
-    (void)context;
-    bool moved = false;
-    for (unsigned k = 0; k < NODES; k++) {
-        unsigned i = draw(NODES);
-        if (!world.stopped[i] && !world.ended[i]) {
-            enum node_event event = node_step(world.node[i]);
-            world.ended[i] = event == NODE_STOPPED;
-            moved = moved || event == NODE_BUSY;
-            world.busy = i != 0               ? world.busy
-                         : event == NODE_BUSY ? world.busy + 1
-                                              : 0;
-            if (world.sick && world.busy > 3) {
-                start_node(0);
-                world.busy = 0;
-            }
-        }
-    }
-    world.now_us += moved ? 20 : wait_us < 1000 ? wait_us + 1 : 1000;
-    for (unsigned i = 0; i < EVENTS; i++) {
-        double when = world.events[i].when * (double)undisturbed_us;
-        if ((double)world.now_us >= when) {
-            strike(&world.events[i]);
-        }
-    }
-}
-
-static int machine_check(void *context, struct host_error *error)
-{
-    (void)context;
-    double when = world.host_fails * (double)undisturbed_us;
-    return when > 0.0 && (double)world.now_us >= when
-               ? host_fail(error, HOST_CUBE, "the host fails; as it should")
-               : 0;
-}
-
-static bool machine_ended(void *context)
-{
-    (void)context;
-    return true;
-}
-
-static void machine_stop(void *context)
-{
-    (void)context;
-}
-
-static struct host_machine make_machine(void)
-{
-    struct host_machine machine;
-    memset(&machine, 0, sizeof machine);
-    machine.nodes = NODES;
-    machine.dimension = DIMENSION;
-    machine.epoch = ++world.epoch;
-    machine.pipe = ring_pipe(&world.host[0]);
-    machine.spare_node = world.spare;
-    machine.absent_s = world.absent_s;
-    machine.spare = ring_pipe(&world.host[1]);
-    machine.now_us = now_us;
-    machine.idle = machine_idle;
-    machine.check = machine_check;
-    machine.ended = machine_ended;
-    machine.stop = machine_stop;
-    return machine;
-}
-
-/* ---- runs ---- */
-
-static void prepare(void)
-{
-    memset(&world, 0, sizeof world);
-    world.epoch = 100;
-    world.dead_us = DEAD_US;
-}
-
-/* Runs the world as it was prepared; the error's code. */
-static int run(const struct host_strategy *strategy, struct host_digest *digest,
-               struct host_error *error)
-{
-    struct host_run_options options;
-    struct host_tetrahedra tets = {0};
-    host_run_defaults(&options);
-    options.quiet = true;
-    options.patience_s = 8;
-    options.memory = MEMORY;
-    memset(&result, 0, sizeof result);
-    memset(error, 0, sizeof *error);
-    result.nodes = NODES;
-    result.strategy = strategy;
-    struct host_machine machine = make_machine();
-    int status =
-        host_triangulate_on(&options, &machine, &points, &tets, &result, error);
-    if (status == 0) {
-        host_tetrahedra_sort(&tets);
-        host_digest(&tets, digest);
-    }
-    host_tetrahedra_free(&tets);
-    if (world.host_fails == 0.0) {
-        end_world();
-    }
-    return status;
-}
-
-static void survives(const struct host_strategy *strategy)
-{
-    struct host_digest digest;
-    struct host_error error;
-    start_world();
-    if (run(strategy, &digest, &error) != 0) {
-        fail_msg("%s", error.text);
-    }
-    assert_string_equal(digest.text, expected.text);
-    assert_true(result.built >= result.tetrahedra);
-    assert_true(result.make_tetra_calls >= result.tetrahedra);
-}
-
-static void fails_with(const char *text)
-{
-    struct host_digest digest;
-    struct host_error error;
-    if (run(&host_spatial, &digest, &error) != HOST_CUBE) {
-        fail_msg("not an error of the cube: %s", error.text);
-    }
-    if (strstr(error.text, text) == NULL) {
-        fail_msg("no '%s' in: %s", text, error.text);
-    }
-    assert_non_null(strchr(error.text, ';'));
-}
+/* The host's service on the simulator's cube, as on one of real boards.
+ * Whatever is lost, the digest is that of the undisturbed run; where the cube
+ * cannot go on, the host says which node and link it is. */
+#include "service_world.h"
 
 static int set_up(void **unused)
 {
     struct host_error error = {0};
     (void)unused;
     assert_int_equal(host_gen("uniform", 8000, 5, &points, &error), 0);
-    prepare();
-    start_world();
-    assert_int_equal(run(&host_spatial, &expected, &error), 0);
-    undisturbed_us = world.now_us;
-    assert_int_equal(result.generations, 1);
+    for (unsigned k = 0; k < 2; k++) {
+        prepare();
+        start_world();
+        assert_int_equal(
+            run(k == 0 ? &host_sequential : &host_spatial, &expected, &error),
+            0);
+        *(k == 0 ? &sequential_us : &spatial_us) = world.sim.now_us;
+        assert_int_equal(result.generations, 1);
+    }
     return 0;
 }
 
@@ -356,9 +85,8 @@ static void test_stopped(void **unused)
     for (unsigned i = 0; i < NODES; i++) {
         prepare();
         world.dead_us = 0;
-        double pause = 4e6 / (double)undisturbed_us;
+        world.stop_us = 4000000;
         world.events[0] = (struct event){STOP, 0.3, i, 0};
-        world.events[1] = (struct event){CONTINUE, 0.3 + pause, i, 0};
         survives(i % 2 == 0 ? &host_spatial : &host_sequential);
         assert_int_equal(result.generations, 1);
     }
@@ -453,21 +181,6 @@ static void test_cut(void **unused)
     assert_true(lost >= 4); /* others have done with it */
 }
 
-static void lacks(unsigned node, unsigned link)
-{
-    wire_of(node, link)->cut = true;
-}
-
-static void survives_as(const struct host_strategy *strategy)
-{
-    struct host_digest digest;
-    struct host_error error;
-    if (run(strategy, &digest, &error) != 0) {
-        fail_msg("%s", error.text);
-    }
-    assert_string_equal(digest.text, expected.text);
-}
-
 /* Wires that were never there are gone round as well, once all else is; one
  * that is on no node's way from or to node 0 is named all the same. */
 static void test_missing_wire(void **unused)
@@ -508,11 +221,9 @@ static void test_missing_wire_and_late_node(void **unused)
     world.absent_s = 3;
     start_world();
     lacks(2, 2);
-    world.stopped[5] = true;
-    world.events[0] =
-        (struct event){CONTINUE, 3e6 / (double)undisturbed_us, 5, 0};
+    host_world_late(&world.sim, 5, 3000000);
     survives_as(&host_spatial);
-    assert_true(world.now_us > 8000000);
+    assert_true(world.sim.now_us > 8000000);
     assert_int_equal(result.generations, 2);
     assert_int_equal(result.missing_wires, 1);
 }
@@ -546,16 +257,16 @@ static void test_late_wire(void **unused)
     (void)unused;
     for (unsigned k = 0; k < 2; k++) {
         uint64_t late_us = k == 0 ? 2500000 : 7000000;
-        double when = (double)late_us / (double)undisturbed_us;
+        double when = (double)late_us / (double)spatial_us;
         prepare();
         world.dead_us = 0;
         start_world();
         lacks(5, 1);
         world.events[0] = (struct event){MEND, when, 5, 1};
+        world.stop_us = (uint64_t)((0.98 * when - 0.4) * (double)spatial_us);
         world.events[1] = (struct event){k == 0 ? NOTHING : STOP, 0.4, 7, 0};
-        world.events[2] = (struct event){CONTINUE, 0.98 * when, 7, 0};
         survives_as(&host_spatial);
-        assert_true(world.now_us > late_us);
+        assert_true(world.sim.now_us > late_us);
         assert_int_equal(result.generations, 1);
         assert_int_equal(result.missing_wires, 0);
     }
@@ -569,27 +280,27 @@ static void test_late_node(void **unused)
         prepare();
         world.absent_s = 3;
         start_world();
-        world.stopped[i] = true;
-        world.events[0] =
-            (struct event){CONTINUE, 7.6e6 / (double)undisturbed_us, i, 0};
+        host_world_late(&world.sim, i, 7600000);
         survives_as(&host_spatial);
-        assert_true(world.now_us > 7600000);
+        assert_true(world.sim.now_us > 7600000);
         assert_int_equal(result.generations, 1);
         assert_int_equal(result.missing_wires, 0);
     }
     prepare();
     world.absent_s = 3;
     start_world();
-    world.stopped[6] = true;
+    host_world_late(&world.sim, 6, UINT64_MAX / 4);
     fails_with("node 6 link 2: no answer");
 }
 
 static void swap(unsigned node, unsigned link, unsigned other,
                  unsigned other_link)
 {
-    struct ring_end end = world.end[node][link];
-    world.end[node][link] = world.end[other][other_link];
-    world.end[other][other_link] = end;
+    struct link_pipe *one = &world.sim.node[node].board.pipes[link];
+    struct link_pipe *two = &world.sim.node[other].board.pipes[other_link];
+    struct link_pipe pipe = *one;
+    *one = *two;
+    *two = pipe;
 }
 
 /* A wire in the wrong place is named before anything is given out. */

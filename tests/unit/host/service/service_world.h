@@ -1,0 +1,263 @@
+/* A service and the simulator's cube of eight nodes, as real boards are: nobody
+ * tells the host that a node has started again, stands still or is gone.  What
+ * happens, and when, a test says beforehand.
+ *
+ * Memory: the nodes'.  Work: some virtual seconds a run.
+ *
+ *     prepare();
+ *     world.events[0] = (struct event){.what = CUT, .when = 0.3, .node = 5};
+ *     survives(&host_spatial);
+ */
+#ifndef TESTS_UNIT_SERVICE_WORLD_H
+#define TESTS_UNIT_SERVICE_WORLD_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/mesh/gen.h"
+#include "host/run/run.h"
+#include "host/service/strategies/strategies.h"
+#include "host/sim/sim_world.h"
+
+enum {
+    DIMENSION = 3,
+    NODES = 8,
+    MEMORY = 1 << 20,
+    EVENTS = 8,
+    DEAD_US = 2000000,
+    SICK_US = 20 /* between two looks at the node that is */
+};
+
+enum what { NOTHING, RESTART, STOP, CUT, MEND };
+
+struct event {
+    enum what what;
+    double when; /* in the time that the same run takes undisturbed */
+    unsigned node, link;
+};
+
+static struct {
+    struct host_world sim;
+    uint16_t spare;
+    uint8_t absent_s;
+    uint32_t dead_us;
+    struct event events[EVENTS];
+    uint64_t stop_us;  /* a STOP lasts so long; 0: for ever */
+    double host_fails; /* when; 0: never */
+    bool sequential;   /* how it runs */
+    bool sick;         /* node 0 starts again whenever it has work */
+} world;
+
+static uint64_t spatial_us, sequential_us; /* undisturbed runs */
+static uint64_t state = 88172645463325252u;
+static struct host_digest expected;
+static struct host_points points;
+static struct host_run_result result;
+
+static inline uint32_t draw(uint32_t below)
+{
+    return (uint32_t)(sim_draw(&state) >> 32) % below;
+}
+
+static inline uint64_t time_of(double when)
+{
+    return (uint64_t)(when *
+                      (double)(world.sequential ? sequential_us : spatial_us));
+}
+
+/* Both ways: what is sent is lost, and nobody is told. */
+static inline void cut(unsigned node, unsigned link, bool deaf)
+{
+    struct host_sim_cube *cube = &world.sim.cube;
+    unsigned wire = host_sim_cube_wire(cube, node, link);
+    for (unsigned side = 0; side < 2; side++) {
+        host_sim_cube_deaf(cube, wire, side, deaf);
+    }
+}
+
+static inline void lacks(unsigned node, unsigned link)
+{
+    cut(node, link, true);
+}
+
+static inline void happen(struct event *event)
+{
+    uint64_t stop_us = world.stop_us > 0 ? world.stop_us : UINT64_MAX / 4;
+    switch (event->what) {
+    case RESTART:
+        host_world_crash(&world.sim, event->node, 0, false);
+        break;
+    case STOP:
+        host_world_pause(&world.sim, event->node, stop_us);
+        break;
+    case CUT:
+    case MEND:
+        cut(event->node, event->link, event->what == CUT);
+        break;
+    case NOTHING:
+        break;
+    }
+    event->what = NOTHING;
+}
+
+static inline void strike(void *context)
+{
+    struct host_world *w = &world.sim;
+    (void)context;
+    if (world.sick && w->node[0].state == HOST_WORLD_UP &&
+        node_held(w->node[0].node) > 0) {
+        host_world_crash(w, 0, 0, false);
+    }
+    w->strike_us = world.sick ? w->now_us + SICK_US : UINT64_MAX;
+    for (unsigned i = 0; i < EVENTS; i++) {
+        struct event *event = &world.events[i];
+        uint64_t time_us = time_of(event->when);
+        if (event->what != NOTHING && time_us <= w->now_us) {
+            happen(event);
+        } else if (event->what != NOTHING && time_us < w->strike_us) {
+            w->strike_us = time_us;
+        }
+    }
+}
+
+static inline void start_world(void)
+{
+    const struct host_world_options options = {
+        .cube = {.dimension = DIMENSION,
+                 .seed = 1 + draw(UINT32_MAX),
+                 .spare_node = world.spare,
+                 .wire = {5000000, 10, 1500, SIM_BYTES_MIN},
+                 .gather_us = 50},
+        .memory = MEMORY,
+        .dead_us = world.dead_us,
+        .step_us = 20,
+        .host_us = 20,
+        .time_us_max = UINT64_MAX,
+        .steps_max = UINT64_MAX,
+        .absent_s = world.absent_s,
+        .strike = strike,
+    };
+    struct host_error error = {0};
+    if (host_world_open(&world.sim, &options, &error) != 0) {
+        fail_msg("%s", error.text);
+    }
+    for (unsigned i = 0; i < NODES; i++) {
+        host_world_late(&world.sim, i, draw(50));
+    }
+    world.sim.strike_us = 0;
+}
+
+static inline void end_world(void)
+{
+    assert_null(host_world_damage(&world.sim));
+    host_world_close(&world.sim);
+}
+
+/* --- the machine ---------------------------------------------------------- */
+
+static inline int machine_check(void *context, struct host_error *error)
+{
+    (void)context;
+    assert_null(world.sim.fault);
+    return world.host_fails > 0.0 &&
+                   world.sim.now_us >= time_of(world.host_fails)
+               ? host_fail(error, HOST_CUBE, "the host fails; as it should")
+               : 0;
+}
+
+static inline bool machine_ended(void *context)
+{
+    (void)context;
+    return true;
+}
+
+static inline struct host_machine make_machine(void)
+{
+    struct host_machine machine = host_world_machine(&world.sim);
+    machine.missing = NULL;
+    machine.check = machine_check;
+    machine.ended = machine_ended;
+    return machine;
+}
+
+/* --- runs ----------------------------------------------------------------- */
+
+static inline void prepare(void)
+{
+    memset(&world, 0, sizeof world);
+    world.dead_us = DEAD_US;
+}
+
+/* Runs the world as it was prepared; the error's code. */
+static inline int run(const struct host_strategy *strategy,
+                      struct host_digest *digest, struct host_error *error)
+{
+    struct host_run_options options;
+    struct host_tetrahedra tets = {0};
+    host_run_defaults(&options);
+    options.quiet = true;
+    options.patience_s = 8;
+    options.memory = MEMORY;
+    memset(&result, 0, sizeof result);
+    memset(error, 0, sizeof *error);
+    result.nodes = NODES;
+    result.strategy = strategy;
+    world.sequential = strategy == &host_sequential;
+    struct host_machine machine = make_machine();
+    int status =
+        host_triangulate_on(&options, &machine, &points, &tets, &result, error);
+    if (status == 0) {
+        host_tetrahedra_sort(&tets);
+        host_digest(&tets, digest);
+    }
+    host_tetrahedra_free(&tets);
+    if (world.host_fails == 0.0) {
+        end_world();
+    }
+    return status;
+}
+
+static inline void survives(const struct host_strategy *strategy)
+{
+    struct host_digest digest;
+    struct host_error error;
+    start_world();
+    if (run(strategy, &digest, &error) != 0) {
+        fail_msg("%s", error.text);
+    }
+    assert_string_equal(digest.text, expected.text);
+    assert_true(result.built >= result.tetrahedra);
+    assert_true(result.make_tetra_calls >= result.tetrahedra);
+}
+
+static inline void fails_with(const char *text)
+{
+    struct host_digest digest;
+    struct host_error error;
+    if (run(&host_spatial, &digest, &error) != HOST_CUBE) {
+        fail_msg("not an error of the cube: %s", error.text);
+    }
+    if (strstr(error.text, text) == NULL) {
+        fail_msg("no '%s' in: %s", text, error.text);
+    }
+    assert_non_null(strchr(error.text, ';'));
+}
+
+static inline void survives_as(const struct host_strategy *strategy)
+{
+    struct host_digest digest;
+    struct host_error error;
+    if (run(strategy, &digest, &error) != 0) {
+        fail_msg("%s", error.text);
+    }
+    assert_string_equal(digest.text, expected.text);
+}
+
+#endif
