@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "check.h"
-#include "frame_tables.h"
 
 /* The machine's word, with the first byte in memory lowest. */
 #if UINTPTR_MAX > 0xffffffffu
@@ -45,24 +44,89 @@ static inline uint32_t load32(const uint8_t *p)
            (uint32_t)p[3] << 24;
 }
 
-uint32_t frame_crc32c_table(uint32_t crc, const void *bytes, size_t size)
+static inline void store32(uint8_t *p, uint32_t value)
+{
+    p[0] = (uint8_t)value;
+    p[1] = (uint8_t)(value >> 8);
+    p[2] = (uint8_t)(value >> 16);
+    p[3] = (uint8_t)(value >> 24);
+}
+
+/* remainders[c][k][n]: what check c makes of four bits n that 4 k zero bits
+ * follow.  A check is linear, so a row holds the sums of what its four bits
+ * make, each of which is the next higher one a step of the polynomial on: the
+ * numbers here are those of the highest bits.  The tests compute the checks
+ * anew, bit by bit. */
+#define STEP(poly, bit) ((bit) >> 1 ^ (((bit)&1) != 0 ? (poly) : 0))
+#define SUMS(a, b, c, d)                                                       \
+    {                                                                          \
+        0, d, c, (c) ^ (d), b, (b) ^ (d), (b) ^ (c), (b) ^ (c) ^ (d), a,       \
+            (a) ^ (d), (a) ^ (c), (a) ^ (c) ^ (d), (a) ^ (b), (a) ^ (b) ^ (d), \
+            (a) ^ (b) ^ (c), (a) ^ (b) ^ (c) ^ (d)                             \
+    }
+#define ROW(poly, bit)                                                         \
+    SUMS(bit, STEP(poly, bit), STEP(poly, STEP(poly, bit)),                    \
+         STEP(poly, STEP(poly, STEP(poly, bit))))
+
+enum { CRC32C, CRC16, CHECKS, ROWS = 8 };
+
+#define CASTAGNOLI 0x82f63b78u
+#define DNP 0xa6bcu
+
+static const uint32_t remainders[CHECKS][ROWS][16] = {
+    {
+        ROW(CASTAGNOLI, 0x82f63b78u),
+        ROW(CASTAGNOLI, 0x8ad958cfu),
+        ROW(CASTAGNOLI, 0xfbc3faf9u),
+        ROW(CASTAGNOLI, 0x9d14c3b8u),
+        ROW(CASTAGNOLI, 0x8b277743u),
+        ROW(CASTAGNOLI, 0x38513ec5u),
+        ROW(CASTAGNOLI, 0x52a0c93fu),
+        ROW(CASTAGNOLI, 0xf64463e6u),
+    },
+    {
+        ROW(DNP, 0xa6bcu),
+        ROW(DNP, 0xff89u),
+        ROW(DNP, 0x1b2fu),
+        ROW(DNP, 0x6f94u),
+        ROW(DNP, 0x55a7u),
+        ROW(DNP, 0xcdc0u),
+        ROW(DNP, 0x0cdcu),
+        ROW(DNP, 0xf52fu),
+    },
+};
+
+/* A check, four bytes on: crc is the last result, exclusive-or them. */
+static inline uint32_t after_word(unsigned check, uint32_t crc)
+{
+    const uint32_t(*t)[16] = remainders[check];
+    return t[7][crc & 15] ^ t[6][crc >> 4 & 15] ^ t[5][crc >> 8 & 15] ^
+           t[4][crc >> 12 & 15] ^ t[3][crc >> 16 & 15] ^ t[2][crc >> 20 & 15] ^
+           t[1][crc >> 24 & 15] ^ t[0][crc >> 28];
+}
+
+static inline uint32_t after_byte(unsigned check, uint32_t crc)
+{
+    const uint32_t(*t)[16] = remainders[check];
+    return t[1][crc & 15] ^ t[0][crc >> 4 & 15] ^ crc >> 8;
+}
+
+static inline uint32_t by_table(unsigned check, uint32_t crc,
+                                const uint8_t *bytes, size_t size)
 {
     const uint8_t *p = bytes;
-    const uint32_t(*t)[256] = frame_crc32c_slice;
-    crc = ~crc;
-    for (; size >= FRAME_SLICES; size -= FRAME_SLICES, p += FRAME_SLICES) {
-        uint32_t w = load32(p) ^ crc;
-        unsigned k = FRAME_SLICES - 4;
-        crc = t[k + 3][w & 255] ^ t[k + 2][w >> 8 & 255] ^
-              t[k + 1][w >> 16 & 255] ^ t[k][w >> 24];
-#if !defined(__arm__)
-        crc ^= t[3][p[4]] ^ t[2][p[5]] ^ t[1][p[6]] ^ t[0][p[7]];
-#endif
+    for (; size >= 4; size -= 4, p += 4) {
+        crc = after_word(check, crc ^ load32(p));
     }
     for (; size > 0; size--) {
-        crc = t[0][(crc ^ *p++) & 255] ^ crc >> 8;
+        crc = after_byte(check, crc ^ *p++);
     }
-    return ~crc;
+    return crc;
+}
+
+uint32_t frame_crc32c_table(uint32_t crc, const void *bytes, size_t size)
+{
+    return ~by_table(CRC32C, ~crc, bytes, size);
 }
 
 #if defined(__SSE4_2__) && defined(__x86_64__)
@@ -90,12 +154,7 @@ uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size)
 
 uint16_t frame_crc16(const void *bytes, size_t size)
 {
-    const uint8_t *p = bytes;
-    unsigned crc = 0;
-    for (; size > 0; size--) {
-        crc = frame_crc16_table[(crc ^ *p++) & 255] ^ crc >> 8;
-    }
-    return (uint16_t)~crc;
+    return (uint16_t)~by_table(CRC16, 0, bytes, size);
 }
 
 size_t frame_find_zero(const uint8_t *bytes, size_t size)
@@ -189,20 +248,13 @@ static void put_words(struct writer *w, const uint8_t *in, size_t size)
     put_bytes(w, in, size);
 }
 
+/* By words, as the checks read them. */
 static void pack_header(uint8_t *bytes, const struct frame_header *h)
 {
-    bytes[0] = (uint8_t)(h->kind | h->flags << 4);
-    bytes[1] = h->credit;
-    bytes[2] = (uint8_t)h->session;
-    bytes[3] = (uint8_t)(h->session >> 8);
-    bytes[4] = (uint8_t)(h->session >> 16);
-    bytes[5] = (uint8_t)(h->session >> 24);
-    bytes[6] = (uint8_t)h->sequence;
-    bytes[7] = (uint8_t)(h->sequence >> 8);
-    bytes[8] = (uint8_t)h->acknowledge;
-    bytes[9] = (uint8_t)(h->acknowledge >> 8);
-    bytes[10] = (uint8_t)h->size;
-    bytes[11] = (uint8_t)(h->size >> 8);
+    store32(bytes, h->kind | (uint32_t)h->flags << 4 |
+                       (uint32_t)h->credit << 8 | h->session << 16);
+    store32(bytes + 4, h->session >> 16 | (uint32_t)h->sequence << 16);
+    store32(bytes + 8, h->acknowledge | (uint32_t)h->size << 16);
     uint16_t check = frame_crc16(bytes, FRAME_HEADER - 2);
     bytes[12] = (uint8_t)check;
     bytes[13] = (uint8_t)(check >> 8);
@@ -230,10 +282,7 @@ size_t frame_encode(uint8_t *out, const struct frame_header *header,
     if (header->size > 0) {
         crc = frame_crc32c(crc, payload, header->size);
     }
-    tail[0] = (uint8_t)crc;
-    tail[1] = (uint8_t)(crc >> 8);
-    tail[2] = (uint8_t)(crc >> 16);
-    tail[3] = (uint8_t)(crc >> 24);
+    store32(tail, crc);
     put_words(&w, head, sizeof head);
     if (header->size > 0) {
         put_words(&w, payload, header->size);

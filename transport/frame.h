@@ -3,9 +3,8 @@
  * and closed by a zero.  A reader finds the next frame at the next zero,
  * whatever went before, and believes no length or number that is not checked.
  *
- * Memory: none but constant tables (0.5 KB for the header; 4 KB for CRC-32C,
- * 8 KB on large machines, none where the processor computes it).  Work: linear
- * in the bytes given.
+ * Memory: none but a constant table of 1 KB.  Work: linear in the bytes given;
+ * CRC-32C takes most of it where the processor does not compute it.
  *
  *     size_t n = frame_encode(out, &header, payload);
  *     if (frame_open(&reader, in, n - 1, &header) == FRAME_GOOD)
@@ -56,7 +55,7 @@ struct frame_reader {
  * result to go on. */
 uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size);
 
-/* The same by tables, on every machine: the reference of the tests. */
+/* The same by the table, on every machine: the reference of the tests. */
 uint32_t frame_crc32c_table(uint32_t crc, const void *bytes, size_t size);
 
 /* CRC-16/DNP (reflected 0xa6bc): finds any 5 false bits in a header. */
