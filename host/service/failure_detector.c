@@ -53,7 +53,7 @@ static void ping_next(struct host_service *s)
 {
     unsigned best = UINT32_MAX;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->work.lost[i] && !s->report[i].here &&
+        if (!s->work.lost[i] && !s->report[i].up &&
             (best == UINT32_MAX || distance(s, i) < distance(s, best))) {
             best = i;
         }
@@ -71,7 +71,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
     s->loss = false;
     s->probing = s->probe;
     s->probe = false;
-    s->work.living = s->here = s->ready = 0;
+    s->work.living = s->up = s->ready = 0;
     s->began_us = s->searching ? s->began_us : now_us;
     s->news_us = s->ping_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -85,7 +85,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
         node->ping_again_us = PING_AGAIN_US_MIN;
         node->sent = node->received = node->missed = 0;
         node->silent_us = 0;
-        s->report[i].here = s->report[i].ready = false;
+        s->report[i].up = s->report[i].ready = false;
         if (lost) {
             close_start(s, i);
         }
@@ -137,12 +137,12 @@ int host_detector_pong(struct host_service *service,
     if (node->start != 0 && node->start != pong.start) {
         s->blamed = message->source;
     }
-    bool first = !report->here;
+    bool first = !report->up;
     if (first) {
         /* It has had nothing but pings yet.  The first of them may have gone
          * to a link's end that was just about to start again. */
-        report->here = true;
-        s->here++;
+        report->up = true;
+        s->up++;
         s->news_us = s->check_us;
         node->missed = pong.pinged - pong.received;
         node->ping_again_us = PING_AGAIN_US;
@@ -357,7 +357,7 @@ static int fail_silent(const struct host_service *s, unsigned node,
                      "node %u link %u: no answer, %u of %u nodes are there; is "
                      "the node's program of this version%s, and the machine "
                      "not too busy?",
-                     node, host_detector_link(s, node), s->here,
+                     node, host_detector_link(s, node), s->up,
                      s->machine->nodes,
                      s->machine->keyed ? ", its key file the same" : "");
 }
@@ -366,13 +366,13 @@ static int fail_silent(const struct host_service *s, unsigned node,
 static int check_bring_up(const struct host_service *s, uint64_t now_us,
                           struct host_error *error)
 {
-    if (s->started || s->here == s->work.living ||
+    if (s->started || s->up == s->work.living ||
         now_us - s->began_us <= patience_of(s) ||
         host_missing_links_undecided(s, now_us, patience_of(s))) {
         return 0;
     }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->work.lost[i] && !s->report[i].here) {
+        if (!s->work.lost[i] && !s->report[i].up) {
             return fail_silent(s, i, error);
         }
     }

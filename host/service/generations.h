@@ -6,7 +6,7 @@
  * does at a loss.
  *
  *     if (service.loss)
- *         (void)host_generation_renew(&service, now_us, &error);
+ *         return host_generation_renew(&service, now_us, &error);
  */
 #ifndef HOST_GENERATIONS_H
 #define HOST_GENERATIONS_H

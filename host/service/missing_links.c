@@ -124,14 +124,14 @@ bool host_missing_links_check(struct host_service *service, uint64_t now_us,
         return false;
     }
     if (!s->searching) {
-        if (s->here < s->work.living &&
+        if (s->up < s->work.living &&
             now_us - s->news_us >= wait_us(patience_us)) {
             search(s, now_us);
         }
         return s->searching;
     }
     found.gateway = host_generation_gateway(s, &found);
-    if (s->here == s->work.living) {
+    if (s->up == s->work.living) {
         end_search(s, now_us,
                    false); /* all have come, or the wires are not needed */
     } else if (now_us - s->search_us < search_us(patience_us)) {

@@ -115,7 +115,7 @@ static bool serve_work(struct host_service *s, uint16_t to,
                        struct host_error *error)
 {
     struct host_node *node = &s->node[to];
-    if (!s->started || !s->report[to].here) {
+    if (!s->started || !s->report[to].up) {
         return false; /* what goes before the first answer may get lost */
     }
     if (node->setup_due) {

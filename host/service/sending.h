@@ -7,7 +7,8 @@
  *
  *     host_sending_begin(&service);
  *     host_sending_deal(&service);
- *     unsigned sent = host_sending_serve(&service, &error);
+ *     bool idle = host_sending_serve(&service, &error) == 0;
+ *     return idle ? 0 : error.code;
  */
 #ifndef HOST_SENDING_H
 #define HOST_SENDING_H

@@ -131,7 +131,7 @@ int host_service_open(struct host_service *service, struct host_error *error)
 
 bool host_service_is_up(const struct host_service *service)
 {
-    return service->here == service->work.living && !service->searching;
+    return service->up == service->work.living && !service->searching;
 }
 
 int host_service_start(struct host_service *service, struct host_error *error)

@@ -70,7 +70,7 @@ struct host_node {
 
 /* What remains of a node when the run is over. */
 struct host_node_report {
-    bool here, ready;
+    bool up, ready;
     struct node_ready_message map;
     struct node_finished_message statistics;
     uint64_t pages; /* that this node had from the host */
@@ -120,10 +120,10 @@ struct host_service {
     uint64_t uncabled_us; /* time without that, while all nodes answer */
     bool probe, probing; /* nodes are pinged one by one: in the next generation;
                             now, until all have answered */
-    unsigned here, ready; /* living nodes that are up; that have their setup */
-    unsigned working;     /* that have a job */
-    unsigned turn;        /* the node to be served next */
-    unsigned ping_turn;   /* to be pinged next */
+    unsigned up, ready;  /* living nodes that are up; that have their setup */
+    unsigned working;    /* that have a job */
+    unsigned turn;       /* the node to be served next */
+    unsigned ping_turn;  /* to be pinged next */
     uint64_t ping_us, check_us, began_us, wire_down_us;
     uint64_t in_use_us; /* since when another host has the nodes; 0: none */
     uint64_t in_use_told_us; /* and when they said so last */

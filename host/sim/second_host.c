@@ -89,7 +89,7 @@ void host_second_host_leave(struct host_second_host *host)
 /* Nobody answers it, and it is not given the cube. */
 static bool let_in(const struct host_second_host *h)
 {
-    return h->service.here > 0 ||
+    return h->service.up > 0 ||
            cube_link_statistics(h->service.cube, 0)->sessions > 0;
 }
 

@@ -3,7 +3,7 @@
  *
  * Memory: the table.  Work: a pass over it.
  *
- *     const struct host_strategy *spatial = host_strategy_named("spatial");
+ *     strategy = host_strategy_named("spatial");
  *     for (unsigned i = 0; host_strategy_name(i) != NULL; i++)
  *         printf("%s: %s\n", host_strategy_name(i), host_strategy_help(i));
  */

@@ -271,10 +271,10 @@ static void test_answers(void **unused)
         begin();
         answer(7, 3, 1, 0); /* two pings went astray */
         assert_false(service.loss);
-        assert_int_equal(service.here, 1);
+        assert_int_equal(service.up, 1);
         answer(then[i].start, then[i].pinged, then[i].received, then[i].sent);
         assert_int_equal(service.loss, then[i].loss);
-        assert_int_equal(service.here, 1);
+        assert_int_equal(service.up, 1);
         end();
     }
 }
@@ -301,7 +301,7 @@ static void test_starts(void **unused)
     size_t size =
         batch(data, service.ledger.job[1].epoch, service.ledger.job[1].first);
     assert_int_equal(send(1, NODE_RESULT, data, size, &error), 0);
-    service.report[1].here = false; /* a new generation */
+    service.report[1].up = false; /* a new generation */
     service.node[1].received = 0;
     answer(8, 0, 0, 0);
     assert_int_equal(sum->make_tetra_calls, 51);

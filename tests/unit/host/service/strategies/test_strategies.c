@@ -67,7 +67,7 @@ static void end(void)
     host_tetrahedra_free(&tets);
 }
 
-/* The roles of the nodes, a letter each. */
+/* The roles of the nodes, one character each. */
 static const char *roles(const struct host_strategy *strategy)
 {
     static char text[NODES + 1];
