@@ -69,26 +69,26 @@ struct node_pong_message {
     uint32_t links;    /* bit d: link d has been up since this start */
 };
 
-/* Begins a node's role; sent once a generation to each node.  What no field
- * says is unlimited within its type; reserved is 0. */
+/* Begins a node's role; sent once a generation to each node.  There are no
+ * defaults: the host fills in every field, and 0 in what is reserved.  What is
+ * out of its limits is a fault that the node reports. */
 struct node_setup_message {
-    /* NODE_PROTOCOL of the host: a node of another one reports a fault.  It is
-     * the first field in every version. */
+    /* NODE_PROTOCOL, that of the node as well.  The first field in every
+     * version. */
     uint32_t protocol;
 
-    /* Nodes of the cube: a power of two, 1 .. 2^CUBE_DIMENSION_MAX. */
+    /* Nodes of the cube: 2^dimension, as the node's board has it. */
     uint16_t nodes;
 
     /* Nodes that keep pages: nodes 1 .. holders do, page p is node
      * 1 + p % holders's; less than `nodes`.  0: the host sends all pages. */
     uint16_t holders;
 
-    /* NODE_RESULT messages that the node may send before the first NODE_CREDIT;
-     * at least 1.  The host chooses 8 and 128 / nodes. */
+    /* NODE_RESULT messages that the node may send before the first NODE_CREDIT,
+     * as the host has room for them: 8 + 128 / nodes.  With 0 it waits. */
     uint32_t credits;
 
-    /* What this node does: enum node_role_number.  Another number is a fault
-     * that the node reports. */
+    /* What this node does: enum node_role_number. */
     uint8_t role;
 
     uint8_t reserved[3];

@@ -118,9 +118,7 @@ static void role_totals(const struct node *n, struct node_finished_message *sum)
 {
     struct node_finished_message totals;
     memset(&totals, 0, sizeof totals);
-    if (n->role != NULL) {
-        n->role->totals(n->role_arena, &totals, n->now_us);
-    }
+    n->role->totals(n->role_arena, &totals, n->now_us);
     totals.memory_high_water +=
         n->board->fixed_bytes + node_aligned(sizeof *n) + n->cube_bytes;
     node_totals_add(sum, &totals);
@@ -135,7 +133,8 @@ static void end_role(struct node *n)
     }
 }
 
-static bool setup_is_sound(struct node *n, const struct cube_message *message)
+static bool read_setup(struct node *n, const struct cube_message *message,
+                       struct node_setup_message *setup)
 {
     uint32_t protocol = NODE_PROTOCOL;
     if (message->size >= sizeof protocol) {
@@ -144,27 +143,44 @@ static bool setup_is_sound(struct node *n, const struct cube_message *message)
     if (protocol != NODE_PROTOCOL) {
         node_fault_set(&n->fault, "protocol version #, expected #", protocol,
                        NODE_PROTOCOL);
-    } else if (message->size != sizeof(struct node_setup_message)) {
-        node_fault_set(&n->fault, "setup in # bytes, expected #", message->size,
-                       sizeof(struct node_setup_message));
+        return false;
     }
-    return !node_fault_is_set(&n->fault);
+    if (message->size != sizeof *setup) {
+        node_fault_set(&n->fault, "setup in # bytes, expected #", message->size,
+                       sizeof *setup);
+        return false;
+    }
+    memcpy(setup, message->data, sizeof *setup);
+    uint32_t nodes = 1u << n->board->identity.dimension;
+    if (setup->nodes != nodes) {
+        node_fault_set(&n->fault, "invalid setup: # nodes, expected #",
+                       setup->nodes, nodes);
+        return false;
+    }
+    if (setup->holders >= nodes) {
+        node_fault_set(&n->fault, "invalid setup: # holders of # nodes",
+                       setup->holders, nodes);
+        return false;
+    }
+    return true;
 }
 
+/* Whatever went before, the setup begins anew. */
 static void take_setup(struct node *n, const struct cube_message *message)
 {
     struct node_setup_message setup;
-    if (!setup_is_sound(n, message)) {
+    end_role(n);
+    n->fault.size = 0;
+    n->fault_sent = false;
+    if (!read_setup(n, message, &setup)) {
         return;
     }
-    memcpy(&setup, message->data, sizeof setup);
     const struct node_role *role = node_role_named(setup.role);
     if (role == NULL) {
         node_fault_set(&n->fault, "role # is not known to its program",
                        setup.role, 0);
         return;
     }
-    end_role(n);
     if (role->start(n->role_arena, n->role_bytes, &setup, &n->counted,
                     &n->fault)) {
         n->role = role;
@@ -299,7 +315,7 @@ static void follow_wiring(struct node *n)
 }
 
 /* Tells the host what is wrong, once.  The node goes on to pass messages of
- * others, so that the host hears of them too. */
+ * others and to answer pings; it takes another setup. */
 static void send_fault(struct node *n)
 {
     n->fault_sent = node_counted_write(&n->counted, CUBE_HOST, NODE_FAULT,
@@ -362,15 +378,14 @@ enum node_event node_step(struct node *node)
         cube_release(node->cube);
         moved++;
     }
-    if (node_fault_is_set(&node->fault)) {
-        if (!node->fault_sent) {
-            send_fault(node);
-        }
+    bool sound = !node_fault_is_set(&node->fault) && node->role != NULL;
+    if (node_fault_is_set(&node->fault) && !node->fault_sent) {
+        send_fault(node);
     } else if (node->owes_pong) {
         node->owes_pong = !send_pong(node);
-    } else if (node->role != NULL && node->owes_ready) {
+    } else if (sound && node->owes_ready) {
         node->owes_ready = !send_ready(node);
-    } else if (node->role != NULL) {
+    } else if (sound) {
         moved += serve_role(node);
     }
     if (may_stop(node)) {

@@ -266,6 +266,10 @@ static void take_job(struct worker *w, const struct cube_message *message,
                        job.job.last);
         return;
     }
+    if (job.epoch == 0) {
+        node_fault_set(w->fault, "invalid job: epoch 0", 0, 0);
+        return;
+    }
     w->epoch = job.epoch;
     w->working = true;
     w->start_us = now_us;
@@ -483,8 +487,7 @@ static void worker_map(const void *self, struct node_map *map)
 {
     const struct worker *w = self;
     const struct incode_map *t = incode_triangulator_map(w->triangulator);
-    const size_t bytes[][2] = {{node_aligned(sizeof *w) + w->outbox_bytes,
-                                w->results.slot_count + w->spills.slot_count},
+    const size_t bytes[][2] = {{node_aligned(sizeof *w) + w->outbox_bytes, 0},
                                {t->control, 0},
                                {t->afl, t->afl_faces},
                                {t->bricks, t->brick_entries},

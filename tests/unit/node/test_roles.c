@@ -1,0 +1,573 @@
+/* A host says to node 1, behind node 0, what it is to be: the table of roles
+ * has a third one here, that echoes.  The node knows each by its functions
+ * alone, says in figures what keeps it from going on, and goes on with the next
+ * setup. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/sim/sim_cube.h"
+#include "node/node.h"
+#include "node/roles/holder.h"
+#include "node/roles/worker.h"
+
+enum {
+    SELF = 1,
+    MEMORY = 1 << 20,
+    FIXED = 65536,
+    ECHO_ROLE = 9,
+    ECHO_ASKS = 77,
+    ECHO_ANSWERS,
+    ECHO_TABLE = 640
+};
+
+/* --- a role of the test's own --------------------------------------------- */
+
+struct echo {
+    struct node_counted *counted;
+    struct node_fault *fault;
+    uint8_t text[16];
+    uint16_t size; /* of what is owed; 0: nothing */
+    uint32_t epoch, worked;
+    uint64_t heard, ended_us;
+};
+
+static size_t echo_arena_min(size_t memory,
+                             const struct node_setup_message *setup)
+{
+    return memory / 1024 + setup->credits;
+}
+
+static bool echo_start(void *self, size_t bytes,
+                       const struct node_setup_message *setup,
+                       struct node_counted *counted, struct node_fault *fault)
+{
+    struct echo *e = self;
+    memset(self, 0, bytes);
+    e->counted = counted;
+    e->fault = fault;
+    if (setup->credits == 0) {
+        node_fault_set(fault, "nothing to echo", 0, 0);
+    }
+    return setup->credits > 0;
+}
+
+static void echo_message(void *self, const struct cube_message *message,
+                         uint64_t now_us)
+{
+    struct echo *e = self;
+    struct node_job_message job;
+    (void)now_us;
+    if (message->type == NODE_JOB && message->size == sizeof job) {
+        memcpy(&job, message->data, sizeof job);
+        e->epoch = job.epoch;
+    } else if (message->type != ECHO_ASKS || message->size > sizeof e->text) {
+        node_fault_set(e->fault, "message # in # bytes has no echo",
+                       message->type, message->size);
+    } else {
+        e->size = message->size;
+        e->heard++;
+        memcpy(e->text, message->data, message->size);
+    }
+}
+
+static unsigned echo_work(void *self)
+{
+    struct echo *e = self;
+    return e->epoch != 0 && e->worked < 3 ? ++e->worked : 0;
+}
+
+static unsigned echo_send(void *self)
+{
+    struct echo *e = self;
+    if (e->size == 0 || node_counted_write(e->counted, CUBE_HOST, ECHO_ANSWERS,
+                                           e->text, e->size) != 0) {
+        return 0;
+    }
+    e->size = 0;
+    return 1;
+}
+
+static uint32_t echo_done(const void *self)
+{
+    const struct echo *e = self;
+    return e->worked == 3 ? e->epoch : 0;
+}
+
+static void echo_end(void *self, uint64_t now_us)
+{
+    struct echo *e = self;
+    e->epoch = e->worked = 0;
+    e->ended_us = now_us;
+}
+
+static uint32_t echo_held(const void *self)
+{
+    const struct echo *e = self;
+    return e->size > 0;
+}
+
+static void echo_totals(const void *self, struct node_finished_message *totals,
+                        uint64_t now_us)
+{
+    const struct echo *e = self;
+    assert_true(now_us >= e->ended_us);
+    totals->pages_held = e->heard;
+    totals->memory_high_water = sizeof *e;
+}
+
+static void echo_map(const void *self, struct node_map *map)
+{
+    (void)self;
+    map->tables[0].bytes = ECHO_TABLE;
+    map->tables[0].count = 1;
+    map->pages = 5;
+}
+
+static const struct node_role echo_role = {
+    .name = "echo",
+    .tables = {{"texts", "texts"}},
+    .arena_min = echo_arena_min,
+    .start = echo_start,
+    .message = echo_message,
+    .work = echo_work,
+    .send = echo_send,
+    .done = echo_done,
+    .end = echo_end,
+    .held = echo_held,
+    .totals = echo_totals,
+    .map = echo_map,
+};
+
+/* In the place of node/roles/roles.c. */
+const struct node_role *node_role_named(uint32_t number)
+{
+    return number == NODE_WORKER   ? &node_worker_role
+           : number == NODE_HOLDER ? &node_holder_role
+           : number == ECHO_ROLE   ? &echo_role
+                                   : NULL;
+}
+
+/* --- a node and its host -------------------------------------------------- */
+
+static struct {
+    uint64_t now_us;
+    struct host_sim_cube wires;
+    struct node_board board[2];
+    struct node *nodes[2];
+    struct node *node; /* the one that is spoken with */
+    struct cube *host;
+    void *memory[3];
+    uint8_t data[CUBE_PAYLOAD_MAX + 1]; /* of the last message, ended by a 0 */
+    uint16_t size;
+} world;
+
+static uint64_t now_us(void *context)
+{
+    (void)context;
+    return world.now_us;
+}
+
+static void start_node(unsigned self)
+{
+    struct node_board *board = &world.board[self];
+    const char *why = NULL;
+    world.memory[self] = aligned_alloc(64, MEMORY - FIXED);
+    assert_non_null(world.memory[self]);
+    board->identity.self = (uint16_t)self;
+    board->identity.dimension = 1;
+    board->identity.epoch = 100 + self;
+    board->identity.window = 4;
+    board->pipes[0] = host_sim_cube_pipe(&world.wires, self, 0);
+    if (self == 0) {
+        board->pipes[1] = host_sim_cube_pipe(&world.wires, 0, 1);
+    }
+    board->now_us = now_us;
+    board->busy_us = now_us;
+    board->arena = world.memory[self];
+    board->arena_bytes = MEMORY - FIXED;
+    board->fixed_bytes = FIXED;
+    world.nodes[self] = node_start(board, &why);
+    assert_null(why);
+    assert_non_null(world.nodes[self]);
+}
+
+static int set_up(void **unused)
+{
+    struct host_sim_cube_options options = {
+        .dimension = 1,
+        .wire = {.latency_us = 30, .room = 4000, .bytes = SIM_BYTES_MIN}};
+    struct host_error error = {0};
+    struct cube_config config;
+    (void)unused;
+    memset(&world, 0, sizeof world);
+    memset(&config, 0, sizeof config);
+    assert_int_equal(
+        host_sim_cube_open(&world.wires, &options, &world.now_us, &error), 0);
+    config.self = CUBE_HOST;
+    config.dimension = 1;
+    config.window = 4;
+    config.epoch = 99;
+    config.pipes[0] = host_sim_cube_pipe(&world.wires, 2, 0);
+    size_t bytes = node_aligned(cube_arena_bytes(&config));
+    world.memory[2] = aligned_alloc(64, bytes);
+    assert_non_null(world.memory[2]);
+    world.host = cube_init(world.memory[2], bytes, &config);
+    assert_non_null(world.host);
+    start_node(0);
+    start_node(1);
+    world.node = world.nodes[SELF];
+    return 0;
+}
+
+static int tear_down(void **unused)
+{
+    (void)unused;
+    host_sim_cube_close(&world.wires);
+    for (unsigned i = 0; i < 3; i++) {
+        free(world.memory[i]);
+    }
+    return 0;
+}
+
+static void step(void)
+{
+    world.now_us += 50;
+    assert_int_not_equal(node_step(world.nodes[0]), NODE_STOPPED);
+    assert_int_not_equal(node_step(world.nodes[1]), NODE_STOPPED);
+    (void)cube_poll(world.host, world.now_us);
+}
+
+static void say(uint8_t type, const void *data, size_t size)
+{
+    for (unsigned i = 0; cube_write(world.host, SELF, type, data, size) != 0;
+         i++) {
+        assert_true(i < 100000);
+        step();
+    }
+}
+
+/* The next message, which must be of that type. */
+static const void *hear(uint8_t type)
+{
+    struct cube_message message;
+    for (unsigned i = 0; !cube_read(world.host, &message); i++) {
+        assert_true(i < 100000);
+        step();
+    }
+    memcpy(world.data, message.data, message.size);
+    world.data[message.size] = 0;
+    world.size = message.size;
+    assert_int_equal(message.type, type);
+    cube_release(world.host);
+    return world.data;
+}
+
+/* The node has nothing to say for a while. */
+static void hear_nothing(void)
+{
+    struct cube_message message;
+    for (unsigned i = 0; i < 1000; i++) {
+        step();
+        assert_false(cube_read(world.host, &message));
+    }
+}
+
+static struct node_setup_message setup_of(uint8_t role)
+{
+    struct node_setup_message setup = {
+        .protocol = NODE_PROTOCOL,
+        .nodes = 2,
+        .holders = role == NODE_HOLDER,
+        .credits = 4,
+        .role = role,
+        .setup = {.bricks = 7, .index = INCODE_KD, .hi = {1, 1, 1}}};
+    return setup;
+}
+
+static struct node_ready_message begin(uint8_t role)
+{
+    struct node_setup_message setup = setup_of(role);
+    struct node_ready_message ready;
+    say(NODE_SETUP, &setup, sizeof setup);
+    memcpy(&ready, hear(NODE_READY), sizeof ready);
+    assert_int_equal(world.size, sizeof ready);
+    assert_int_equal(ready.protocol, NODE_PROTOCOL);
+    assert_int_equal(ready.role, role);
+    return ready;
+}
+
+static struct node_finished_message report(void)
+{
+    struct node_finished_message finished;
+    say(NODE_REPORT, NULL, 0);
+    memcpy(&finished, hear(NODE_FINISHED), sizeof finished);
+    assert_int_equal(finished.epoch, 0);
+    return finished;
+}
+
+static void refuses(uint8_t type, const void *data, size_t size,
+                    const char *text)
+{
+    say(type, data, size);
+    assert_string_equal(hear(NODE_FAULT), text);
+    hear_nothing(); /* once */
+}
+
+/* --- roles ---------------------------------------------------------------- */
+
+static void a_role_of_its_own(void **unused)
+{
+    struct node_job_message job = {.epoch = 5};
+    struct node_setup_message setup = setup_of(ECHO_ROLE);
+    struct node_finished_message finished;
+    (void)unused;
+    say(ECHO_ASKS, "early", 5); /* without a setup */
+    hear_nothing();
+    struct node_ready_message ready = begin(ECHO_ROLE);
+    assert_int_equal(ready.map.memory, MEMORY);
+    assert_int_equal(ready.map.tables[0].bytes, ECHO_TABLE);
+    assert_int_equal(ready.map.pages, 5);
+    for (unsigned i = 0; i < 3; i++) {
+        say(ECHO_ASKS, "echo", 4);
+        assert_string_equal(hear(ECHO_ANSWERS), "echo");
+        assert_int_equal(node_held(world.node), 0);
+    }
+    say(NODE_JOB, &job, sizeof job);
+    memcpy(&finished, hear(NODE_FINISHED), sizeof finished);
+    assert_int_equal(finished.epoch, 5);
+    assert_int_equal(finished.pages_held, 3);
+    assert_int_equal(finished.sent, 4); /* ready, three echoes */
+    assert_int_equal(finished.memory_high_water, FIXED + ready.map.node +
+                                                     ready.map.cube +
+                                                     sizeof(struct echo));
+    hear_nothing(); /* it has ended */
+    setup.credits = 0;
+    size_t least =
+        node_arena_needed(&world.board[SELF].identity, MEMORY, &setup);
+    setup.credits = 1000;
+    assert_int_equal(
+        node_arena_needed(&world.board[SELF].identity, MEMORY, &setup),
+        least + 1000);
+    assert_int_equal(least, ready.map.node + ready.map.cube + MEMORY / 1024);
+}
+
+/* The tables of a role and what they count fit what is there. */
+static void roles_map_their_arena(void **unused)
+{
+    static const uint8_t numbers[] = {NODE_WORKER, NODE_HOLDER};
+    (void)unused;
+    for (size_t i = 0; i < sizeof numbers; i++) {
+        struct node_ready_message ready = begin(numbers[i]);
+        const struct node_role *role = node_role_named(numbers[i]);
+        uint32_t sum = ready.map.cube + ready.map.node;
+        for (unsigned k = 0; k < NODE_TABLES_MAX; k++) {
+            assert_int_equal(ready.map.tables[k].bytes > 0,
+                             role->tables[k].name != NULL);
+            assert_int_equal(ready.map.tables[k].count > 0,
+                             role->tables[k].unit != NULL);
+            sum += ready.map.tables[k].bytes;
+        }
+        assert_true(sum <= ready.map.arena);
+        assert_true(sum > ready.map.arena - 4096);
+        assert_true(ready.map.pages > 100);
+        assert_int_equal(node_held(world.node), 0);
+    }
+}
+
+/* Another setup makes another role of it; what the one before did stays
+ * counted, and what it had is gone. */
+static void a_second_setup(void **unused)
+{
+    (void)unused;
+    (void)begin(ECHO_ROLE);
+    say(ECHO_ASKS, "once", 4);
+    assert_string_equal(hear(ECHO_ANSWERS), "once");
+    (void)begin(NODE_HOLDER);
+    assert_int_equal(report().pages_held, 1);
+    uint32_t page = 3;
+    say(NODE_PAGE_REQUEST, &page, sizeof page);
+    assert_memory_equal(hear(NODE_PAGE_REQUEST), &page, sizeof page);
+    assert_int_equal(node_held(world.node), 1);
+    (void)begin(NODE_WORKER);
+    assert_int_equal(node_held(world.node), 0);
+    struct node_finished_message finished = report();
+    assert_int_equal(finished.pages_held, 1);
+    assert_int_equal(finished.pages_forwarded, 1);
+    struct node_job_message job = {.epoch = 1}; /* of no bricks */
+    say(NODE_JOB, &job, sizeof job);
+    memcpy(&finished, hear(NODE_FINISHED), sizeof finished);
+    assert_int_equal(finished.epoch, 1);
+    (void)begin(ECHO_ROLE);
+    assert_int_equal(report().pages_held, 1);
+}
+
+/* --- faults --------------------------------------------------------------- */
+
+static void an_unknown_role(void **unused)
+{
+    struct node_setup_message setup = setup_of(7);
+    struct node_ping_message ping = {2};
+    struct node_pong_message pong;
+    (void)unused;
+    (void)begin(ECHO_ROLE);
+    refuses(NODE_SETUP, &setup, sizeof setup,
+            "role 7 is not known to its program");
+    say(ECHO_ASKS, "none", 4); /* to the role before */
+    say(NODE_PING, &ping, sizeof ping);
+    memcpy(&pong, hear(NODE_PONG), sizeof pong);
+    assert_int_equal(pong.start, 100 + SELF);
+    assert_int_equal(pong.received, 3);
+    assert_int_equal(pong.sent, 2);
+    (void)begin(NODE_WORKER);
+    (void)begin(ECHO_ROLE);
+    setup = setup_of(ECHO_ROLE);
+    setup.credits = 0;
+    refuses(NODE_SETUP, &setup, sizeof setup, "nothing to echo");
+}
+
+static void setups_of_other_versions(void **unused)
+{
+    struct node_setup_message setup = setup_of(NODE_WORKER);
+    struct {
+        struct node_setup_message setup;
+        uint32_t more;
+    } later = {setup, 0};
+    (void)unused;
+    assert_int_equal(NODE_PROTOCOL, 4);
+    setup.protocol = later.setup.protocol = 3;
+    refuses(NODE_SETUP, &setup, sizeof setup, "protocol version 3, expected 4");
+    refuses(NODE_SETUP, &later, sizeof later, "protocol version 3, expected 4");
+    refuses(NODE_SETUP, &later, 4, "protocol version 3, expected 4");
+    refuses(NODE_SETUP, &later, 3, "setup in 3 bytes, expected 96");
+    later.setup.protocol = 4;
+    refuses(NODE_SETUP, &later, 100, "setup in 100 bytes, expected 96");
+}
+
+static void invalid_setups(void **unused)
+{
+    struct node_setup_message setup = setup_of(NODE_WORKER);
+    (void)unused;
+    setup.nodes = 8;
+    refuses(NODE_SETUP, &setup, sizeof setup,
+            "invalid setup: 8 nodes, expected 2");
+    setup.nodes = setup.holders = 2;
+    refuses(NODE_SETUP, &setup, sizeof setup,
+            "invalid setup: 2 holders of 2 nodes");
+    setup = setup_of(NODE_HOLDER);
+    setup.holders = 0;
+    refuses(NODE_SETUP, &setup, sizeof setup,
+            "invalid setup: a holder among 0 holders");
+}
+
+static void what_a_worker_refuses(void **unused)
+{
+    struct node_job_message job = {.epoch = 1, .job = {.first = 5, .last = 3}};
+    struct {
+        uint32_t page;
+        uint8_t data[INCODE_PAGE_BYTES];
+    } page = {.page = 17};
+    struct node_spill_header header = {.epoch = 0, .brick = 6, .sent = 1};
+    (void)unused;
+    (void)begin(NODE_WORKER);
+    refuses(NODE_JOB, &job, sizeof job, "invalid job: bricks 5..3");
+    (void)begin(NODE_WORKER);
+    job.job.last = 8;
+    refuses(NODE_JOB, &job, sizeof job, "invalid job: bricks 5..8");
+    (void)begin(NODE_WORKER);
+    refuses(NODE_JOB, &job, 10, "job in 10 bytes, expected 64");
+    (void)begin(NODE_WORKER);
+    job.job.last = 7;
+    job.epoch = 0;
+    refuses(NODE_JOB, &job, sizeof job, "invalid job: epoch 0");
+    (void)begin(NODE_WORKER);
+    job.epoch = 1;
+    say(NODE_JOB, &job, sizeof job);
+    (void)hear(NODE_PAGE_REQUEST);
+    job.epoch = 2;
+    refuses(NODE_JOB, &job, sizeof job, "job 2 before job 1 is done");
+    (void)begin(NODE_WORKER);
+    refuses(NODE_PAGE, &page, sizeof page, "page 17 was not requested");
+    (void)begin(NODE_WORKER);
+    refuses(NODE_PAGE, &page, 2, "page in 2 bytes, expected 4 at least");
+    (void)begin(NODE_WORKER);
+    job.epoch = 1;
+    say(NODE_JOB, &job, sizeof job);
+    (void)hear(NODE_PAGE_REQUEST);
+    refuses(NODE_PAGE, &page, 4 + 24, "page 17 of 24 bytes was not requested");
+    (void)begin(NODE_WORKER);
+    refuses(NODE_UNSPILL, &header, 8,
+            "spilled faces in 8 bytes, header takes 20");
+    (void)begin(NODE_WORKER);
+    header.count = 2;
+    refuses(NODE_UNSPILL, &header, sizeof header,
+            "2 spilled faces in 20 bytes");
+}
+
+static void what_a_holder_refuses(void **unused)
+{
+    struct node_job_message job = {.epoch = 1};
+    uint32_t pages[NODE_PAGES_IN_FLIGHT_MAX + 1];
+    struct {
+        uint32_t page;
+        uint8_t data[INCODE_PAGE_BYTES + 4];
+    } page = {.page = 17};
+    (void)unused;
+    (void)begin(NODE_HOLDER);
+    refuses(NODE_JOB, &job, sizeof job, "a job for a node that holds pages");
+    (void)begin(NODE_HOLDER);
+    refuses(NODE_PAGE, &page, sizeof page - 4, "page 17 was not requested");
+    (void)begin(NODE_HOLDER);
+    refuses(NODE_PAGE, &page, sizeof page,
+            "page in 1544 bytes, expected 1540 at most");
+    (void)begin(NODE_HOLDER);
+    memset(pages, 0, sizeof pages);
+    refuses(NODE_PAGE_REQUEST, pages, sizeof pages,
+            "more than 256 pages requested at a time");
+}
+
+/* A text that is too long is cut, and the first fault stays. */
+static void fault_texts(void **unused)
+{
+    static struct node_fault fault;
+    char words[NODE_FAULT_TEXT_MAX + 11];
+    (void)unused;
+    assert_false(node_fault_is_set(&fault));
+    node_fault_set(&fault, "#, # and #", 0, UINT32_MAX);
+    assert_string_equal(fault.text, "0, 4294967295 and 4294967295");
+    assert_int_equal(fault.size, strlen(fault.text));
+    node_fault_set(&fault, "later", 0, 0);
+    assert_int_equal(fault.text[0], '0');
+    fault.size = 0;
+    memset(words, 'x', sizeof words - 1);
+    words[sizeof words - 1] = '\0';
+    words[NODE_FAULT_TEXT_MAX - 2] = '#';
+    node_fault_set(&fault, words, 123, 0);
+    assert_int_equal(fault.size, NODE_FAULT_TEXT_MAX);
+    assert_string_equal(fault.text + NODE_FAULT_TEXT_MAX - 3, "x12");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(a_role_of_its_own, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(roles_map_their_arena, set_up,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(a_second_setup, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(an_unknown_role, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(setups_of_other_versions, set_up,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(invalid_setups, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(what_a_worker_refuses, set_up,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(what_a_holder_refuses, set_up,
+                                        tear_down),
+        cmocka_unit_test(fault_texts),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
