@@ -129,8 +129,9 @@ static unsigned cube_dimension(unsigned nodes)
     return dimension;
 }
 
-/* The least memory that node 0, which has the most links, does with. */
+/* The least memory that every node does with. */
 static uint64_t memory_needed(const struct host_run_options *options,
+                              const struct host_strategy *strategy,
                               unsigned dimension,
                               const struct node_setup_message *setup)
 {
@@ -138,8 +139,9 @@ static uint64_t memory_needed(const struct host_run_options *options,
                                      .window = (uint8_t)options->window,
                                      .epoch = 1};
     uint64_t memory = HOST_MEMORY_MIN;
-    while (node_arena_needed(&identity, memory, setup) + HOST_STACK_BYTES +
-               HOST_STATIC_BYTES >
+    while (host_strategy_arena(strategy, 1u << dimension, &identity, memory,
+                               setup) +
+               HOST_STACK_BYTES + HOST_STATIC_BYTES >
            memory) {
         memory += 16384;
     }
@@ -148,33 +150,37 @@ static uint64_t memory_needed(const struct host_run_options *options,
 
 /* What can be done where a cube needs more memory than its nodes have. */
 static const char *memory_advice(const struct host_run_options *options,
+                                 const struct host_strategy *strategy,
                                  unsigned nodes,
                                  const struct node_setup_message *setup)
 {
     struct host_run_options narrow = *options;
     narrow.window = 0;
-    bool fewer =
-        nodes > 1 && memory_needed(options, 0, setup) <= options->memory;
+    bool fewer = nodes > 1 &&
+                 memory_needed(options, strategy, 0, setup) <= options->memory;
     if (options->cube != NULL) {
         return "";
     }
-    if (options->window > 0 && memory_needed(&narrow, cube_dimension(nodes),
-                                             setup) <= options->memory) {
+    if (options->window > 0 &&
+        memory_needed(&narrow, strategy, cube_dimension(nodes), setup) <=
+            options->memory) {
         return fewer ? ", fewer --nodes, or no --window" : ", or no --window";
     }
     return fewer ? ", or fewer --nodes" : "";
 }
 
 /* bricks, cells: of the order, where it is known; else 1 and none. */
-static int check_memory(const struct host_run_options *options, unsigned nodes,
+static int check_memory(const struct host_run_options *options,
+                        const struct host_strategy *strategy, unsigned nodes,
                         uint32_t bricks, const uint32_t cells[3],
                         struct host_error *error)
 {
-    struct node_setup_message setup = {.role = NODE_WORKER};
+    struct node_setup_message setup = {0};
     setup.setup.bricks = bricks;
     setup.setup.index = (uint8_t)options->index;
     memcpy(setup.setup.cells, cells, sizeof setup.setup.cells);
-    uint64_t needed = memory_needed(options, cube_dimension(nodes), &setup);
+    uint64_t needed =
+        memory_needed(options, strategy, cube_dimension(nodes), &setup);
     return needed <= options->memory
                ? 0
                : host_fail(error, HOST_USAGE,
@@ -184,7 +190,7 @@ static int check_memory(const struct host_run_options *options, unsigned nodes,
                            options->cube == NULL ? "--memory" : ": memory",
                            (unsigned long long)options->memory / 1024, nodes,
                            (unsigned long long)needed / 1024,
-                           memory_advice(options, nodes, &setup));
+                           memory_advice(options, strategy, nodes, &setup));
 }
 
 int host_triangulate_on(const struct host_run_options *options,
@@ -227,8 +233,8 @@ int host_triangulate_on(const struct host_run_options *options,
         result->points = order.points;
         result->duplicates = order.duplicates;
         result->negative_zeros = order.negative_zeros;
-        status = check_memory(options, result->nodes, order.bricks, order.cells,
-                              error);
+        status = check_memory(options, result->strategy, result->nodes,
+                              order.bricks, order.cells, error);
     }
     if (status == 0) {
         status = run_service(options, &order, &service, tets, result, error);
@@ -288,7 +294,8 @@ int host_triangulate(const struct host_run_options *options,
     struct host_machine machine;
     uint64_t start = host_now_us();
     settle(options, points->count, result);
-    if (check_memory(options, result->nodes, 1, no_cells, error) != 0 ||
+    if (check_memory(options, result->strategy, result->nodes, 1, no_cells,
+                     error) != 0 ||
         (options->begin != NULL ? options->begin : begin_on_board)(
             options, result, &machine, error) != 0) {
         return error->code;

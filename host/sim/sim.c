@@ -5,6 +5,7 @@
 
 #include "host/check/verify.h"
 #include "host/mesh/gen.h"
+#include "host/service/strategies/strategies.h"
 #include "sim_draw.h"
 #include "sim_reference.h"
 #include "sim_run.h"
@@ -14,12 +15,11 @@ enum {
     STEPS_MAX = 60000000      /* or so many steps: it hangs */
 };
 
-/* Bytes that every node needs: node 0 has the most links. */
+/* Bytes with which every node does. */
 static uint64_t memory_of(const struct host_sim_run *r)
 {
     const struct host_sim_plan *p = r->plan;
     struct node_setup_message setup = {
-        .role = NODE_WORKER,
         .setup = {.bricks = r->order.bricks, .index = (uint8_t)p->index}};
     unsigned dimension = (unsigned)__builtin_ctz(p->nodes);
     struct node_identity identity = {.dimension = (uint8_t)dimension,
@@ -29,7 +29,8 @@ static uint64_t memory_of(const struct host_sim_run *r)
     uint64_t memory = 0, needed = 1;
     while (needed > memory) {
         memory += 4096;
-        needed = node_arena_needed(&identity, memory, &setup) +
+        needed = host_strategy_arena(p->strategy, p->nodes, &identity, memory,
+                                     &setup) +
                  HOST_WORLD_STACK + HOST_WORLD_STATIC;
     }
     return memory + p->memory_more / 64 * 64;

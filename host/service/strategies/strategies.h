@@ -10,6 +10,7 @@
 #ifndef HOST_STRATEGIES_H
 #define HOST_STRATEGIES_H
 
+#include "node/node.h"
 #include "strategy.h"
 
 /* One a file. */
@@ -23,6 +24,13 @@ const struct host_strategy *host_strategy_named(const char *name);
 
 /* The one that costs least; of equals the first in the table. */
 const struct host_strategy *host_strategy_auto(const struct host_task *task);
+
+/* Bytes of arena with which any node of a cube does, whatever its role: `given`
+ * is the setup but for what the strategy fills in, and identity that of the
+ * node with the most links; memory as in node_arena_needed. */
+size_t host_strategy_arena(const struct host_strategy *strategy, unsigned nodes,
+                           const struct node_identity *identity, size_t memory,
+                           const struct node_setup_message *given);
 
 /* What a user may ask for: the names of the rows, and "auto" behind them, with
  * a few words on each; NULL past the last. */

@@ -61,7 +61,8 @@ struct host_strategy {
     /* Regions that the order is cut into: a power of two. */
     unsigned (*regions)(unsigned nodes);
     /* Fills in what the node has to know: its role, and what goes with it.  The
-     * rest is there already.  Once a node and generation, or more often. */
+     * rest is there already.  Once a node and generation, or more often; before
+     * the run as well, where work has no more than the numbers of nodes. */
     void (*set_up)(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup);
     /* The first job of a node, when all nodes have their setup: true, or false

@@ -305,6 +305,31 @@ static void test_table(void **unused)
     assert_null(host_strategy_row(UINT32_MAX));
 }
 
+/* The memory that is asked for does for every role that a strategy gives, and
+ * is no more than one of them needs. */
+static void test_arena(void **unused)
+{
+    (void)unused;
+    const struct node_identity identity = {.dimension = 2, .epoch = 1};
+    const struct node_setup_message given = {.setup = {.bricks = 100}};
+    for (unsigned r = 0; host_strategy_row(r) != NULL; r++) {
+        const struct host_strategy *s = host_strategy_row(r);
+        size_t bytes =
+            host_strategy_arena(s, NODES, &identity, 1u << 20, &given);
+        bool needed = false;
+        begin(s);
+        for (unsigned i = 0; i < NODES; i++) {
+            struct node_setup_message setup = given;
+            s->set_up(&work, i, &setup);
+            size_t one = node_arena_needed(&identity, 1u << 20, &setup);
+            assert_true(one <= bytes);
+            needed = needed || one == bytes;
+        }
+        assert_true(needed);
+        end();
+    }
+}
+
 static void test_auto(void **unused)
 {
     (void)unused;
@@ -327,6 +352,7 @@ int main(void)
         cmocka_unit_test(test_spatial_restart),
         cmocka_unit_test(test_lost_tetrahedra),
         cmocka_unit_test(test_table),
+        cmocka_unit_test(test_arena),
         cmocka_unit_test(test_auto),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
