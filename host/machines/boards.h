@@ -40,4 +40,7 @@ const char *host_board_name(unsigned i);
 /* NULL: there is none of that name. */
 const struct host_board *host_board_named(const char *name);
 
+/* Names that other versions know, with a comma before and after each. */
+extern const char host_boards_elsewhere[];
+
 #endif

@@ -6,7 +6,7 @@
  *
  *     if (host_cube_file_read(&file, "lab.cube", &error) != 0)
  *         return error.code;
- *     unsigned count = host_cube_straps(&file, 3, straps);
+ *     unsigned count = host_cube_node_options(&file, 3, options);
  *     host_cube_file_free(&file);
  */
 #ifndef HOST_CUBE_FILE_H
@@ -18,7 +18,7 @@
 #include "transport/drivers/serial_port.h"
 #include "transport/drivers/tcp_wire.h"
 
-enum { HOST_STRAPS_MAX = 64, HOST_STRAP_BYTES = 256 };
+enum { HOST_NODE_OPTIONS_MAX = 64, HOST_NODE_OPTION_BYTES = 256 };
 
 /* From a node to another, or to the host: CUBE_HOST. */
 struct host_cube_wire {
@@ -38,7 +38,7 @@ struct host_cube_file {
     uint64_t memory;
     unsigned window;
     unsigned dead_s; /* a link silent so long is given up; 0: never */
-    char key_path[HOST_STRAP_BYTES];
+    char key_path[HOST_NODE_OPTION_BYTES];
     bool has_key;
     uint8_t key[SECURE_KEY_BYTES];
     uint32_t serial_baud; /* of the slowest serial wire; 0: there is none */
@@ -58,8 +58,9 @@ const struct host_cube_wire *
 host_cube_host_wire(const struct host_cube_file *file, unsigned k);
 
 /* The arguments of a node's program, without its name: how many. */
-unsigned host_cube_straps(const struct host_cube_file *file, unsigned node,
-                          char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES]);
+unsigned host_cube_node_options(
+    const struct host_cube_file *file, unsigned node,
+    char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES]);
 
 /* `incode cube FILE`: prints how each node is started. */
 int host_cube_print(const char *path, struct host_error *error);

@@ -13,13 +13,13 @@
 /* In the child: becomes the node. */
 static void become_node(const void *context, unsigned node)
 {
-    static char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES];
+    static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     const struct host_remote *r = context;
-    char *argv[HOST_STRAPS_MAX + 2] = {(char[]){"incode-node"}};
+    char *argv[HOST_NODE_OPTIONS_MAX + 2] = {(char[]){"incode-node"}};
     char *no_environment[] = {NULL};
-    unsigned count = host_cube_straps(r->file, node, straps);
+    unsigned count = host_cube_node_options(r->file, node, options);
     for (unsigned i = 0; i < count; i++) {
-        argv[1 + i] = straps[i];
+        argv[1 + i] = options[i];
     }
     execve(r->program, argv, no_environment);
 }

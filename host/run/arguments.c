@@ -229,7 +229,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
         return true;
     case KEY_BOARD:
         o->board = host_board_row((unsigned)choose_row(
-            p, "board", value, host_board_name, ",mps2-an500,mps2-an385,"));
+            p, "board", value, host_board_name, host_boards_elsewhere));
         return true;
     default:
         return false;

@@ -51,11 +51,12 @@ static const char *const good =
     "    baud = 921600; rtscts = true; }\n"
     ");\n";
 
-static bool has(char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES], unsigned count,
-                const char *name, const char *value)
+static bool has(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
+                unsigned count, const char *name, const char *value)
 {
     for (unsigned i = 0; i + 1 < count; i += 2) {
-        if (strcmp(straps[i], name) == 0 && strcmp(straps[i + 1], value) == 0) {
+        if (strcmp(options[i], name) == 0 &&
+            strcmp(options[i + 1], value) == 0) {
             return true;
         }
     }
@@ -65,7 +66,7 @@ static bool has(char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES], unsigned count,
 static void nodes_are_started_as_it_says(void **unused)
 {
     static struct host_cube_file file;
-    static char straps[HOST_STRAPS_MAX][HOST_STRAP_BYTES];
+    static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     struct host_error error = {0};
     (void)unused;
     write_file(path, good);
@@ -79,21 +80,21 @@ static void nodes_are_started_as_it_says(void **unused)
     assert_int_equal(host_cube_host_wire(&file, 0)->node, 0);
     assert_int_equal(host_cube_host_wire(&file, 1)->node, 1);
     assert_null(host_cube_host_wire(&file, 2));
-    unsigned count = host_cube_straps(&file, 0, straps);
-    assert_true(has(straps, count, "--node", "0"));
-    assert_true(has(straps, count, "--memory", "524288"));
-    assert_true(has(straps, count, "--lines", "921600"));
-    assert_true(has(straps, count, "--key", key_path));
-    assert_true(has(straps, count, "--board", "linux"));
+    unsigned count = host_cube_node_options(&file, 0, options);
+    assert_true(has(options, count, "--node", "0"));
+    assert_true(has(options, count, "--memory", "524288"));
+    assert_true(has(options, count, "--lines", "921600"));
+    assert_true(has(options, count, "--key", key_path));
+    assert_true(has(options, count, "--board", "linux"));
     assert_true(
-        has(straps, count, "--wire", "0=serial:/dev/ttyUSB0:921600:rtscts"));
-    assert_true(has(straps, count, "--wire", "1=listen:10.0.0.1:7000"));
-    count = host_cube_straps(&file, 1, straps);
-    assert_true(has(straps, count, "--host-wire", "1"));
+        has(options, count, "--wire", "0=serial:/dev/ttyUSB0:921600:rtscts"));
+    assert_true(has(options, count, "--wire", "1=listen:10.0.0.1:7000"));
+    count = host_cube_node_options(&file, 1, options);
+    assert_true(has(options, count, "--host-wire", "1"));
     assert_true(
-        has(straps, count, "--wire", "0=serial:/dev/ttyS1:921600:rtscts"));
-    assert_true(has(straps, count, "--wire", "1=listen:127.0.0.1:7001") ||
-                has(straps, count, "--wire", "1=listen:[::1]:7001"));
+        has(options, count, "--wire", "0=serial:/dev/ttyS1:921600:rtscts"));
+    assert_true(has(options, count, "--wire", "1=listen:127.0.0.1:7001") ||
+                has(options, count, "--wire", "1=listen:[::1]:7001"));
     host_cube_file_free(&file);
 }
 

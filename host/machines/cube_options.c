@@ -1,0 +1,84 @@
+#include <stdio.h>
+#include <string.h>
+
+#include "cube_reader.h"
+
+static void print_wire(const struct host_cube_wire *wire, unsigned link,
+                       bool first, char text[HOST_NODE_OPTION_BYTES])
+{
+    char address[HOST_NODE_OPTION_BYTES / 2];
+    if (wire->serial) {
+        snprintf(text, HOST_NODE_OPTION_BYTES, "%u=serial:%s:%u%s", link,
+                 wire->device[first ? 0 : 1], wire->baud,
+                 wire->rts_cts ? ":rtscts" : "");
+        return;
+    }
+    host_cube_print_address(first ? &wire->at : &wire->via, address,
+                            sizeof address);
+    snprintf(text, HOST_NODE_OPTION_BYTES, "%u=%s:%s", link,
+             first ? "listen" : "call", address);
+}
+
+unsigned host_cube_node_options(
+    const struct host_cube_file *file, unsigned node,
+    char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES])
+{
+    unsigned n = 0, count;
+    const struct host_cube_wire *second = host_cube_host_wire(file, 1);
+    const struct host_cube_wire *host = node == 0 ? host_cube_host_wire(file, 0)
+                                        : second != NULL && second->node == node
+                                            ? second
+                                            : NULL;
+    const struct {
+        const char *name;
+        uint64_t value;
+    } numbers[] = {{"--node", node},
+                   {"--dimension", file->dimension},
+                   {"--memory", file->memory},
+                   {"--window", file->window},
+                   {"--dead", UINT64_C(1000000) * file->dead_s},
+                   {"--lines", file->serial_baud},
+                   {"--host-wire", host != NULL ? 1 : 0}};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", numbers[i].name);
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%llu",
+                 (unsigned long long)numbers[i].value);
+    }
+    if (file->has_key) {
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--key");
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%.*s",
+                 HOST_NODE_OPTION_BYTES - 1, file->key_path);
+    }
+    for (unsigned d = 0; d <= file->dimension; d++) {
+        const struct host_cube_wire *wire =
+            d == file->dimension
+                ? host
+                : host_cube_between(file, node, node ^ 1u << d, &count);
+        if (wire != NULL) {
+            snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--wire");
+            print_wire(wire, d, wire->node == node, options[n++]);
+        }
+    }
+    snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--board");
+    snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", file->board->name);
+    return n;
+}
+
+int host_cube_print(const char *path, struct host_error *error)
+{
+    static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
+    static struct host_cube_file file;
+    if (host_cube_file_read(&file, path, error) != 0) {
+        return error->code;
+    }
+    for (unsigned i = 0; i < file.nodes; i++) {
+        unsigned count = host_cube_node_options(&file, i, options);
+        printf("incode-node");
+        for (unsigned k = 0; k < count; k++) {
+            printf(" %s", options[k]);
+        }
+        printf("\n");
+    }
+    host_cube_file_free(&file);
+    return 0;
+}

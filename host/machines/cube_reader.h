@@ -1,0 +1,64 @@
+/* What the parts of the cube file's reader share: its settings as libconfig has
+ * them (cube_values.c), and its links (cube_wires.c).
+ *
+ * Memory: none.  Work: that of the setting; all wires, where wires are
+ * compared.
+ *
+ *     int window = 0;
+ *     if (!host_cube_take_number(root, "window", 1, 64, &window))
+ *         return host_cube_wrong(&file, root, &error, "window: give 1 to 64");
+ */
+#ifndef HOST_CUBE_READER_H
+#define HOST_CUBE_READER_H
+
+#include <libconfig.h>
+
+#include "cube_file.h"
+
+/* HOST_INPUT with the line of a setting; NULL: the first. */
+int host_cube_wrong(const struct host_cube_file *file,
+                    const config_setting_t *where, struct host_error *error,
+                    const char *what);
+
+/* A member that is not one of `names`, which NULL ends, is a mistake in
+ * writing. */
+int host_cube_check_names(const struct host_cube_file *file,
+                          const config_setting_t *group,
+                          const char *const names[], struct host_error *error);
+
+/* Whether it is a whole number from lo to hi. */
+bool host_cube_is_number(const config_setting_t *setting, int lo, int hi,
+                         int *value);
+
+/* The same of a member, which may be left out: *value stays as it is. */
+bool host_cube_take_number(const config_setting_t *group, const char *name,
+                           int lo, int hi, int *value);
+
+/* "HOST:PORT", "[ADDRESS]:PORT": looked up once, before the run. */
+int host_cube_resolve(const struct host_cube_file *file,
+                      const config_setting_t *where,
+                      struct tcp_address *address, struct host_error *error);
+
+/* As it is written, in numbers. */
+void host_cube_print_address(const struct tcp_address *address, char *text,
+                             size_t size);
+
+/* Adds the wire of a group to file->wire, which has room for it. */
+int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
+                        struct host_error *error);
+
+/* Whether each wire of the cube is there once, and the host's. */
+int host_cube_check_wires(const struct host_cube_file *file,
+                          const config_setting_t *list,
+                          struct host_error *error);
+
+/* Whether no two links share an end. */
+int host_cube_check_ends(const struct host_cube_file *file,
+                         struct host_error *error);
+
+/* The wire between two nodes, either way round, and how many there are. */
+const struct host_cube_wire *
+host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
+                  unsigned *count);
+
+#endif

@@ -1,0 +1,108 @@
+#include "cube_reader.h"
+
+#include <netdb.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "host/base/parse.h"
+
+int host_cube_wrong(const struct host_cube_file *file,
+                    const config_setting_t *where, struct host_error *error,
+                    const char *what)
+{
+    return host_fail(error, HOST_INPUT, "%s:%u: %s", file->path,
+                     where == NULL ? 1 : config_setting_source_line(where),
+                     what);
+}
+
+int host_cube_check_names(const struct host_cube_file *file,
+                          const config_setting_t *group,
+                          const char *const names[], struct host_error *error)
+{
+    for (int i = 0; i < config_setting_length(group); i++) {
+        const config_setting_t *member =
+            config_setting_get_elem(group, (unsigned)i);
+        const char *name = config_setting_name(member);
+        bool known = false;
+        for (unsigned k = 0; names[k] != NULL; k++) {
+            known = known || strcmp(names[k], name) == 0;
+        }
+        if (!known) {
+            char text[160];
+            snprintf(text, sizeof text,
+                     "%.60s: no such setting here; see README.md for those "
+                     "that there are",
+                     name);
+            return host_cube_wrong(file, member, error, text);
+        }
+    }
+    return 0;
+}
+
+/* What libconfig reads of a setting of another
+ * type, or of one beyond an int, is 0. */
+bool host_cube_is_number(const config_setting_t *setting, int lo, int hi,
+                         int *value)
+{
+    long long n = config_setting_get_int64(setting);
+    int type = config_setting_type(setting);
+    if ((type != CONFIG_TYPE_INT && type != CONFIG_TYPE_INT64) || n < lo ||
+        n > hi) {
+        return false;
+    }
+    *value = (int)n;
+    return true;
+}
+
+bool host_cube_take_number(const config_setting_t *group, const char *name,
+                           int lo, int hi, int *value)
+{
+    const config_setting_t *member = config_setting_get_member(group, name);
+    return member == NULL || host_cube_is_number(member, lo, hi, value);
+}
+
+int host_cube_resolve(const struct host_cube_file *file,
+                      const config_setting_t *where,
+                      struct tcp_address *address, struct host_error *error)
+{
+    struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *found = NULL;
+    const char *text = config_setting_get_string(where);
+    char host[256];
+    const char *colon = text == NULL ? NULL : strrchr(text, ':');
+    uint64_t port = 0;
+    if (text != NULL && tcp_address_parse(address, text) == 0) {
+        return 0;
+    }
+    if (colon == NULL || (size_t)(colon - text) >= sizeof host ||
+        host_parse_number(colon + 1, 1, 65535, &port) != 0) {
+        return host_cube_wrong(file, where, error,
+                               "not a host with a port; write \"name:7001\", "
+                               "\"10.0.0.7:7001\" or \"[2001:db8::7]:7001\"");
+    }
+    snprintf(host, sizeof host, "%.*s", (int)(colon - text), text);
+    int status = getaddrinfo(host, colon + 1, &hints, &found);
+    if (status != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "%s:%u: host %s: %s; correct the name or give its "
+                         "address",
+                         file->path, config_setting_source_line(where), host,
+                         gai_strerror(status));
+    }
+    memcpy(&address->to, found->ai_addr, found->ai_addrlen);
+    address->size = found->ai_addrlen;
+    freeaddrinfo(found);
+    return 0;
+}
+
+void host_cube_print_address(const struct tcp_address *address, char *text,
+                             size_t size)
+{
+    char host[NI_MAXHOST], port[NI_MAXSERV];
+    if (getnameinfo(&address->to.any, address->size, host, sizeof host, port,
+                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
+        snprintf(text, size, "?");
+        return;
+    }
+    snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host,
+             port);
+}

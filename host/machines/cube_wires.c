@@ -1,0 +1,287 @@
+#include "cube_reader.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "transport/cube.h"
+
+/* --- one link --------------------------------------------------------------
+ */
+
+static int read_device(const struct host_cube_file *file,
+                       const config_setting_t *pair, int end,
+                       char device[SERIAL_NAME_MAX], struct host_error *error)
+{
+    const char *name = config_setting_get_string_elem(pair, end);
+    if (name == NULL || strlen(name) >= SERIAL_NAME_MAX ||
+        config_setting_length(pair) != 2) {
+        return host_cube_wrong(
+            file, pair, error,
+            "serial: not two devices; write [\"/dev/ttyS1\", "
+            "\"/dev/ttyUSB0\"], the first at `node`");
+    }
+    snprintf(device, SERIAL_NAME_MAX, "%s", name);
+    return 0;
+}
+
+static int read_line(const struct host_cube_file *file,
+                     const config_setting_t *group, struct host_cube_wire *wire,
+                     struct host_error *error)
+{
+    const config_setting_t *pair = config_setting_get_member(group, "serial");
+    const config_setting_t *flow = config_setting_get_member(group, "rtscts");
+    int baud = 115200;
+    wire->serial = true;
+    if (!host_cube_take_number(group, "baud", 300, 20000000, &baud)) {
+        return host_cube_wrong(file, config_setting_get_member(group, "baud"),
+                               error,
+                               "baud: not a rate of a serial wire; give 300 to "
+                               "20000000");
+    }
+    if (flow != NULL && config_setting_type(flow) != CONFIG_TYPE_BOOL) {
+        return host_cube_wrong(
+            file, flow, error,
+            "rtscts: neither true nor false; give one of them");
+    }
+    wire->baud = (uint32_t)baud;
+    wire->rts_cts = flow != NULL && config_setting_get_bool(flow) != 0;
+    return read_device(file, pair, 0, wire->device[0], error) != 0 ||
+                   read_device(file, pair, 1, wire->device[1], error) != 0
+               ? error->code
+               : 0;
+}
+
+static int read_net(const struct host_cube_file *file,
+                    const config_setting_t *group, struct host_cube_wire *wire,
+                    struct host_error *error)
+{
+    const config_setting_t *at = config_setting_get_member(group, "tcp");
+    const config_setting_t *via = config_setting_get_member(group, "via");
+    if (host_cube_resolve(file, at, &wire->at, error) != 0) {
+        return error->code;
+    }
+    wire->via = wire->at;
+    if (via != NULL && host_cube_resolve(file, via, &wire->via, error) != 0) {
+        return error->code;
+    }
+    if (!file->has_key && !(tcp_address_is_loopback(&wire->at) &&
+                            tcp_address_is_loopback(&wire->via))) {
+        return host_cube_wrong(
+            file, at, error,
+            "tcp between machines without a key; add key = \"FILE\" "
+            "at the top");
+    }
+    return 0;
+}
+
+/* A node's number, or the host. */
+static int read_end(const struct host_cube_file *file,
+                    const config_setting_t *group, const char *name,
+                    uint16_t *node, struct host_error *error)
+{
+    const config_setting_t *end = config_setting_get_member(group, name);
+    const char *text = end == NULL ? NULL : config_setting_get_string(end);
+    int number = 0;
+    if (text != NULL && strcmp(text, "host") == 0 && strcmp(name, "to") == 0) {
+        *node = CUBE_HOST;
+        return 0;
+    }
+    if (end == NULL ||
+        !host_cube_is_number(end, 0, (int)file->nodes - 1, &number)) {
+        char message[120];
+        snprintf(message, sizeof message,
+                 "%s: not a node of this cube; give 0 to %u%s", name,
+                 file->nodes - 1,
+                 strcmp(name, "to") == 0 ? ", or \"host\"" : "");
+        return host_cube_wrong(file, end == NULL ? group : end, error, message);
+    }
+    *node = (uint16_t)number;
+    return 0;
+}
+
+int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
+                        struct host_error *error)
+{
+    static const char *const names[] = {"node",   "to",   "tcp",    "via",
+                                        "serial", "baud", "rtscts", NULL};
+    struct host_cube_wire *wire = &file->wire[file->wires];
+    memset(wire, 0, sizeof *wire);
+    wire->line = config_setting_source_line(group);
+    if (host_cube_check_names(file, group, names, error) != 0 ||
+        read_end(file, group, "node", &wire->node, error) != 0 ||
+        read_end(file, group, "to", &wire->to, error) != 0) {
+        return error->code;
+    }
+    if (wire->to != CUBE_HOST &&
+        __builtin_popcount(wire->node ^ wire->to) != 1) {
+        return host_cube_wrong(
+            file, group, error,
+            "no neighbours in a cube; their numbers must differ in "
+            "one binary digit");
+    }
+    bool tcp = config_setting_get_member(group, "tcp") != NULL;
+    bool serial = config_setting_get_member(group, "serial") != NULL;
+    if (tcp == serial) {
+        return host_cube_wrong(
+            file, group, error,
+            "neither or both of tcp and serial; give one of them");
+    }
+    int status = serial ? read_line(file, group, wire, error)
+                        : read_net(file, group, wire, error);
+    if (serial && (file->serial_baud == 0 || wire->baud < file->serial_baud)) {
+        file->serial_baud = wire->baud;
+    }
+    file->wires++;
+    return status;
+}
+
+const struct host_cube_wire *
+host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
+                  unsigned *count)
+{
+    const struct host_cube_wire *found = NULL;
+    *count = 0;
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        if ((w->node == a && w->to == b) || (w->node == b && w->to == a)) {
+            found = w;
+            (*count)++;
+        }
+    }
+    return found;
+}
+
+const struct host_cube_wire *
+host_cube_host_wire(const struct host_cube_file *file, unsigned k)
+{
+    for (unsigned i = 0; i < file->wires; i++) {
+        if (file->wire[i].to == CUBE_HOST && k-- == 0) {
+            return &file->wire[i];
+        }
+    }
+    return NULL;
+}
+
+/* The host's machine has the ports of all nodes that it starts. */
+static unsigned owner(const struct host_cube_file *file, unsigned node)
+{
+    return node == CUBE_HOST || file->local[node] ? CUBE_HOST : node;
+}
+
+/* --- all of them -----------------------------------------------------------
+ */
+
+/* Two that listen at one address: on one machine, or at one address of all. */
+static bool same_address(const struct host_cube_file *file,
+                         const struct host_cube_wire *a,
+                         const struct host_cube_wire *b)
+{
+    return !a->serial && !b->serial && a->at.size == b->at.size &&
+           memcmp(&a->at.to, &b->at.to, a->at.size) == 0 &&
+           (!tcp_address_is_any(&a->at) ||
+            owner(file, a->node) == owner(file, b->node));
+}
+
+/* The device at the ends of both that is the same one; NULL: none. */
+static const char *same_device(const struct host_cube_file *file,
+                               const struct host_cube_wire *a,
+                               const struct host_cube_wire *b)
+{
+    const char *found = NULL;
+    for (int i = 0; i < 4 && a->serial && b->serial; i++) {
+        unsigned left = i / 2 == 0 ? a->node : a->to;
+        unsigned right = i % 2 == 0 ? b->node : b->to;
+        if (owner(file, left) == owner(file, right) &&
+            strcmp(a->device[i / 2], b->device[i % 2]) == 0) {
+            found = a->device[i / 2];
+        }
+    }
+    return found;
+}
+
+/* "nodes 0 and 1", "node 0 and the host" */
+static void name_wire(const struct host_cube_wire *wire, char text[40])
+{
+    if (wire->to == CUBE_HOST) {
+        snprintf(text, 40, "node %u and the host", wire->node);
+    } else {
+        snprintf(text, 40, "nodes %u and %u", wire->node, wire->to);
+    }
+}
+
+int host_cube_check_ends(const struct host_cube_file *file,
+                         struct host_error *error)
+{
+    char address[HOST_NODE_OPTION_BYTES / 2], names[2][40];
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        const char *what = w->serial &&
+                                   owner(file, w->node) == owner(file, w->to) &&
+                                   strcmp(w->device[0], w->device[1]) == 0
+                               ? w->device[0]
+                               : NULL;
+        unsigned other = i;
+        for (unsigned k = 0; k < i && what == NULL; k++) {
+            what = same_device(file, &file->wire[k], w);
+            if (what == NULL && same_address(file, &file->wire[k], w)) {
+                host_cube_print_address(&w->at, address, sizeof address);
+                what = address;
+            }
+            other = k;
+        }
+        if (what != NULL) {
+            name_wire(w, names[0]);
+            name_wire(&file->wire[other], names[1]);
+            return host_fail(error, HOST_INPUT,
+                             "%s:%u: the link between %s has %s, and so has "
+                             "that between %s in line %u; give each end of a "
+                             "link its own",
+                             file->path, w->line, names[0], what, names[1],
+                             file->wire[other].line);
+        }
+    }
+    return 0;
+}
+
+int host_cube_check_wires(const struct host_cube_file *file,
+                          const config_setting_t *list,
+                          struct host_error *error)
+{
+    const struct host_cube_wire *first = host_cube_host_wire(file, 0);
+    const struct host_cube_wire *second = host_cube_host_wire(file, 1);
+    char text[120];
+    for (unsigned i = 0; i < file->nodes; i++) {
+        for (unsigned d = 0; d < file->dimension; d++) {
+            unsigned count = 0, other = i ^ 1u << d;
+            const struct host_cube_wire *w =
+                host_cube_between(file, i, other, &count);
+            if (count > 1) {
+                return host_fail(error, HOST_INPUT,
+                                 "%s:%u: a second link between nodes %u and "
+                                 "%u; leave one of them out",
+                                 file->path, w->line, i, other);
+            }
+            if (count == 0) {
+                snprintf(text, sizeof text,
+                         "no link between nodes %u and %u; add { node = %u; "
+                         "to = %u; .. }",
+                         i, other, i, other);
+                return host_cube_wrong(file, list, error, text);
+            }
+        }
+    }
+    if (first == NULL || first->node != 0) {
+        return host_cube_wrong(
+            file, list, error,
+            "the host's first link must be that of node 0; begin "
+            "with { node = 0; to = \"host\"; .. }");
+    }
+    if (second != NULL &&
+        (second->node == 0 || host_cube_host_wire(file, 2) != NULL)) {
+        return host_cube_wrong(
+            file, list, error,
+            "a second link of the host must be another node's, and "
+            "there is no third; leave it out");
+    }
+    return 0;
+}

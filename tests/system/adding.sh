@@ -1,0 +1,181 @@
+#!/usr/bin/env bash
+# A format and a board are a file and a row: in a copy of the tree one of each
+# is added so, and it is read, written, listed and run on.  What is built
+# already is copied with the sources, so that little is built again.
+. tests/system/lib.sh
+
+tree=$scratch/tree
+mkdir -p "$tree/build"
+cp -a Makefile boards host incode node transport "$tree"
+mkdir -p "$tree/tests"
+cp -a "$BUILD/flags" "$BUILD/commit" "$BUILD/obj" "$BUILD"/*.a \
+    "$BUILD/incode-node" "$tree/build"
+
+cat > "$tree/host/formats/toy.c" <<'END'
+/* A count, then as many rows; tetrahedra in the same way, with a sibling that
+ * holds their points. */
+#include "format.h"
+#include "rows.h"
+#include "scan.h"
+
+static int read_points(const struct host_source *source, struct host_mesh *mesh,
+                       struct host_error *error)
+{
+    struct host_scan s =
+        host_scan_start(source->path, source->data, source->bytes);
+    uint64_t count = 0;
+    host_scan_unsigned(&s, UINT32_MAX, &count, error);
+    for (; error->code == 0 && count > 0; count--) {
+        double xyz[3];
+        for (int d = 0; d < 3; d++) {
+            if (host_scan_double_anywhere(&s, &xyz[d], error) != 0) {
+                return error->code;
+            }
+        }
+        host_points_append(mesh->points, xyz, 1, error);
+    }
+    return error->code;
+}
+
+static int read_tetrahedra(const struct host_source *source,
+                           struct host_mesh *mesh, struct host_error *error)
+{
+    struct host_scan s =
+        host_scan_start(source->path, source->data, source->bytes);
+    uint64_t count = 0, v[4];
+    host_scan_unsigned(&s, UINT32_MAX, &count, error);
+    for (; error->code == 0 && count > 0; count--) {
+        for (int k = 0; k < 4; k++) {
+            if (host_scan_unsigned(&s, UINT32_MAX, &v[k], error) != 0) {
+                return error->code;
+            }
+        }
+        host_take_element(mesh, v, 0, source, &s, error);
+    }
+    return error->code;
+}
+
+static void write_points(struct host_output *out,
+                         const struct host_points *points)
+{
+    host_put_line(out, "", points->count, "\n");
+    host_put_points(out, points, " ", false);
+}
+
+static int write_tetrahedra(struct host_output *out, struct host_output *beside,
+                            const struct host_points *points,
+                            const struct host_tetrahedra *tets,
+                            struct host_error *error)
+{
+    write_points(beside, points);
+    host_put_line(out, "", tets->count, "\n");
+    for (uint64_t i = 0; i < tets->count; i++) {
+        host_put_row(out, tets->v[i], 4, 0);
+        host_output_text(out, "\n");
+    }
+    return error->code;
+}
+
+const struct host_format host_format_toy = {
+    .name = "a toy",
+    .extensions = {".toy"},
+    .read_points = read_points,
+    .read_tetrahedra = read_tetrahedra,
+    .write_points = write_points,
+    .write_tetrahedra = write_tetrahedra,
+    .beside = {".toypoints"},
+    .rows_only = true,
+};
+END
+cat > "$tree/host/machines/board_toy.c" <<'END'
+/* Processes of a program of their own, incode-node-toy. */
+#include <string.h>
+
+#include "boards.h"
+
+static int start(const struct host_cluster_options *options,
+                 struct host_started *started, struct host_error *error)
+{
+    static struct host_cluster cluster;
+    static char program[4096];
+    struct host_cluster_options mine = *options;
+    if (host_cluster_program(NULL, program, sizeof program - 8, error) != 0) {
+        return error->code;
+    }
+    mine.program = strcat(program, "-toy");
+    if (host_cluster_start(&cluster, &mine, error) != 0) {
+        return error->code;
+    }
+    started->machine = host_cluster_machine(&cluster);
+    return 0;
+}
+
+const struct host_board host_board_toy = {
+    .name = "toy",
+    .help = "processes of a toy",
+    .start = start,
+};
+END
+sed -i 's/ROW(plot3d)$/ROW(plot3d) ROW(toy)/' "$tree/host/formats/formats.c"
+sed -i 's/ROW(linux)$/ROW(linux) ROW(toy)/' "$tree/host/machines/boards.c"
+
+# The flags of what is copied, whatever they were: only what has changed is
+# built, and without optimisation.
+if ! "${MAKE:-make}" -C "$tree" --no-print-directory -o build/flags \
+    BUILD=build OPT=-O0 build/incode > "$scratch/log" 2>&1; then
+    fail adding/build "$(grep -m 1 error "$scratch/log")"
+    exit 1
+fi
+check adding/build 'a warning' [ "$(grep -c warning "$scratch/log")" = 0 ]
+cp "$tree/build/incode-node" "$tree/build/incode-node-toy"
+
+old=$INCODE new=$tree/build/incode
+"$old" gen uniform 500 -o "$scratch/a.xyz"
+
+# says NAME PATTERN COMMAND...: on standard output or error, line ends apart.
+says() {
+    local name=$1 pattern=$2
+    shift 2
+    "$@" < /dev/null 2>&1 | tr -s ' \n' ' ' > "$scratch/said"
+    check "$name" "$(last "$scratch/said")" grep -qF -e "$pattern" \
+        "$scratch/said"
+}
+
+says adding/format/help '(PLOT3D), .toy (a toy);' "$new" run --help
+says adding/format/help-out '.toy (a toy; with .toypoints beside it);' \
+    "$new" run --help
+says adding/format/points-in '.bin .toy, or any' "$new" run "$scratch/a.pdf"
+says adding/format/points-out '.npy .toy, or -' \
+    "$new" convert "$scratch/a.xyz" "$scratch/a.pdf"
+says adding/format/tetrahedra-in '.npy .toy, or any' \
+    "$new" digest "$scratch/a.pdf"
+says adding/format/tetrahedra-out '.npy .toy, or -' \
+    "$new" run "$scratch/a.xyz" -o "$scratch/a.pdf"
+
+succeeds adding/format/write-points \
+    "$new" convert "$scratch/a.xyz" "$scratch/a.toy"
+succeeds adding/format/read-points \
+    "$new" convert "$scratch/a.toy" "$scratch/b.xyz"
+check adding/format/same-points 'other bytes' \
+    cmp -s "$scratch/a.xyz" "$scratch/b.xyz"
+
+succeeds adding/board/run "$new" run "$scratch/a.toy" -q --board toy --nodes 2 \
+    --stats "$scratch/toy.json" -o "$scratch/t.toy"
+succeeds adding/format/other "$old" run "$scratch/a.xyz" -q \
+    --stats "$scratch/linux.json" -o "$scratch/t.ele"
+check adding/format/beside 'other points' \
+    cmp -s "$scratch/a.toy" "$scratch/t.toypoints"
+check adding/format/digest 'another triangulation' test \
+    "$("$new" digest "$scratch/t.toy")" = "$("$old" digest "$scratch/t.ele")"
+
+says adding/board/help 'linux (processes of this machine; the default), toy' \
+    "$new" run --help
+says adding/board/message 'allowed: linux, toy' \
+    "$new" run "$scratch/a.xyz" --board z80
+check adding/board/statistics 'another board' \
+    [ "$(stat_of "$scratch/toy.json" board)" = toy ]
+printf 'dimension = 0; board = "z80"; links = ();' > "$scratch/z80.cube"
+says adding/board/cube-file '"linux" or "toy"' "$new" cube "$scratch/z80.cube"
+rm "$tree/build/incode-node-toy"
+says adding/board/its-program 'incode-node-toy: No such file' \
+    "$new" run "$scratch/a.xyz" --board toy
