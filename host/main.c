@@ -251,16 +251,67 @@ static int command_sim(int argc, char **argv, struct host_error *error)
     return host_sim_seeds(&options, error);
 }
 
+/* A command is a row: help and messages list it from here. */
 struct command {
-    const char *name;
+    const char *name, *arguments;
+    const char *help; /* what it does, in a line or two */
     int (*run)(int argc, char **argv, struct host_error *error);
 };
 
+enum { HELP_COLUMN = 23, TEXT_MAX = 2048 };
+
 static const struct command commands[] = {
-    {"run", command_run},         {"gen", command_gen},
-    {"verify", command_verify},   {"digest", command_digest},
-    {"convert", command_convert}, {"bench", command_bench},
-    {"cube", command_cube},       {"sim", command_sim}};
+    {"run", "POINTS -o OUT", "triangulate on a cube of nodes", command_run},
+    {"gen", "KIND N -o FILE",
+     "make points: uniform, bubbles, bluntfin, sphere, grid,\nrotated, hub",
+     command_gen},
+    {"verify", "POINTS TETS", "check a triangulation exactly", command_verify},
+    {"digest", "TETS", "print what tells triangulations apart", command_digest},
+    {"convert", "IN OUT", "from one file format to another", command_convert},
+    {"cube", "FILE", "check a cube file, print what starts its nodes",
+     command_cube},
+    {"bench", "paper|links", "the paper's tables on this machine; its links",
+     command_bench},
+    {"sim", "--seeds A..B", "whole cubes in virtual time, with faults",
+     command_sim}};
+
+enum { COMMANDS = sizeof commands / sizeof commands[0] };
+
+/* "run, gen, verify" */
+static const char *command_names(void)
+{
+    static char names[TEXT_MAX];
+    size_t used = 0;
+    for (size_t i = 0; i < COMMANDS; i++) {
+        used += (size_t)snprintf(names + used, sizeof names - used, "%s%s",
+                                 i == 0 ? "" : ", ", commands[i].name);
+    }
+    return names;
+}
+
+/* As argp asks for it: the commands, where its text has %s. */
+static char *list_commands(int key, const char *text, void *input)
+{
+    char rows[TEXT_MAX] = "", usage[64], *whole = NULL;
+    size_t used = 0;
+    (void)input;
+    if (key != ARGP_KEY_HELP_POST_DOC) {
+        return (char *)text;
+    }
+    for (size_t i = 0; i < COMMANDS; i++) {
+        const struct command *c = &commands[i];
+        const char *more = strchr(c->help, '\n');
+        int first = more == NULL ? (int)strlen(c->help) : (int)(more - c->help);
+        snprintf(usage, sizeof usage, "  %s %s", c->name, c->arguments);
+        used += (size_t)snprintf(rows + used, sizeof rows - used, "%-*s%.*s\n",
+                                 HELP_COLUMN, usage, first, c->help);
+        if (more != NULL) {
+            used += (size_t)snprintf(rows + used, sizeof rows - used, "%*s%s\n",
+                                     HELP_COLUMN, "", more + 1);
+        }
+    }
+    return asprintf(&whole, text, rows) < 0 ? NULL : whole;
+}
 
 /* Stops at the first word that is no option: the command. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
@@ -274,8 +325,7 @@ static error_t parse_top(int key, char *value, struct argp_state *state)
         state->next = state->argc;
         return 0;
     case ARGP_KEY_NO_ARGS:
-        argp_error(state, "no command; allowed: run, gen, verify, digest, "
-                          "convert, bench, cube, sim");
+        argp_error(state, "no command; allowed: %s", command_names());
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -285,17 +335,15 @@ static error_t parse_top(int key, char *value, struct argp_state *state)
 static int dispatch(int argc, char **argv, struct host_error *error)
 {
     static char name[64];
-    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+    for (size_t i = 0; i < COMMANDS; i++) {
         if (strcmp(argv[0], commands[i].name) == 0) {
             snprintf(name, sizeof name, "incode %s", commands[i].name);
             argv[0] = name;
             return commands[i].run(argc, argv, error);
         }
     }
-    return host_fail(error, HOST_USAGE,
-                     "%s: no such command; allowed: run, gen, verify, "
-                     "digest, convert, bench, cube, sim",
-                     argv[0]);
+    return host_fail(error, HOST_USAGE, "%s: no such command; allowed: %s",
+                     argv[0], command_names());
 }
 
 /* What was printed, help included, has to arrive. */
@@ -315,21 +363,10 @@ int main(int argc, char **argv)
         parse_top,
         "COMMAND ARGUMENT...",
         "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
-        "Commands:\n"
-        "  run POINTS -o OUT    triangulate on a cube of nodes\n"
-        "  gen KIND N -o FILE   make points: uniform, bubbles, bluntfin, "
-        "sphere, grid,\n"
-        "                       rotated, hub\n"
-        "  verify POINTS TETS   check a triangulation exactly\n"
-        "  digest TETS          print what tells triangulations apart\n"
-        "  convert IN OUT       from one file format to another\n"
-        "  cube FILE            check a cube file, print what starts its "
-        "nodes\n"
-        "  bench paper|links    the paper's tables on this machine; its links\n"
-        "  sim --seeds A..B     whole cubes in virtual time, with faults\n\n"
+        "Commands:\n%s\n"
         "incode COMMAND --help says more of each.",
         NULL,
-        NULL,
+        list_commands,
         NULL};
     struct host_error error = {0};
     int command = 0;
