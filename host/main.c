@@ -5,24 +5,24 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "incode/predicates/predicates.h"
 #include "host/base/parse.h"
-#include "host/run/arguments.h"
-#include "host/run/begin.h"
 #include "host/bench/bench_links.h"
 #include "host/bench/bench_paper.h"
-#include "host/formats/convert.h"
-#include "host/mesh/gen.h"
-#include "host/run/launch.h"
+#include "host/check/verify.h"
 #include "host/files/output.h"
+#include "host/formats/convert.h"
+#include "host/formats/read.h"
+#include "host/formats/write.h"
 #include "host/machines/cube_file.h"
+#include "host/mesh/gen.h"
+#include "host/mesh/tetrahedra.h"
+#include "host/run/arguments.h"
+#include "host/run/begin.h"
+#include "host/run/launch.h"
 #include "host/run/on_cube.h"
 #include "host/run/run.h"
 #include "host/sim/sim.h"
-#include "host/formats/read.h"
-#include "host/formats/write.h"
-#include "host/mesh/tetrahedra.h"
-#include "host/check/verify.h"
+#include "incode/predicates/predicates.h"
 
 const char *argp_program_version = "incode 0.1.0";
 

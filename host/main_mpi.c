@@ -9,14 +9,14 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include "incode/predicates/predicates.h"
-#include "transport/drivers/mpi_environment.h"
+#include "host/bench/mpi/bench.h"
+#include "host/machines/mpi/ranks.h"
 #include "host/run/arguments.h"
 #include "host/run/begin.h"
 #include "host/run/launch.h"
 #include "host/run/run.h"
-#include "host/bench/mpi/bench.h"
-#include "host/machines/mpi/ranks.h"
+#include "incode/predicates/predicates.h"
+#include "transport/drivers/mpi_environment.h"
 
 static struct host_ranks ranks;
 

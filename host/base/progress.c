@@ -2,17 +2,11 @@
 
 #include <stdio.h>
 #include <sys/ioctl.h>
-#include <time.h>
 #include <unistd.h>
 
-enum { EVERY_US = 100000, BAR_MAX = 40, TEXT = 52 };
+#include "clock.h"
 
-uint64_t host_now_us(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
-}
+enum { EVERY_US = 100000, BAR_MAX = 40, TEXT = 52 };
 
 void host_progress_start(struct host_progress *progress, bool wanted)
 {

@@ -26,7 +26,4 @@ void host_progress_show(struct host_progress *progress, uint64_t done,
                         uint64_t total, uint64_t tetrahedra);
 void host_progress_end(struct host_progress *progress);
 
-/* Microseconds of the monotonic clock. */
-uint64_t host_now_us(void);
-
 #endif

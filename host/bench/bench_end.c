@@ -4,7 +4,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "host/base/progress.h"
+#include "host/base/clock.h"
 
 enum {
     PINGS = 200,

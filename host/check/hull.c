@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "incode/predicates/predicates.h"
-#include "host/mesh/adjacency.h"
 #include "host/base/memory.h"
+#include "host/mesh/adjacency.h"
+#include "incode/predicates/predicates.h"
 
 enum {
     DIRECTIONS = 64,       /* rays tried before giving up */

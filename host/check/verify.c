@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "incode/predicates/predicates.h"
-#include "host/mesh/adjacency.h"
 #include "edges.h"
-#include "hull.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
+#include "host/mesh/adjacency.h"
 #include "host/order/duplicates.h"
+#include "hull.h"
+#include "incode/predicates/predicates.h"
 
 enum {
     NAMED_MAX = 8,   /* offenders named */
@@ -103,7 +103,8 @@ static void check_tetrahedron(struct verify *v, uint64_t i,
     int s = incode_orient3d(tally, at(v, t[0]), at(v, t[1]), at(v, t[2]),
                             at(v, t[3]));
     if (s <= 0) {
-        tet_fault(v, i, s == 0 ? "is flat" : "is turned inside out");
+        tet_fault(v, i,
+                  s == 0 ? "has no volume" : "is of negative orientation");
         __atomic_store_n(&v->positive, false, __ATOMIC_RELAXED);
     }
 }

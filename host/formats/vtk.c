@@ -5,8 +5,8 @@
 #include <string.h>
 #include <strings.h>
 
-#include "host/base/memory.h"
 #include "format.h"
+#include "host/base/memory.h"
 #include "numbers.h"
 #include "rows.h"
 #include "scan.h"

@@ -8,7 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "host/base/progress.h"
+#include "host/base/clock.h"
 
 /* Ends with the reason in `report`, which a program that begins closes. */
 static _Noreturn void become(const struct host_child *child, pid_t host,

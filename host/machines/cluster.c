@@ -11,8 +11,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "host/base/clock.h"
 #include "host/base/parallel.h"
-#include "host/base/progress.h"
 
 /* Sanitizers map memory by the terabyte: no limit then. */
 #ifdef INCODE_SANITIZED

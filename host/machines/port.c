@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "host/base/clock.h"
 #include "transport/drivers/wait.h"
-#include "host/base/progress.h"
 
 void host_port_socket(struct host_port *port, int fd)
 {

@@ -12,9 +12,9 @@
 #ifndef HOST_PORT_H
 #define HOST_PORT_H
 
+#include "host/base/error.h"
 #include "transport/drivers/serial_port.h"
 #include "transport/drivers/tcp_wire.h"
-#include "host/base/error.h"
 
 enum host_port_kind {
     HOST_PORT_NONE,

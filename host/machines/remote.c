@@ -7,7 +7,7 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-#include "host/base/progress.h"
+#include "host/base/clock.h"
 #include "transport/drivers/secure_sodium.h"
 
 /* In the child: becomes the node. */

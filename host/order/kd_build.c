@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "incode/pages/pages.h"
 #include "host/base/parallel.h"
+#include "incode/pages/pages.h"
 
 enum {
     SAMPLE_MAX = 256,     /* items looked at to choose a pivot */

@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "duplicates.h"
+#include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "incode/pages/cells.h"
 #include "incode/predicates/predicates.h"
 #include "kd_build.h"
-#include "host/base/memory.h"
-#include "host/base/parallel.h"
-#include "duplicates.h"
 
 enum { FORK_POINTS = 1 << 13 };
 

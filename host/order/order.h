@@ -19,8 +19,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "incode/pages/pages.h"
 #include "host/base/error.h"
+#include "incode/pages/pages.h"
 
 enum host_partition { HOST_ADAPTIVE, HOST_UNIFORM };
 

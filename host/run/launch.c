@@ -16,8 +16,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "host/base/clock.h"
 #include "host/base/parse.h"
-#include "host/base/progress.h"
 #include "transport/drivers/mpi_environment.h"
 
 #define SOCKET_NAME "INCODE_LAUNCHER"

@@ -5,16 +5,17 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "node/node.h"
-#include "host/formats/claims.h"
-#include "host/mesh/facets.h"
+#include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/files/output.h"
-#include "host/service/strategies/strategies.h"
-#include "report.h"
-#include "stats.h"
+#include "host/formats/claims.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
+#include "host/mesh/facets.h"
+#include "host/service/strategies/strategies.h"
+#include "node/node.h"
+#include "report.h"
+#include "stats.h"
 
 void host_run_defaults(struct host_run_options *options)
 {
@@ -72,8 +73,8 @@ static void settle(const struct host_run_options *options, uint64_t points,
 }
 
 /* Sums over the nodes. */
-static void gather_reports(const struct host_service *service,
-                           struct host_run_result *r)
+static void sum_reports(const struct host_service *service,
+                        struct host_run_result *r)
 {
     memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
     r->retransmitted = service->retransmitted;
@@ -115,7 +116,7 @@ static int run_service(const struct host_run_options *options,
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
     int status = host_service_run(service, error);
-    gather_reports(service, result);
+    sum_reports(service, result);
     result->time_io_s += 1e-6 * (double)service->pages_us;
     return status;
 }

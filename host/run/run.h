@@ -14,13 +14,13 @@
 
 #include <sys/types.h>
 
+#include "host/check/verify.h"
 #include "host/machines/boards.h"
 #include "host/machines/throttle.h"
-#include "host/order/order.h"
 #include "host/mesh/points.h"
-#include "host/service/service.h"
 #include "host/mesh/tetrahedra.h"
-#include "host/check/verify.h"
+#include "host/order/order.h"
+#include "host/service/service.h"
 
 enum { HOST_OUTPUTS_MAX = 16 };
 

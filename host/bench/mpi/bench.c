@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "transport/drivers/mpi.h"
 #include "host/bench/bench_end.h"
+#include "transport/drivers/mpi.h"
 
 static struct mpi_place place;
 static struct mpi_pipe wire;

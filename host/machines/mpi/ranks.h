@@ -20,8 +20,8 @@
 
 #include <signal.h>
 
-#include "transport/drivers/mpi.h"
 #include "host/service/machine.h"
+#include "transport/drivers/mpi.h"
 
 struct host_ranks {
     struct mpi_place place;

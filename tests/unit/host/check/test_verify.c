@@ -12,8 +12,8 @@
 
 #include <cmocka.h>
 
-#include "host/mesh/gen.h"
 #include "host/check/verify.h"
+#include "host/mesh/gen.h"
 #include "tests/unit/reference.h"
 
 struct fixture {
@@ -185,7 +185,7 @@ static void each_turned_one_is_found(void **unused)
         uint32_t t = f.tets.v[i][2];
         f.tets.v[i][2] = f.tets.v[i][3];
         f.tets.v[i][3] = t;
-        expect(&f, "is turned inside out");
+        expect(&f, "is of negative orientation");
         host_tetrahedra_free(&f.tets);
         reference_delaunay(f.points.xyz, 40, &f.tets);
         host_tetrahedra_sort(&f.tets);

@@ -10,8 +10,8 @@
 
 #include <cmocka.h>
 
-#include "host/order/order.h"
 #include "host/order/duplicates.h"
+#include "host/order/order.h"
 #include "incode/pages/cells.h"
 
 static uint64_t state = 7;
