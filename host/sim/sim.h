@@ -18,7 +18,7 @@
 
 struct host_sim_outcome {
     uint64_t trace;  /* of all that went over the wires */
-    uint64_t frames; /* sent on all lines */
+    uint64_t frames; /* sent on all wires */
     uint64_t steps, time_us, work_us;
     uint64_t struck[HOST_SIM_FAULTS]; /* while work was open */
     uint64_t node_frames[16];         /* sent by the first nodes */

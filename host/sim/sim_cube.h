@@ -25,7 +25,7 @@ struct host_sim_cube_options {
     unsigned dimension; /* 0 .. CUBE_DIMENSION_MAX; 0: node 0 and its host */
     uint64_t seed;      /* of what befalls the wires by chance */
     struct sim_quality wire, host_wire; /* host_wire.bytes 0: as `wire` */
-    struct sim_faults faults;           /* of chance, on all lines */
+    struct sim_faults faults;           /* of chance, on all wires */
     unsigned host_wires; /* nodes 0 .. host_wires - 1 have one, 1 (as 0) to
                             CUBE_HOST_WIRES_MAX; see cube.h */
     uint16_t spare_node; /* has the host's second wire; 0: none */
@@ -82,20 +82,20 @@ struct host_sim_port *host_sim_cube_port(const struct host_sim_cube *cube,
 struct link_pipe host_sim_cube_pipe(const struct host_sim_cube *cube,
                                     unsigned place, unsigned link);
 
-/* A line of a wire: 0 from its lower end on, 1 towards it. */
+/* A direction of a wire: 0 from its lower end on, 1 towards it. */
 struct sim_direction *host_sim_cube_direction(const struct host_sim_cube *cube,
                                               unsigned wire, unsigned side);
 
-/* Chance on all lines from now on; NULL: none any more. */
+/* Chance on all wires from now on; NULL: none any more. */
 void host_sim_cube_faults(struct host_sim_cube *cube,
                           const struct sim_faults *faults);
 
-/* Times that a fault of enum sim_fault struck, on all lines. */
+/* Times that a fault of enum sim_fault struck, on all wires. */
 uint64_t host_sim_cube_struck(const struct host_sim_cube *cube,
                               enum sim_fault fault);
 
-/* A wire that is closed, or a line that brings nothing: taken back as often as
- * it was made. */
+/* A wire that is closed, or a direction that brings nothing: taken back as
+ * often as it was made. */
 void host_sim_cube_cut(struct host_sim_cube *cube, unsigned wire, bool cut);
 void host_sim_cube_deaf(struct host_sim_cube *cube, unsigned wire,
                         unsigned side, bool deaf);

@@ -18,9 +18,9 @@
 struct host_sim_plan;
 struct host_sim_run;
 
-/* Those of a line by chance, then what happens at a time. */
+/* Those of a wire by chance, then what happens at a time. */
 enum host_sim_fault {
-    HOST_SIM_ONE_WAY = SIM_CHANCES, /* a line brings nothing any more */
+    HOST_SIM_ONE_WAY = SIM_CHANCES, /* a wire brings nothing one way */
     HOST_SIM_CUT,                   /* a wire is closed at both ends */
     HOST_SIM_PARTITION,    /* all wires between two parts of the cube */
     HOST_SIM_PAUSE,        /* a node stands still */
@@ -63,7 +63,7 @@ struct host_sim_kind {
 extern const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS];
 
 /* Before the cube comes up: what is wrong with it from the start, and what
- * befalls its lines and ends at calm_us of the run. */
+ * befalls its wires and ends at calm_us of the run. */
 void host_sim_faults_prepare(struct host_sim_run *run);
 
 /* The work is open: from now on faults happen at their times, and count. */

@@ -33,7 +33,7 @@ struct host_sim_plan {
     uint32_t gather_us, step_us, host_us;
     /* What goes wrong. */
     bool wanted[HOST_SIM_FAULTS];
-    struct sim_faults weather; /* of the lines that have any */
+    struct sim_faults weather; /* of the wires that have any */
     bool early;                /* before the cube is up, too */
     uint32_t gap_us;           /* between two events, more or less */
     uint32_t lasts_us_max;     /* each of them */
