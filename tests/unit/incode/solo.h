@@ -1,4 +1,4 @@
-/* A triangulator alone in a process: pages come straight from the host's order,
+/* A triangulator alone, on no cube: pages come straight from the host's order,
  * spilled faces wait in an array, tetrahedra gather in a list.  By chance its
  * outside refuses, pages come late and in any order, and what the interface
  * promises is checked on the way.
