@@ -53,6 +53,8 @@ board        := $(wildcard boards/*.c boards/linux/*.c)
 # Host and node as ranks of Open MPI: no other program is linked with it.
 host_mpi     := host/main_mpi.c $(wildcard host/*/mpi/*.c)
 host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
+# A library of its own, for others' programs: nothing here is linked with it.
+ncube        := $(wildcard transport/ncube/*.c)
 unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
@@ -69,7 +71,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all unit points planted bare run test test-full bench firmware fuzz fuzzers lint install \
+.PHONY: all ncube unit points planted bare run test test-full bench firmware fuzz fuzzers lint install \
 	clean help deps deps-run deps-test deps-bench deps-full FORCE
 
 all: $(BUILD)/incode $(BUILD)/incode-node $(BUILD)/incode-mpi \
@@ -91,11 +93,18 @@ $(BUILD)/incode-node-mpi: $(mpi_node) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
+ncube: $(BUILD)/libncube.a
+$(BUILD)/libncube.a: $(ncube:%.c=$(obj)/%.o)
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
-$(BUILD)/%.a:
+$(BUILD)/%.a: $(BUILD)/lists
 	@rm -f $@
-	@$(AR) rcs $@ $^
+	@$(AR) rcs $@ $(filter %.o,$^)
+# An archive keeps nothing of a file that is gone.
+$(BUILD)/lists: FORCE
+	@mkdir -p $(@D)
+	@echo '$(core_objects) $(host_objects) $(ncube)' | cmp -s - $@ || \
+		echo '$(core_objects) $(host_objects) $(ncube)' > $@
 
 # Objects depend on the flags that they were compiled with.
 $(BUILD)/flags: FORCE
@@ -149,6 +158,7 @@ $(BUILD)/include/sodium.h:
 
 # A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
+$(BUILD)/tests/test_ncube: $(BUILD)/libncube.a
 $(foreach t,$(unit),$(eval $(BUILD)/tests/$(notdir $(t:.c=)): $(obj)/$(t:.c=.o)))
 $(filter-out %/test_mpi,$(unit_tests)): $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
@@ -279,6 +289,8 @@ help:
 	@echo '                         Cortex-M3 and M7, print their sizes'
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
 	@echo 'make lint                formatters, analysers, warnings as errors'
+	@echo 'make ncube               build/libncube.a: the nCUBE'"'"'s calls, for porting'
+	@echo '                         programs that were written for them'
 	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='

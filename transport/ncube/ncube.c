@@ -1,64 +1,64 @@
-#include "vertex.h"
+#include "ncube.h"
 
 #include <string.h>
 
-#include "check.h"
+#include "transport/check.h"
 
 /* The head: type (16 bits, low byte first), two bytes of zero. */
-enum { HEAD = VERTEX_HEAD };
+enum { HEAD = NCUBE_HEAD };
 
-void vertex_init(struct vertex *v, const struct vertex_config *config)
+void ncube_init(struct ncube *n, const struct ncube_config *config)
 {
     LINK_ASSERT(config->slot_count >= 1);
-    memset(v, 0, sizeof *v);
-    v->config = *config;
-    v->generation = cube_wiring(config->cube)->generation;
+    memset(n, 0, sizeof *n);
+    n->config = *config;
+    n->generation = cube_wiring(config->cube)->generation;
 }
 
-void whoami(const struct vertex *v, int *node, int *process, int *host,
+void whoami(const struct ncube *n, int *node, int *process, int *host,
             int *dimension)
 {
-    *node = v->config.self;
+    *node = n->config.self;
     *process = 0;
     *host = CUBE_HOST;
-    *dimension = v->config.dimension;
+    *dimension = n->config.dimension;
 }
 
 /* --- waiting ------------------------------------------------------------- */
 
-static int failed(struct vertex *v, enum vertex_failure failure)
+static int failed(struct ncube *n, enum ncube_failure failure)
 {
-    v->failure = failure;
+    n->failure = failure;
     return -1;
 }
 
 /* Whether all that waited here, and all that was agreed on, is of another
  * generation.  The first one is no loss. */
-static bool renewed(struct vertex *v)
+static bool renewed(struct ncube *n)
 {
-    uint32_t before = v->generation;
-    v->generation = cube_wiring(v->config.cube)->generation;
-    if (v->generation == before) {
+    uint32_t before = n->generation;
+    n->generation = cube_wiring(n->config.cube)->generation;
+    if (n->generation == before) {
         return false;
     }
     if (before == 0) {
         return false;
     }
-    v->used = 0;
+    n->used = 0;
     return true;
 }
 
 /* Lets the cube work, or time pass.  0, or -1. */
-static int wait(struct vertex *v, uint64_t start_us)
+static int wait(struct ncube *n, uint64_t start_us)
 {
-    const struct vertex_config *c = &v->config;
+    const struct ncube_config *c = &n->config;
     uint64_t now_us = c->now_us(c->context);
     int moved = cube_poll(c->cube, now_us);
-    if (renewed(v)) {
-        return failed(v, VERTEX_RENEWED);
+    if (renewed(n)) {
+        return failed(n, NCUBE_RENEWED);
     }
     if (c->patience_us != 0 && now_us - start_us > c->patience_us) {
-        return failed(v, VERTEX_LATE);
+        return failed(n, NCUBE_LATE);
     }
     if (moved == 0) {
         uint64_t due_us = cube_next_due_us(c->cube, now_us);
@@ -81,19 +81,18 @@ struct found {
 
 static bool fits(const struct found *found, int source, int type)
 {
-    bool any = type == VERTEX_ANY && found->type < VERTEX_INNER;
-    return (source == VERTEX_ANY || found->source == source) &&
+    bool any = type == NCUBE_ANY && found->type < NCUBE_INNER;
+    return (source == NCUBE_ANY || found->source == source) &&
            (any || found->type == type);
 }
 
-static struct found in_slot(const struct vertex *v, unsigned i)
+static struct found in_slot(const struct ncube *n, unsigned i)
 {
-    const struct vertex_slot *slot = &v->config.slots[i];
+    const struct ncube_slot *slot = &n->config.slots[i];
     return (struct found){slot->source, slot->type, slot->data, slot->size};
 }
 
-/* The messages of a cube that were not written by such a module are not of
- * ours: false. */
+/* False: it was not written by this library. */
 static bool open_message(const struct cube_message *message,
                          struct found *found)
 {
@@ -107,30 +106,30 @@ static bool open_message(const struct cube_message *message,
     return true;
 }
 
-static void keep(struct vertex *v, const struct found *found)
+static void keep(struct ncube *n, const struct found *found)
 {
-    struct vertex_slot *slot = &v->config.slots[v->used++];
-    LINK_ASSERT(v->used <= v->config.slot_count);
+    struct ncube_slot *slot = &n->config.slots[n->used++];
+    LINK_ASSERT(n->used <= n->config.slot_count);
     slot->source = (uint16_t)found->source;
     slot->type = (uint16_t)found->type;
     slot->size = (uint16_t)found->size;
     memcpy(slot->data, found->data, found->size);
-    v->used_max = v->used > v->used_max ? v->used : v->used_max;
+    n->used_max = n->used > n->used_max ? n->used : n->used_max;
 }
 
-static void drop(struct vertex *v, unsigned i)
+static void drop(struct ncube *n, unsigned i)
 {
-    struct vertex_slot *slots = v->config.slots;
-    v->used--;
-    memmove(&slots[i], &slots[i + 1], (v->used - i) * sizeof slots[0]);
+    struct ncube_slot *slots = n->config.slots;
+    n->used--;
+    memmove(&slots[i], &slots[i + 1], (n->used - i) * sizeof slots[0]);
 }
 
 /* What link d has brought, up to a message that fits, which is left in hand, or
  * one for which there is no slot; *blocked then. */
-static bool look_at_link(struct vertex *v, unsigned d, int source, int type,
+static bool look_at_link(struct ncube *n, unsigned d, int source, int type,
                          struct found *found, bool *blocked)
 {
-    struct cube *cube = v->config.cube;
+    struct cube *cube = n->config.cube;
     struct cube_message message;
     while (cube_read_from(cube, d, &message)) {
         if (!open_message(&message, found)) {
@@ -140,12 +139,12 @@ static bool look_at_link(struct vertex *v, unsigned d, int source, int type,
         if (fits(found, source, type)) {
             return true;
         }
-        if (v->used == v->config.slot_count) {
+        if (n->used == n->config.slot_count) {
             cube_put_back(cube);
             *blocked = true;
             return false;
         }
-        keep(v, found);
+        keep(n, found);
         cube_release(cube);
     }
     return false;
@@ -154,20 +153,20 @@ static bool look_at_link(struct vertex *v, unsigned d, int source, int type,
 /* Where a message that fits was found: a slot, or in hand from a link. */
 enum { NOWHERE = -1, IN_HAND = -2, NOBODY = -2 };
 
-static int look(struct vertex *v, int source, int type, struct found *found,
+static int look(struct ncube *n, int source, int type, struct found *found,
                 bool *stuck)
 {
-    unsigned blocked_links = 0, links = cube_links(v->config.cube);
+    unsigned blocked_links = 0, links = cube_links(n->config.cube);
     *stuck = false;
-    for (unsigned i = 0; i < v->used; i++) {
-        *found = in_slot(v, i);
+    for (unsigned i = 0; i < n->used; i++) {
+        *found = in_slot(n, i);
         if (fits(found, source, type)) {
             return (int)i;
         }
     }
     for (unsigned d = 0; d < links; d++) {
         bool blocked = false;
-        if (look_at_link(v, d, source, type, found, &blocked)) {
+        if (look_at_link(n, d, source, type, found, &blocked)) {
             return IN_HAND;
         }
         blocked_links += blocked;
@@ -178,88 +177,88 @@ static int look(struct vertex *v, int source, int type, struct found *found,
 
 /* Two that write to each other, and do not read, would wait for ever: what
  * comes meanwhile goes to the slots. */
-static void take_in(struct vertex *v)
+static void take_in(struct ncube *n)
 {
     struct found found;
     bool stuck;
-    LINK_ASSERT(look(v, NOBODY, VERTEX_ANY, &found, &stuck) == NOWHERE);
+    LINK_ASSERT(look(n, NOBODY, NCUBE_ANY, &found, &stuck) == NOWHERE);
 }
 
 /* --- sending and receiving ----------------------------------------------- */
 
-static int send_to_self(struct vertex *v, const void *data, size_t size,
+static int send_to_self(struct ncube *n, const void *data, size_t size,
                         unsigned type)
 {
-    struct found found = {v->config.self, (int)type, data, size};
-    if (v->used == v->config.slot_count) {
-        return failed(v, VERTEX_FULL);
+    struct found found = {n->config.self, (int)type, data, size};
+    if (n->used == n->config.slot_count) {
+        return failed(n, NCUBE_FULL);
     }
-    keep(v, &found);
+    keep(n, &found);
     return 0;
 }
 
-int vertex_send(struct vertex *v, const void *data, size_t size, unsigned dest,
-                unsigned type)
+int ncube_send(struct ncube *n, const void *data, size_t size, unsigned dest,
+               unsigned type)
 {
-    const struct vertex_config *c = &v->config;
+    const struct ncube_config *c = &n->config;
     uint64_t start_us = c->now_us(c->context);
     bool node = dest < 1u << c->dimension;
-    v->failure = VERTEX_FINE;
-    if (size > VERTEX_BYTES_MAX ||
+    n->failure = NCUBE_FINE;
+    if (size > NCUBE_BYTES_MAX ||
         (!node && dest != CUBE_HOST && dest != CUBE_ALL) ||
         (dest == CUBE_HOST && c->self == CUBE_HOST)) {
-        return failed(v, VERTEX_NOT_SOUND);
+        return failed(n, NCUBE_NOT_SOUND);
     }
-    if (renewed(v)) {
-        return failed(v, VERTEX_RENEWED);
+    if (renewed(n)) {
+        return failed(n, NCUBE_RENEWED);
     }
     if (node && dest == c->self) {
-        return send_to_self(v, data, size, type);
+        return send_to_self(n, data, size, type);
     }
-    v->out[0] = (uint8_t)type;
-    v->out[1] = (uint8_t)(type >> 8);
-    v->out[2] = v->out[3] = 0;
+    n->out[0] = (uint8_t)type;
+    n->out[1] = (uint8_t)(type >> 8);
+    n->out[2] = n->out[3] = 0;
     if (size > 0) {
-        memmove(v->out + HEAD, data, size);
+        memmove(n->out + HEAD, data, size);
     }
     for (;;) {
         if (node && !cube_reaches(c->cube, (uint16_t)dest)) {
-            return failed(v, VERTEX_NO_WAY);
+            return failed(n, NCUBE_NO_WAY);
         }
-        if (cube_write(c->cube, (uint16_t)dest, 0, v->out, HEAD + size) == 0) {
+        if (cube_write(c->cube, (uint16_t)dest, 0, n->out, HEAD + size) == 0) {
             return 0;
         }
-        if (wait(v, start_us) != 0) {
+        if (wait(n, start_us) != 0) {
             return -1;
         }
-        take_in(v);
+        take_in(n);
     }
 }
 
-int vertex_receive(struct vertex *v, int *source, int *type,
-                   const struct vertex_sink *sink)
+int ncube_receive(struct ncube *n, int *source, int *type,
+                  const struct ncube_sink *sink)
 {
-    const struct vertex_config *c = &v->config;
+    const struct ncube_config *c = &n->config;
     uint64_t start_us = c->now_us(c->context);
     struct found found;
     bool stuck;
-    v->failure = VERTEX_FINE;
-    if (renewed(v)) {
-        return failed(v, VERTEX_RENEWED);
+    n->failure = NCUBE_FINE;
+    if (renewed(n)) {
+        return failed(n, NCUBE_RENEWED);
     }
-    int at = look(v, *source, *type, &found, &stuck);
+    int at = look(n, *source, *type, &found, &stuck);
     while (at == NOWHERE) {
         bool node = *source >= 0 && *source < 1 << c->dimension;
         if (node && !cube_reaches(c->cube, (uint16_t)*source)) {
-            return failed(v, VERTEX_NO_WAY);
+            return failed(n, NCUBE_NO_WAY);
         }
         if (stuck) {
-            return failed(v, VERTEX_FULL);
+            return failed(n, NCUBE_FULL);
         }
-        if (wait(v, start_us) != 0) {
+        if (wait(n, start_us) != 0) {
             return -1;
         }
-        at = look(v, *source, *type, &found, &stuck);
+        at = look(n, *source, *type, &found, &stuck);
     }
     sink->take(sink->context, found.data, found.size);
     *source = found.source;
@@ -267,20 +266,20 @@ int vertex_receive(struct vertex *v, int *source, int *type,
     if (at == IN_HAND) {
         cube_release(c->cube);
     } else {
-        drop(v, (unsigned)at);
+        drop(n, (unsigned)at);
     }
     return 0;
 }
 
 /* --- the vendor's calls -------------------------------------------------- */
 
-int nwrite(struct vertex *v, const void *buffer, int size, int dest, int type,
+int nwrite(struct ncube *n, const void *buffer, int size, int dest, int type,
            int *flag)
 {
-    if (size < 0 || dest < 0 || type < 0 || type > VERTEX_TYPE_MAX) {
-        return failed(v, VERTEX_NOT_SOUND);
+    if (size < 0 || dest < 0 || type < 0 || type > NCUBE_TYPE_MAX) {
+        return failed(n, NCUBE_NOT_SOUND);
     }
-    if (vertex_send(v, buffer, (size_t)size, (unsigned)dest, (unsigned)type) !=
+    if (ncube_send(n, buffer, (size_t)size, (unsigned)dest, (unsigned)type) !=
         0) {
         return -1;
     }
@@ -304,16 +303,16 @@ static void copy(void *context, const uint8_t *data, size_t size)
     }
 }
 
-int nread(struct vertex *v, void *buffer, int size, int *source, int *type,
+int nread(struct ncube *n, void *buffer, int size, int *source, int *type,
           int *flag)
 {
     struct buffer b = {buffer, 0, size > 0 ? (size_t)size : 0};
-    struct vertex_sink sink = {copy, &b};
-    if (size < 0 || *source < VERTEX_ANY || *type < VERTEX_ANY ||
-        *type > VERTEX_TYPE_MAX) {
-        return failed(v, VERTEX_NOT_SOUND);
+    struct ncube_sink sink = {copy, &b};
+    if (size < 0 || *source < NCUBE_ANY || *type < NCUBE_ANY ||
+        *type > NCUBE_TYPE_MAX) {
+        return failed(n, NCUBE_NOT_SOUND);
     }
-    if (vertex_receive(v, source, type, &sink) != 0) {
+    if (ncube_receive(n, source, type, &sink) != 0) {
         return -1;
     }
     if (flag != NULL) {
@@ -322,17 +321,17 @@ int nread(struct vertex *v, void *buffer, int size, int *source, int *type,
     return (int)b.size;
 }
 
-int ntest(struct vertex *v, int *source, int *type)
+int ntest(struct ncube *n, int *source, int *type)
 {
-    const struct vertex_config *c = &v->config;
+    const struct ncube_config *c = &n->config;
     struct found found;
     bool stuck;
-    v->failure = VERTEX_FINE;
+    n->failure = NCUBE_FINE;
     (void)cube_poll(c->cube, c->now_us(c->context));
-    if (renewed(v)) {
-        return failed(v, VERTEX_RENEWED);
+    if (renewed(n)) {
+        return failed(n, NCUBE_RENEWED);
     }
-    int at = look(v, *source, *type, &found, &stuck);
+    int at = look(n, *source, *type, &found, &stuck);
     if (at == NOWHERE) {
         return -1;
     }

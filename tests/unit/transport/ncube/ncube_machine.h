@@ -8,22 +8,22 @@
  *     perform(s, node_program, host_program);
  *     free_stage(s);
  */
-#ifndef TESTS_UNIT_VERTEX_MACHINE_H
-#define TESTS_UNIT_VERTEX_MACHINE_H
+#ifndef TESTS_UNIT_NCUBE_MACHINE_H
+#define TESTS_UNIT_NCUBE_MACHINE_H
 
-#include "cube_machine.h"
+#include "tests/unit/transport/cube_machine.h"
 
 #include <pthread.h>
 #include <stdio.h>
 
-#include "transport/collect.h"
+#include "transport/ncube/collect.h"
 
 struct stage;
 
 struct actor {
     struct stage *stage;
-    struct vertex vertex;
-    struct vertex_slot *slots;
+    struct ncube ncube;
+    struct ncube_slot *slots;
     pthread_t thread;
     unsigned place;
     uint64_t random;
@@ -98,7 +98,7 @@ static inline struct stage *new_stage(unsigned dimension,
     pthread_cond_init(&s->next, NULL);
     for (unsigned i = 0; i < s->machine->count; i++) {
         struct actor *actor = &s->actors[i];
-        struct vertex_config c = {0};
+        struct ncube_config c = {0};
         actor->stage = s;
         actor->place = i;
         actor->random = seed * 1000 + i + 1;
@@ -113,7 +113,7 @@ static inline struct stage *new_stage(unsigned dimension,
         c.slots = actor->slots;
         c.slot_count = (uint16_t)slots;
         c.patience_us = 3000000;
-        vertex_init(&actor->vertex, &c);
+        ncube_init(&actor->ncube, &c);
     }
     return s;
 }

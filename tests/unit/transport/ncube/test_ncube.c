@@ -1,12 +1,13 @@
 /* The nCUBE's calls, and what all nodes do together, on cubes of dimension 0 to
  * 5 whose nodes run real programs. */
-#include "vertex_machine.h"
+#include "ncube_machine.h"
 
 /* cmocka's jumps must not leave a thread. */
 static void demand_at(bool true_now, int line)
 {
     if (!true_now) {
-        fprintf(stderr, "tests/unit/test_vertex.c:%d: not so\n", line);
+        fprintf(stderr, "tests/unit/transport/ncube/test_ncube.c:%d: not so\n",
+                line);
         abort();
     }
 }
@@ -19,7 +20,7 @@ static const struct cube_config narrow = {.window = 1};
 /* All send to all, themselves and the host as well. */
 static void greet_all(struct actor *a)
 {
-    struct vertex *v = &a->vertex;
+    struct ncube *v = &a->ncube;
     int node, process, host, dimension, flag = 7, number = 0;
     bool heard[ENDS_MAX] = {false};
     whoami(v, &node, &process, &host, &dimension);
@@ -64,7 +65,7 @@ enum { TYPES_SENT = 6, EACH = 3 };
 /* Node 0 reads by type, the last that was sent first; of a type, in order. */
 static void choose_by_type(struct actor *a)
 {
-    struct vertex *v = &a->vertex;
+    struct ncube *v = &a->ncube;
     int nodes = (int)a->stage->machine->nodes, size;
     for (int i = 0; i < TYPES_SENT * EACH && a->place != 0; i++) {
         demand(nwrite(v, &i, sizeof i, 0, i % TYPES_SENT, NULL) >= 0);
@@ -81,7 +82,7 @@ static void choose_by_type(struct actor *a)
     }
     if (a->place == 0) {
         int source = -1, type = -1;
-        demand(ntest(v, &source, &type) == -1 && v->failure == VERTEX_FINE);
+        demand(ntest(v, &source, &type) == -1 && v->failure == NCUBE_FINE);
         demand(v->used == 0 && v->used_max > 0);
     }
 }
@@ -100,9 +101,9 @@ static void messages_wait_for_who_asks_for_them(void **unused)
 /* 0xffff, sizes from nothing to the most, and buffers that are too small. */
 static void tell_all(struct actor *a)
 {
-    static const int sizes[] = {0, 1, 5, 1000, VERTEX_BYTES_MAX};
-    struct vertex *v = &a->vertex;
-    uint8_t bytes[VERTEX_BYTES_MAX + 1];
+    static const int sizes[] = {0, 1, 5, 1000, NCUBE_BYTES_MAX};
+    struct ncube *v = &a->ncube;
+    uint8_t bytes[NCUBE_BYTES_MAX + 1];
     for (int i = 0; i < 5; i++) {
         int source = -1, type = -1, size = sizes[i];
         memset(bytes, i + 1, sizeof bytes);
@@ -139,24 +140,24 @@ static void the_host_tells_all(void **unused)
 
 static void ask_wrongly(struct actor *a)
 {
-    struct vertex *v = &a->vertex;
-    uint8_t bytes[VERTEX_BYTES_MAX + 1] = {0};
+    struct ncube *v = &a->ncube;
+    uint8_t bytes[NCUBE_BYTES_MAX + 1] = {0};
     int source = -1, type = -1, nobody = 99, negative = -2;
-    int above = VERTEX_TYPE_MAX + 1;
+    int above = NCUBE_TYPE_MAX + 1;
     demand(nwrite(v, bytes, -1, 0, 0, NULL) == -1);
     demand(nwrite(v, bytes, sizeof bytes, 0, 0, NULL) == -1);
     demand(nwrite(v, bytes, 1, 4, 0, NULL) == -1);
     demand(nwrite(v, bytes, 1, -1, 0, NULL) == -1);
     demand(nwrite(v, bytes, 1, 0, -1, NULL) == -1);
     demand(nwrite(v, bytes, 1, 0, above, NULL) == -1);
-    demand(v->failure == VERTEX_NOT_SOUND);
+    demand(v->failure == NCUBE_NOT_SOUND);
     demand(nread(v, bytes, -1, &source, &type, NULL) == -1);
     demand(nread(v, bytes, 1, &negative, &type, NULL) == -1);
     demand(nread(v, bytes, 1, &source, &above, NULL) == -1);
-    demand(v->failure == VERTEX_NOT_SOUND);
+    demand(v->failure == NCUBE_NOT_SOUND);
     v->config.patience_us = 100000;
     demand(nread(v, bytes, 1, &nobody, &type, NULL) == -1);
-    demand(v->failure == VERTEX_LATE);
+    demand(v->failure == NCUBE_LATE);
 }
 
 static void what_makes_no_sense_is_refused(void **unused)
@@ -170,7 +171,7 @@ static void what_makes_no_sense_is_refused(void **unused)
 /* Node 1 writes what node 0 does not ask for, as does the host. */
 static void fill_up(struct actor *a)
 {
-    struct vertex *v = &a->vertex;
+    struct ncube *v = &a->ncube;
     int source = -1, type = 5, number = 0;
     if (a->place != 0) {
         for (int i = 0; i < 3; i++) {
@@ -179,7 +180,7 @@ static void fill_up(struct actor *a)
         return;
     }
     demand(nread(v, &number, sizeof number, &source, &type, NULL) == -1);
-    demand(v->failure == VERTEX_FULL);
+    demand(v->failure == NCUBE_FULL);
     for (int i = 0; i < 6; i++) {
         source = type = -1;
         demand(nread(v, &number, sizeof number, &source, &type, NULL) > 0);
@@ -196,7 +197,7 @@ static void full_slots_are_said_to_be(void **unused)
 
 static void live_through(struct actor *a)
 {
-    struct vertex *v = &a->vertex;
+    struct ncube *v = &a->ncube;
     int source = -1, type = 5, number = 3;
     if (a->place == a->stage->machine->nodes) {
         struct cube *cube = v->config.cube;
@@ -207,13 +208,13 @@ static void live_through(struct actor *a)
         struct cube_wiring next = *cube_wiring(cube);
         cube_renew(cube, &next);
         demand(nwrite(v, &number, sizeof number, 0, 5, NULL) == -1);
-        demand(v->failure == VERTEX_RENEWED);
+        demand(v->failure == NCUBE_RENEWED);
         demand(nwrite(v, &number, sizeof number, 0xffff, 5, NULL) > 0);
         return;
     }
     demand(nwrite(v, &number, sizeof number, (int)a->place ^ 1, 1, NULL) > 0);
     demand(nread(v, &number, sizeof number, &source, &type, NULL) == -1);
-    demand(v->failure == VERTEX_RENEWED && v->used == 0);
+    demand(v->failure == NCUBE_RENEWED && v->used == 0);
     source = -1;
     type = 5;
     demand(nread(v, &number, sizeof number, &source, &type, NULL) > 0);
@@ -244,7 +245,7 @@ static void broadcast_round(struct actor *a, unsigned root, unsigned round,
     for (size_t i = 0; i < size; i++) {
         data[i] = a->place == root ? byte_of(root, round, i) : 0;
     }
-    demand(collect_broadcast(&a->vertex, root, data, size) == 0);
+    demand(ncube_broadcast(&a->ncube, root, data, size) == 0);
     for (size_t i = 0; i < size; i++) {
         demand(data[i] == byte_of(root, round, i));
     }
@@ -259,7 +260,7 @@ static void gather_round(struct actor *a, unsigned root, unsigned round,
     for (size_t i = 0; i < size; i++) {
         own[i] = byte_of(a->place, round, i);
     }
-    demand(collect_gather(&a->vertex, root, own, size, all) == 0);
+    demand(ncube_gather(&a->ncube, root, own, size, all) == 0);
     for (unsigned k = 0; k < nodes && a->place == root; k++) {
         for (size_t i = 0; i < size; i++) {
             demand(all[k * size + i] == byte_of(k, round, i));
@@ -287,7 +288,7 @@ static void reduce_round(struct actor *a, unsigned root, unsigned round,
     for (uint32_t i = 0; i < size / 4; i++) {
         data[i] = a->place * (i + 1) + round;
     }
-    demand(collect_reduce(&a->vertex, root, data, size / 4 * 4, 4, add) == 0);
+    demand(ncube_reduce(&a->ncube, root, data, size / 4 * 4, 4, add) == 0);
     for (uint32_t i = 0; i < size / 4 && a->place == root; i++) {
         demand(data[i] == nodes * (nodes - 1) / 2 * (i + 1) + nodes * round);
     }
@@ -299,12 +300,12 @@ static void barrier_round(struct actor *a, unsigned round)
     unsigned nodes = a->stage->machine->nodes;
     ++*count;
     for (uint64_t i = sim_draw(&a->random) % 30; i > 0; i--) {
-        cube_poll(a->vertex.config.cube, a->stage->machine->now_us);
+        cube_poll(a->ncube.config.cube, a->stage->machine->now_us);
         stage_idle(a, 0);
     }
-    demand(collect_barrier(&a->vertex) == 0);
+    demand(ncube_barrier(&a->ncube) == 0);
     demand(*count == nodes);
-    demand(collect_barrier(&a->vertex) == 0);
+    demand(ncube_barrier(&a->ncube) == 0);
     *count = 0; /* by each, before any can be two rounds ahead */
 }
 
@@ -339,25 +340,25 @@ static void nodes_do_things_together(void **unused)
 
 static void do_together_with_care(struct actor *a)
 {
-    while (cube_wiring(a->vertex.config.cube)->generation < 2) {
-        cube_poll(a->vertex.config.cube, a->stage->machine->now_us);
+    while (cube_wiring(a->ncube.config.cube)->generation < 2) {
+        cube_poll(a->ncube.config.cube, a->stage->machine->now_us);
         stage_idle(a, 0);
     }
-    a->vertex.generation = 2;
+    a->ncube.generation = 2;
     for (unsigned round = 0; round < 10; round++) {
         unsigned root = round % a->stage->machine->nodes;
         broadcast_round(a, root, round, LARGE);
-        demand(collect_barrier(&a->vertex) == 0);
+        demand(ncube_barrier(&a->ncube) == 0);
         reduce_round(a, root, round, LARGE);
-        demand(collect_barrier(&a->vertex) == 0);
+        demand(ncube_barrier(&a->ncube) == 0);
         gather_round(a, root, round, 100);
-        demand(collect_barrier(&a->vertex) == 0);
+        demand(ncube_barrier(&a->ncube) == 0);
     }
 }
 
 static void cut_and_renew(struct actor *a)
 {
-    struct cube *cube = a->vertex.config.cube;
+    struct cube *cube = a->ncube.config.cube;
     struct cube_wiring next = *cube_wiring(cube);
     next.dead[next.dead_count++] = (struct cube_dead){0, 1};
     next.dead[next.dead_count++] = (struct cube_dead){5, 1};
@@ -376,7 +377,7 @@ static void and_after_links_have_died(void **unused)
 
 static void miss_a_node(struct actor *a)
 {
-    struct vertex *v = &a->vertex;
+    struct ncube *v = &a->ncube;
     uint32_t data = 1;
     int source = 2, type = -1;
     while (cube_wiring(v->config.cube)->generation < 2) {
@@ -388,17 +389,17 @@ static void miss_a_node(struct actor *a)
     }
     v->generation = 2;
     demand(nwrite(v, &data, 4, 2, 1, NULL) == -1);
-    demand(v->failure == VERTEX_NO_WAY);
+    demand(v->failure == NCUBE_NO_WAY);
     demand(nread(v, &data, 4, &source, &type, NULL) == -1);
-    demand(v->failure == VERTEX_NO_WAY);
+    demand(v->failure == NCUBE_NO_WAY);
     /* Node 1 has done its part; 0 and 3 are neighbours of the dead. */
-    demand(collect_reduce(v, 0, &data, 4, 4, add) == (a->place == 1 ? 0 : -1));
-    demand(a->place == 1 || v->failure == VERTEX_NO_WAY);
+    demand(ncube_reduce(v, 0, &data, 4, 4, add) == (a->place == 1 ? 0 : -1));
+    demand(a->place == 1 || v->failure == NCUBE_NO_WAY);
 }
 
 static void lose_a_node(struct actor *a)
 {
-    struct cube *cube = a->vertex.config.cube;
+    struct cube *cube = a->ncube.config.cube;
     struct cube_wiring next = *cube_wiring(cube);
     next.dead[next.dead_count++] = (struct cube_dead){2, CUBE_WHOLE_NODE};
     cube_renew(cube, &next);
