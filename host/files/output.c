@@ -508,6 +508,10 @@ int host_output_printed(struct host_error *error)
     if (fflush(stdout) == 0 && ferror(stdout) == 0) {
         return error->code;
     }
+    if (errno == 0) { /* an earlier write failed: one more says why */
+        clearerr(stdout);
+        (void)(putchar('\n') == EOF || fflush(stdout));
+    }
     int reason = errno;
     __fpurge(stdout); /* nor is it tried again */
     clearerr(stdout);

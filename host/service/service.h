@@ -23,11 +23,11 @@
 #include "host/base/progress.h"
 #include "host/mesh/tetrahedra.h"
 #include "host/order/order.h"
+#include "host/service/strategies/strategy.h"
 #include "ledger.h"
 #include "machine.h"
 #include "node/message.h"
 #include "spill.h"
-#include "strategies/strategy.h"
 
 enum {
     HOST_PAGES_QUEUED_MAX = 256,
