@@ -1,6 +1,6 @@
 /* All that a node asks of the place where it runs.  A new board fills this
- * struct, calls node_start once and node_step for ever, and touches no other
- * room.
+ * struct, calls node_start once and node_step until it is stopped, and needs
+ * nothing of other rooms but a driver of transport/drivers, where one fits.
  *
  * Memory: the arena is the whole of a node's tables; `fixed` states what the
  * board holds besides (.data, .bss, stack).  Work: every function returns at
@@ -20,17 +20,36 @@
 
 #include "transport/cube.h"
 
-/* Who the node is: straps, in the language of boards. */
+/* Who the node is, as its board was told. */
 struct node_identity {
-    uint16_t self;      /* 0 .. 2^dimension - 1 */
-    uint8_t dimension;  /* of the cube */
-    uint8_t window;     /* frames a link and direction; 0: what suits memory */
-    uint32_t epoch;     /* of this start, never repeated */
-    bool host_wire;     /* at link `dimension`; node 0 has it always */
-    uint8_t host_wires; /* nodes that have, where all below this; see cube.h */
-    uint32_t dead_us;   /* a link that is down or silent for so long is given up
-                           for the run; 0: never */
-    uint32_t serial_baud; /* of the slowest serial wire of the cube; 0: none */
+    /* Its number, 0 .. 2^dimension - 1. */
+    uint16_t self;
+
+    /* Of the cube, 0 .. CUBE_DIMENSION_MAX; the same on all nodes. */
+    uint8_t dimension;
+
+    /* Frames a link and direction, 1 .. LINK_WINDOW_MAX; 0: what suits the
+     * memory: 8 from 2 MiB on, 4 from 1 MiB on, else 2. */
+    uint8_t window;
+
+    /* Of this start; not 0, and never used before by this node. */
+    uint32_t epoch;
+
+    /* The host's second wire leads to this node, to link `dimension`; node 0
+     * always has one. */
+    bool host_wire;
+
+    /* Nodes 0 .. host_wires - 1 have a wire to the host, the same on all: a
+     * power of two, 2 .. CUBE_HOST_WIRES_MAX; 0: node 0 has, and who has
+     * host_wire. */
+    uint8_t host_wires;
+
+    /* Microseconds after which a link that is down or silent is given up for
+     * the run; 0: never. */
+    uint32_t dead_us;
+
+    /* Baud rate of the slowest serial wire of the cube; 0: it has none. */
+    uint32_t serial_baud;
 };
 
 struct node_board {

@@ -28,14 +28,14 @@ struct node {
     uint64_t now_us, stop_us;
 };
 
-/* Frames a window, where the strap leaves it open: an eighth of a small
+/* Frames a window, where the identity leaves it open: an eighth of a small
  * memory at most goes to windows. */
 static uint16_t window_for(size_t bytes)
 {
     return bytes >= 2u << 20 ? 8 : bytes >= 1u << 20 ? 4 : 2;
 }
 
-/* The cube as this node's straps and memory make it. */
+/* The cube as this node's identity and memory make it. */
 static struct cube_config configure(const struct node_identity *identity,
                                     size_t memory)
 {

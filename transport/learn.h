@@ -1,4 +1,4 @@
-/* Who a node is that has neither straps nor a file: it listens on its links
+/* Who a node is that has neither options nor a file: it listens on its links
  * until a neighbour, or the host, greets the node that it expects there.
  * Nothing is sent.
  *

@@ -1,4 +1,4 @@
-/* A node as a process of Linux.  Its straps are arguments, its links are
+/* A node as a process of Linux.  Its options are arguments, its links are
  * connected sockets or open terminals that it inherits, its arena is one
  * mapping made at start: arena, .data, .bss and stack together are --memory.
  * The one who starts it sets RLIMIT_DATA and RLIMIT_STACK, so that the kernel
@@ -87,19 +87,19 @@ static bool read_key(const char *path, uint8_t key[SECURE_KEY_BYTES],
 }
 
 static bool open_wires(struct linux_board *linux_board,
-                       const struct straps *straps, struct tcp_wire *net,
-                       struct linux_fault *fault)
+                       const struct linux_options *options,
+                       struct tcp_wire *net, struct linux_fault *fault)
 {
-    const uint8_t *key = straps->key == NULL ? NULL : linux_board->key;
-    if (key != NULL && !read_key(straps->key, linux_board->key, fault)) {
+    const uint8_t *key = options->key == NULL ? NULL : linux_board->key;
+    if (key != NULL && !read_key(options->key, linux_board->key, fault)) {
         return false;
     }
-    for (unsigned i = 0; i < straps->wires_count; i++) {
+    for (unsigned i = 0; i < options->wires_count; i++) {
         *fault = (struct linux_fault){.where = "--wire",
-                                      .value = straps->wire[i],
+                                      .value = options->wire[i],
                                       .next = "see incode-node --help"};
         if (!linux_wire_open(&linux_board->wire[i],
-                             strchr(straps->wire[i], '=') + 1, key, &net[i],
+                             strchr(options->wire[i], '=') + 1, key, &net[i],
                              fault)) {
             return false;
         }
@@ -108,26 +108,26 @@ static bool open_wires(struct linux_board *linux_board,
 }
 
 /* What the one who starts a node does otherwise. */
-static void start_alone(struct straps *straps, struct linux_board *linux_board,
-                        char **argv)
+static void start_alone(struct linux_options *options,
+                        struct linux_board *linux_board, char **argv)
 {
     uint32_t epoch = 0;
     linux_board->again = argv;
-    while (straps->epoch == 0) {
+    while (options->epoch == 0) {
         (void)getrandom(&epoch, sizeof epoch, 0);
-        straps->epoch = epoch;
+        options->epoch = epoch;
     }
 #ifndef INCODE_SANITIZED
-    struct rlimit stack = {straps->stack, straps->stack};
-    struct rlimit data = {straps->memory - straps->stack,
-                          straps->memory - straps->stack};
+    struct rlimit stack = {options->stack, options->stack};
+    struct rlimit data = {options->memory - options->stack,
+                          options->memory - options->stack};
     (void)setrlimit(RLIMIT_STACK, &stack);
     (void)setrlimit(RLIMIT_DATA, &data);
 #endif
 }
 
 /* Waits until a neighbour has said who this node is; true: as it has wires. */
-static bool learn(const struct node_board *board, struct straps *straps)
+static bool learn(const struct node_board *board, struct linux_options *options)
 {
     static struct learner learner;
     struct linux_board *links = board->context;
@@ -136,26 +136,26 @@ static bool learn(const struct node_board *board, struct straps *straps)
     while (!learner_poll(&learner, &learned)) {
         idle(links, 50000);
     }
-    straps->node = learned.self;
-    straps->dimension = learned.dimension;
-    straps->host_wire =
+    options->node = learned.self;
+    options->dimension = learned.dimension;
+    options->host_wire =
         learned.self != 0 && links->links_count > learned.dimension;
     unsigned count = learned.dimension +
-                     (straps->node == 0 || straps->host_wire != 0 ? 1u : 0u);
+                     (options->node == 0 || options->host_wire != 0 ? 1u : 0u);
     return count == links->links_count;
 }
 
-static struct node_identity identity_of(const struct straps *straps)
+static struct node_identity identity_of(const struct linux_options *options)
 {
     struct node_identity id;
     memset(&id, 0, sizeof id);
-    id.self = (uint16_t)straps->node;
-    id.dimension = (uint8_t)straps->dimension;
-    id.window = (uint8_t)straps->window;
-    id.epoch = (uint32_t)straps->epoch;
-    id.serial_baud = (uint32_t)straps->lines;
-    id.dead_us = (uint32_t)straps->dead;
-    id.host_wire = straps->host_wire != 0;
+    id.self = (uint16_t)options->node;
+    id.dimension = (uint8_t)options->dimension;
+    id.window = (uint8_t)options->window;
+    id.epoch = (uint32_t)options->epoch;
+    id.serial_baud = (uint32_t)options->serial_baud;
+    id.dead_us = (uint32_t)options->dead;
+    id.host_wire = options->host_wire != 0;
     return id;
 }
 
@@ -173,20 +173,20 @@ static void fill_in(struct node_board *board, struct linux_board *linux_board)
 
 /* The arena, and at its end the wires' state; NULL, or what is wrong. */
 static const char *take_memory(struct node_board *board,
-                               const struct straps *straps,
+                               const struct linux_options *options,
                                struct tcp_wire **net)
 {
-    size_t wires = straps->wires_count * sizeof **net;
-    size_t fixed = process_static_bytes() + straps->stack;
+    size_t wires = options->wires_count * sizeof **net;
+    size_t fixed = process_static_bytes() + options->stack;
 #ifdef INCODE_SANITIZED
     /* A sanitizer's own data is not a node's, and nothing limits it. */
-    fixed = SANITIZED_STATIC + straps->stack;
+    fixed = SANITIZED_STATIC + options->stack;
 #endif
     wires = (wires + PROCESS_PAGE - 1) / PROCESS_PAGE * PROCESS_PAGE;
-    if (straps->memory < fixed + wires + PROCESS_PAGE) {
+    if (options->memory < fixed + wires + PROCESS_PAGE) {
         return "does not hold the program's own data and the wires";
     }
-    size_t bytes = (straps->memory - fixed) / PROCESS_PAGE * PROCESS_PAGE;
+    size_t bytes = (options->memory - fixed) / PROCESS_PAGE * PROCESS_PAGE;
     board->arena = process_arena(bytes);
     board->arena_bytes = bytes - wires;
     board->fixed_bytes = fixed + wires;
@@ -204,35 +204,35 @@ static int complain(struct linux_fault fault, int status)
 }
 
 /* 0, or the status to end with. */
-static int prepare(char **argv, struct straps *straps,
+static int prepare(char **argv, struct linux_options *options,
                    struct linux_board *linux_board, struct node_board *board)
 {
     struct linux_fault fault = {0};
     struct tcp_wire *net = NULL;
-    if (!straps_read(argv + 1, straps, &fault)) {
+    if (!linux_options_read(argv + 1, options, &fault)) {
         return complain(fault, 2);
     }
-    if (straps->wires_count > 0 && straps->memory > straps->stack) {
-        start_alone(straps, linux_board, argv);
+    if (options->wires_count > 0 && options->memory > options->stack) {
+        start_alone(options, linux_board, argv);
     }
-    const char *why = take_memory(board, straps, &net);
+    const char *why = take_memory(board, options, &net);
     if (why != NULL) {
         return complain((struct linux_fault){.where = "--memory",
                                              .what = why,
                                              .next = "give another"},
                         4);
     }
-    linux_board->links_count = straps->links_count + straps->wires_count;
-    linux_board->watch_us = straps->watch;
-    if (straps->wires_count > 0 &&
-        !open_wires(linux_board, straps, net, &fault)) {
+    linux_board->links_count = options->links_count + options->wires_count;
+    linux_board->watch_us = options->watch;
+    if (options->wires_count > 0 &&
+        !open_wires(linux_board, options, net, &fault)) {
         return complain(fault, 2);
     }
-    for (unsigned i = 0; i < straps->links_count; i++) {
-        linux_wire_inherit(&linux_board->wire[i], straps->links[i]);
+    for (unsigned i = 0; i < options->links_count; i++) {
+        linux_wire_inherit(&linux_board->wire[i], options->links[i]);
     }
     fill_in(board, linux_board);
-    if (straps->node == STRAPS_UNNAMED && !learn(board, straps)) {
+    if (options->node == LINUX_UNNAMED && !learn(board, options)) {
         return complain(
             (struct linux_fault){.where = "--wire",
                                  .what = "a neighbour takes this node for one "
@@ -240,22 +240,22 @@ static int prepare(char **argv, struct straps *straps,
                                  .next = "see incode cube FILE"},
             2);
     }
-    board->identity = identity_of(straps);
+    board->identity = identity_of(options);
     return 0;
 }
 
 int main(int argc, char **argv)
 {
-    static struct straps straps = {
-        .node = STRAPS_UNNAMED, .stack = 65536, .memory = 4u << 20};
+    static struct linux_options options = {
+        .node = LINUX_UNNAMED, .stack = 65536, .memory = 4u << 20};
     static struct linux_board linux_board;
     static struct node_board board;
     const char *why = NULL;
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
-        straps_help();
+        linux_options_help();
         return 0;
     }
-    int status = prepare(argv, &straps, &linux_board, &board);
+    int status = prepare(argv, &options, &linux_board, &board);
     if (status != 0) {
         return status;
     }

@@ -39,7 +39,7 @@ static const char help[] =
 static const char no_such[] = "no such argument";
 static const char see_help[] = "see incode-node --help";
 
-void straps_help(void)
+void linux_options_help(void)
 {
     (void)!write(STDOUT_FILENO, help, sizeof help - 1);
 }
@@ -56,21 +56,22 @@ static bool read_number(const char **text, uint64_t *value)
     return good;
 }
 
-static const char *read_links(const char *text, struct straps *straps)
+static const char *read_links(const char *text, struct linux_options *options)
 {
     uint64_t fd;
     while (*text != '\0') {
-        if (straps->links_count == CUBE_LINKS_MAX || !read_number(&text, &fd) ||
-            fd > INT16_MAX || (*text != ',' && *text != '\0')) {
+        if (options->links_count == CUBE_LINKS_MAX ||
+            !read_number(&text, &fd) || fd > INT16_MAX ||
+            (*text != ',' && *text != '\0')) {
             return "not open files as in 5,6,7";
         }
-        straps->links[straps->links_count++] = (int)fd;
+        options->links[options->links_count++] = (int)fd;
         text += *text == ',';
     }
     return NULL;
 }
 
-static const char *read_wire(const char *text, struct straps *straps)
+static const char *read_wire(const char *text, struct linux_options *options)
 {
     const char *at = text;
     uint64_t link;
@@ -80,31 +81,31 @@ static const char *read_wire(const char *text, struct straps *straps)
     if (link >= CUBE_LINKS_MAX) {
         return "no such link";
     }
-    if (straps->wire[link] != NULL) {
+    if (options->wire[link] != NULL) {
         return "that link has a wire already";
     }
-    straps->wire[link] = text;
-    straps->wires_count++;
+    options->wire[link] = text;
+    options->wires_count++;
     return NULL;
 }
 
 /* An argument and its value; what is wrong with it, or NULL. */
 static const char *read_one(const char *name, const char *text,
-                            struct straps *straps)
+                            struct linux_options *options)
 {
     const struct {
         const char *name;
         uint64_t *value, most;
-    } known[] = {{"--node", &straps->node, (1u << CUBE_DIMENSION_MAX) - 1},
-                 {"--dimension", &straps->dimension, CUBE_DIMENSION_MAX},
-                 {"--memory", &straps->memory, UINT64_C(1) << 40},
-                 {"--stack", &straps->stack, UINT64_C(1) << 40},
-                 {"--window", &straps->window, LINK_WINDOW_MAX},
-                 {"--epoch", &straps->epoch, UINT32_MAX},
-                 {"--lines", &straps->lines, UINT32_MAX},
-                 {"--host-wire", &straps->host_wire, 1},
-                 {"--dead", &straps->dead, UINT32_MAX},
-                 {"--watch", &straps->watch, UINT32_MAX}};
+    } known[] = {{"--node", &options->node, (1u << CUBE_DIMENSION_MAX) - 1},
+                 {"--dimension", &options->dimension, CUBE_DIMENSION_MAX},
+                 {"--memory", &options->memory, UINT64_C(1) << 40},
+                 {"--stack", &options->stack, UINT64_C(1) << 40},
+                 {"--window", &options->window, LINK_WINDOW_MAX},
+                 {"--epoch", &options->epoch, UINT32_MAX},
+                 {"--lines", &options->serial_baud, UINT32_MAX},
+                 {"--host-wire", &options->host_wire, 1},
+                 {"--dead", &options->dead, UINT32_MAX},
+                 {"--watch", &options->watch, UINT32_MAX}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
         if (strcmp(name, known[i].name) == 0) {
             bool good = read_number(&text, known[i].value) && *text == '\0';
@@ -114,45 +115,46 @@ static const char *read_one(const char *name, const char *text,
         }
     }
     if (strcmp(name, "--links") == 0) {
-        return read_links(text, straps);
+        return read_links(text, options);
     }
     if (strcmp(name, "--wire") == 0) {
-        return read_wire(text, straps);
+        return read_wire(text, options);
     }
     if (strcmp(name, "--board") == 0) {
         return strcmp(text, "linux") == 0 ? NULL
                                           : "another board's program starts it";
     }
     if (strcmp(name, "--key") == 0) {
-        straps->key = text;
+        options->key = text;
         return NULL;
     }
     return no_such;
 }
 
 /* Every link has a wire, and there are no others. */
-static bool wires_fit(const struct straps *straps)
+static bool wires_fit(const struct linux_options *options)
 {
-    unsigned links = (unsigned)straps->dimension +
-                     (straps->node == 0 || straps->host_wire != 0 ? 1 : 0);
-    if (straps->node == STRAPS_UNNAMED) {
-        links = straps->links_count + straps->wires_count;
+    unsigned links = (unsigned)options->dimension +
+                     (options->node == 0 || options->host_wire != 0 ? 1 : 0);
+    if (options->node == LINUX_UNNAMED) {
+        links = options->links_count + options->wires_count;
         if (links == 0) {
             return false; /* nobody could say who it is */
         }
     }
-    if (straps->wires_count == 0) {
-        return straps->links_count == links;
+    if (options->wires_count == 0) {
+        return options->links_count == links;
     }
     for (unsigned i = 0; i < links; i++) {
-        if (straps->wire[i] == NULL) {
+        if (options->wire[i] == NULL) {
             return false;
         }
     }
-    return straps->links_count == 0 && straps->wires_count == links;
+    return options->links_count == 0 && options->wires_count == links;
 }
 
-bool straps_read(char **argv, struct straps *straps, struct linux_fault *fault)
+bool linux_options_read(char **argv, struct linux_options *options,
+                        struct linux_fault *fault)
 {
     memset(fault, 0, sizeof *fault);
     fault->next = see_help;
@@ -162,21 +164,21 @@ bool straps_read(char **argv, struct straps *straps, struct linux_fault *fault)
         if (argv[1] == NULL) {
             return false;
         }
-        fault->what = read_one(argv[0], argv[1], straps);
+        fault->what = read_one(argv[0], argv[1], options);
         if (fault->what != NULL) {
             fault->value = fault->what == no_such ? NULL : argv[1];
             return false;
         }
     }
-    if (straps->node != STRAPS_UNNAMED &&
-        straps->node >= UINT64_C(1) << straps->dimension) {
+    if (options->node != LINUX_UNNAMED &&
+        options->node >= UINT64_C(1) << options->dimension) {
         fault->where = "--node";
         fault->what = "there is no such node in a cube of that --dimension";
         return false;
     }
-    fault->where = straps->links_count > 0 ? "--links" : "--wire";
+    fault->where = options->links_count > 0 ? "--links" : "--wire";
     fault->what = "not one for each link: those to neighbours, and to the host "
                   "from node 0 and with --host-wire 1";
     fault->next = "incode cube FILE prints those of a cube";
-    return wires_fit(straps);
+    return wires_fit(options);
 }

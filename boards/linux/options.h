@@ -2,11 +2,11 @@
  *
  * Memory: the caller's; texts stay those of the arguments.  Work: one pass.
  *
- *     if (!straps_read(argv + 1, &straps, &fault))
+ *     if (!linux_options_read(argv + 1, &options, &fault))
  *         fault_print(&fault);
  */
-#ifndef BOARDS_LINUX_STRAPS_H
-#define BOARDS_LINUX_STRAPS_H
+#ifndef BOARDS_LINUX_OPTIONS_H
+#define BOARDS_LINUX_OPTIONS_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -14,23 +14,32 @@
 #include "transport/cube.h"
 #include "fault.h"
 
-#define STRAPS_UNNAMED UINT64_MAX /* as a node: it is to learn who it is */
+#define LINUX_UNNAMED UINT64_MAX /* as a node: it is to learn who it is */
 
-struct straps {
-    uint64_t node, dimension, memory, stack, window, epoch, lines, host_wire,
-        dead, watch;
-    int links[CUBE_LINKS_MAX];
+struct linux_options {
+    uint64_t node;        /* its number, or LINUX_UNNAMED */
+    uint64_t dimension;   /* of the cube */
+    uint64_t memory;      /* bytes of data memory in all, stack included */
+    uint64_t stack;       /* bytes of it */
+    uint64_t window;      /* frames a link and direction; 0: by memory */
+    uint64_t epoch;       /* of this start; 0: it draws one */
+    uint64_t serial_baud; /* of the slowest serial wire; 0: there is none */
+    uint64_t host_wire;   /* 1: it has a wire to the host although not node 0 */
+    uint64_t dead;        /* microseconds until a link is given up; 0: never */
+    uint64_t watch;       /* microseconds to stay awake with nothing to do */
+    int links[CUBE_LINKS_MAX]; /* open files, given by who starts the node */
     unsigned links_count;
-    /* That the node opens itself: the arguments, as "2=call:10.0.0.1:7001". */
+    /* Wires that it opens itself: the arguments, as "2=call:10.0.0.1:7001". */
     const char *wire[CUBE_LINKS_MAX];
     unsigned wires_count;
-    const char *key; /* a file */
+    const char *key; /* a file, or NULL */
 };
 
 /* False: *fault says which argument is wrong. */
-bool straps_read(char **argv, struct straps *straps, struct linux_fault *fault);
+bool linux_options_read(char **argv, struct linux_options *options,
+                        struct linux_fault *fault);
 
 /* What --help prints. */
-void straps_help(void);
+void linux_options_help(void);
 
 #endif

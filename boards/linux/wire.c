@@ -4,9 +4,9 @@
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "boards/process.h"
 #include "transport/drivers/secure_sodium.h"
 #include "transport/drivers/wait.h"
 
@@ -17,7 +17,7 @@ void linux_wire_inherit(struct linux_wire *wire, int fd)
     memset(wire, 0, sizeof *wire);
     wire->kind = isatty(fd) == 1 ? LINUX_TERMINAL : LINUX_SOCKET;
     if (wire->kind == LINUX_TERMINAL) {
-        serial_pipe_init(&wire->line, fd, 0);
+        serial_pipe_init(&wire->serial, fd, 0);
     } else {
         tcp_pipe_init(&wire->tcp, fd);
     }
@@ -57,16 +57,13 @@ static bool open_net(struct linux_wire *wire, const char *address, bool listens,
     return true;
 }
 
-/* A port that is not there, or vanished, is looked for from time to time. */
+/* A device that is not there, or vanished, is looked for from time to time. */
 static void recover(void *context)
 {
     struct linux_wire *wire = context;
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    uint64_t now_us =
-        (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
-    serial_close(wire->line.fd);
-    wire->line.fd = -1;
+    uint64_t now_us = process_clock_us(CLOCK_MONOTONIC);
+    serial_close(wire->serial.fd);
+    wire->serial.fd = -1;
     if (now_us - wire->look_us < LOOK_US) {
         return;
     }
@@ -74,14 +71,14 @@ static void recover(void *context)
     int fd = serial_open(wire->device, wire->baud, wire->rts_cts);
     wire->reason = fd < 0 ? errno : 0;
     if (fd >= 0) {
-        serial_pipe_init(&wire->line, fd, wire->baud);
-        wire->line.recover = recover;
-        wire->line.context = wire;
+        serial_pipe_init(&wire->serial, fd, wire->baud);
+        wire->serial.recover = recover;
+        wire->serial.context = wire;
     }
 }
 
 /* From the end, as a device's name may have colons of its own. */
-static bool read_line(struct linux_wire *wire, const char *text)
+static bool read_serial(struct linux_wire *wire, const char *text)
 {
     static const char flow[] = ":rtscts";
     size_t size = strlen(text);
@@ -103,22 +100,22 @@ static bool read_line(struct linux_wire *wire, const char *text)
     return true;
 }
 
-static bool open_line(struct linux_wire *wire, const char *text,
-                      struct linux_fault *fault)
+static bool open_serial(struct linux_wire *wire, const char *text,
+                        struct linux_fault *fault)
 {
-    if (!read_line(wire, text)) {
+    if (!read_serial(wire, text)) {
         fault->what = "not a device and its rate";
         fault->next = "write serial:/dev/ttyS0:115200 or "
                       "serial:/dev/ttyS0:115200:rtscts";
         return false;
     }
     wire->kind = LINUX_TERMINAL;
-    serial_pipe_init(&wire->line, -1, wire->baud);
-    wire->line.recover = recover;
-    wire->line.context = wire;
+    serial_pipe_init(&wire->serial, -1, wire->baud);
+    wire->serial.recover = recover;
+    wire->serial.context = wire;
     recover(wire);
-    if (wire->line.fd < 0 && access(wire->device, F_OK) == 0) {
-        fault->what = "does not open so";
+    if (wire->serial.fd < 0 && access(wire->device, F_OK) == 0) {
+        fault->what = "does not open at that rate";
         fault->reason = wire->reason;
         fault->next = "end who uses it, or give a rate that it knows";
         return false;
@@ -140,7 +137,7 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
         return open_net(wire, text + 5, false, key, fault);
     }
     if (strncmp(text, "serial:", 7) == 0) {
-        return open_line(wire, text + 7, fault);
+        return open_serial(wire, text + 7, fault);
     }
     fault->what = "not one of listen:, call: and serial:";
     return false;
@@ -148,7 +145,7 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire)
 {
-    return wire->kind == LINUX_TERMINAL ? serial_link_pipe(&wire->line)
+    return wire->kind == LINUX_TERMINAL ? serial_link_pipe(&wire->serial)
            : wire->kind == LINUX_NET    ? tcp_wire_pipe(wire->net)
                                         : tcp_link_pipe(&wire->tcp);
 }
@@ -159,9 +156,10 @@ static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds)
     if (wire->kind == LINUX_NET) {
         return tcp_wire_events(wire->net, fds);
     }
-    bool line = wire->kind == LINUX_TERMINAL;
-    fds->fd = line ? wire->line.fd : wire->tcp.fd;
-    fds->events = line ? serial_events(&wire->line) : tcp_events(&wire->tcp);
+    bool serial = wire->kind == LINUX_TERMINAL;
+    fds->fd = serial ? wire->serial.fd : wire->tcp.fd;
+    fds->events =
+        serial ? serial_events(&wire->serial) : tcp_events(&wire->tcp);
     return fds->events != 0 ? 1 : 0;
 }
 
@@ -199,8 +197,8 @@ void linux_wires_idle(struct linux_wire *wires, unsigned count,
     for (unsigned i = 0; i < count; i++) {
         const struct linux_wire *wire = &wires[i];
         if (wire->kind == LINUX_TERMINAL &&
-            serial_wait_us(&wire->line) < wait_us) {
-            wait_us = serial_wait_us(&wire->line);
+            serial_wait_us(&wire->serial) < wait_us) {
+            wait_us = serial_wait_us(&wire->serial);
         }
         if (wire->kind == LINUX_NET && tcp_wire_wait_us(wire->net) < wait_us) {
             wait_us = tcp_wire_wait_us(wire->net);

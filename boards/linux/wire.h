@@ -21,12 +21,12 @@ enum linux_wire_kind { LINUX_SOCKET, LINUX_TERMINAL, LINUX_NET };
 
 struct linux_wire {
     enum linux_wire_kind kind;
-    struct tcp_pipe tcp;     /* a socket from the one who started the node */
-    struct serial_pipe line; /* a terminal */
-    struct tcp_wire *net;    /* TCP, by calling and listening, */
-    const char *text;        /* as it was asked for; */
-    bool told;               /* its trouble was told */
-    char device[128];        /* of a terminal that was opened here */
+    struct tcp_pipe tcp;       /* a socket from the one who started the node */
+    struct serial_pipe serial; /* a terminal */
+    struct tcp_wire *net;      /* TCP, by calling and listening, */
+    const char *text;          /* as it was asked for; */
+    bool told;                 /* its trouble was told */
+    char device[128];          /* of a terminal that was opened here */
     uint32_t baud;
     bool rts_cts;
     uint64_t look_us; /* when it was last looked for, */

@@ -1,6 +1,6 @@
-/* A node as a rank of MPI.  It has no straps of its own: rank 0, the host, says
- * how large the cube is and how much memory a node has, and rank i + 1 is node
- * i.  Its links are pipes to the ranks of its neighbours.
+/* A node as a rank of MPI.  It has no options of its own: rank 0, the host,
+ * says how large the cube is and how much memory a node has, and rank i + 1 is
+ * node i.  Its links are pipes to the ranks of its neighbours.
  *
  * Memory: a node's is --memory, as on other boards: its arena, its .data and
  * .bss, and a stack.  Nothing but the arena is enforced: what MPI allocates,

@@ -54,11 +54,11 @@ gather() {
 }
 # start_nodes CUBE [PATTERN]: those that the user starts; $nodes.
 start_nodes() {
-    local straps
+    local options
     nodes=
-    while read -r straps; do
+    while read -r options; do
         # shellcheck disable=SC2086
-        "$BUILD/"$straps 2> /dev/null < /dev/null &
+        "$BUILD/"$options 2> /dev/null < /dev/null &
         nodes="$nodes $!"
     done < <("$INCODE" cube "$1" | grep -e "${2:-^incode-node }")
 }
@@ -101,12 +101,12 @@ wrong_keys() {
 	key = "cube.key";
 	links = ( { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 50))"; } );
 END
-    "$INCODE" cube "$scratch/one.cube" > "$scratch/straps"
+    "$INCODE" cube "$scratch/one.cube" > "$scratch/options"
     openssl rand -hex 32 > "$scratch/other.key"
     refused() { # NAME SED
         local began=$SECONDS
         # shellcheck disable=SC2046
-        "$BUILD/"$(sed "$2" "$scratch/straps") 2> "$scratch/said" &
+        "$BUILD/"$(sed "$2" "$scratch/options") 2> "$scratch/said" &
         node=$!
         timeout 60 "$INCODE" run "$points" -q -o "$scratch/out.npy" \
             --patience 2 --cube "$scratch/one.cube" 2> "$scratch/errors"
@@ -143,9 +143,9 @@ END
     check 'links/another key between nodes' "$(cat "$scratch/said")" \
         grep -q "^incode-node: --wire .*$((base + 52)): answers, but with" \
         "$scratch/said"
-    sed -i 's/--key [^ ]*//; s/127.0.0.1/0.0.0.0/' "$scratch/straps"
+    sed -i 's/--key [^ ]*//; s/127.0.0.1/0.0.0.0/' "$scratch/options"
     # shellcheck disable=SC2046
-    "$BUILD/"$(cat "$scratch/straps") 2> "$scratch/said" &
+    "$BUILD/"$(cat "$scratch/options") 2> "$scratch/said" &
     node=$!
     sleep 0.3
     kill $node
@@ -354,9 +354,9 @@ cat > "$scratch/nameless.cube" <<-END
 	          { node = 1; to = 0; tcp = "127.0.0.1:$((base + 91))"; } );
 END
 nameless=
-while read -r straps; do
+while read -r options; do
     # shellcheck disable=SC2086
-    "$BUILD/"$straps 2> "$scratch/said" &
+    "$BUILD/"$options 2> "$scratch/said" &
     nameless="$! $nameless"
 done < <("$INCODE" cube "$scratch/nameless.cube" | grep '^incode-node ' |
     sed 's/--node [0-9]* //; s/--dimension [0-9]* //' | tac)

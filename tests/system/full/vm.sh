@@ -98,13 +98,13 @@ for _ in $(seq 50); do
     sleep 0.1
 done
 make_cube /dev/none "$line" > "$scratch/out.cube"
-"$INCODE" cube "$scratch/out.cube" > "$scratch/straps"
+"$INCODE" cube "$scratch/out.cube" > "$scratch/options"
 nodes=
-while read -r straps; do
+while read -r options; do
     # shellcheck disable=SC2086
-    "$BUILD/"$straps 2>> "$scratch/nodes" &
+    "$BUILD/"$options 2>> "$scratch/nodes" &
     nodes="$nodes $!"
-done < "$scratch/straps"
+done < "$scratch/options"
 wait $machine
 status=$?
 # shellcheck disable=SC2086

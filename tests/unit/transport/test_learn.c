@@ -1,5 +1,5 @@
-/* Nodes without straps learn who they are from their neighbours, over bad wires
- * too, and never from noise or from a wire in another socket. */
+/* Nodes without options learn who they are from their neighbours, over bad
+ * wires too, and never from noise or from a wire in another socket. */
 #include "cube_machine.h"
 
 #include "transport/learn.h"
