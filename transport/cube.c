@@ -153,10 +153,13 @@ static unsigned links_of(const struct cube_config *config)
 static bool sound(const struct cube_config *config)
 {
     unsigned wires = config->host_wires;
+    if (config->dimension > CUBE_DIMENSION_MAX) {
+        return false;
+    }
     bool even = (wires & (wires - 1)) == 0 && wires <= CUBE_HOST_WIRES_MAX &&
                 wires <= 1u << config->dimension &&
                 (wires < 2 || config->spare_node == 0);
-    return even && config->dimension <= CUBE_DIMENSION_MAX &&
+    return even &&
            (config->self == CUBE_HOST
                 ? config->gateway == 0 ||
                       config->gateway == config->spare_node ||

@@ -72,31 +72,67 @@ struct cube_wiring {
     struct cube_wrong wrong[CUBE_WRONG_MAX];
 };
 
+/* cube_arena_bytes() is 0, and cube_init gives NULL, where a limit is not kept,
+ * or one of struct link_config.  A field that has a default takes it where it
+ * is 0.  All ends of a cube are given the same where it says so. */
 struct cube_config {
-    uint16_t self; /* 0 .. 2^dimension - 1, or CUBE_HOST */
+    /* This node, 0 .. 2^dimension - 1; or CUBE_HOST. */
+    uint16_t self;
+
+    /* Of the cube: 2^dimension nodes; 0 .. CUBE_DIMENSION_MAX.  The same at all
+     * ends. */
     uint8_t dimension;
-    uint16_t window; /* frames a link and direction, 1 .. LINK_WINDOW_MAX */
-    uint32_t epoch;  /* of this start of the node, never repeated */
-    struct link_pipe pipes[CUBE_LINKS_MAX]; /* the bytes of each link; the host
-                                               uses pipes[0], to node 0 */
-    /* A second wire to the host: at the host pipes[1], to this node; at that
-     * node its link `dimension`, as node 0 has it. */
-    uint16_t spare_node; /* host's; 0: none */
-    /* Instead of it: the host has a wire to each of nodes 0 .. host_wires - 1,
-     * the power of two that all ends are told: pipes[i] to node i.  What goes
-     * between it and a node takes that node's wire, or that of the node with
-     * the same low bits. */
-    uint8_t host_wires; /* 2 .. CUBE_HOST_WIRES_MAX; 0: to node 0 */
-    bool host_wire;     /* node's; node 0 has one always */
-    uint16_t gateway;   /* host's: of the first generation */
-    uint32_t dead_us;   /* a link that was up, and then was down or silent for
-                           so long, is dead; 0: never */
-    /* Zero means the default. */
-    uint16_t host_window;   /* of the host's link, at both ends; `window` */
-    uint16_t frame_payload; /* bytes, a multiple of 8, the same on both ends of
-                               a wire; a message a frame */
-    uint16_t staging;       /* frames encoded ahead of the pipe; see link.h */
-    uint32_t serial_baud;   /* see cube_for_serial */
+
+    /* Frames a link and direction that may be under way.  No default; 1 ..
+     * LINK_WINDOW_MAX, and enough for a message. */
+    uint16_t window;
+
+    /* This start of this end.  No default; 1 .. 2^32 - 1, never repeated. */
+    uint32_t epoch;
+
+    /* The bytes of each link: pipes[d] of dimension d, then those of the host
+     * port, if the node has one; at the host, those to node 0 and to the others
+     * that have a host port.  No default. */
+    struct link_pipe pipes[CUBE_LINKS_MAX];
+
+    /* At the host: another node that has a host port, beside node 0; pipes[1]
+     * leads there.  Default: none; 1 .. 2^dimension - 1, with host_wires 0. */
+    uint16_t spare_node;
+
+    /* Instead of it: nodes 0 .. host_wires - 1 have host ports, pipes[i] of the
+     * host leads to node i, and what goes between the host and a node takes
+     * that node's, or that of the node with the same low bits.  The same at all
+     * ends.  Default, as for 1: node 0 alone; a power of two, up to
+     * CUBE_HOST_WIRES_MAX and 2^dimension. */
+    uint8_t host_wires;
+
+    /* At the spare node: that it has a host port.  Default: it has none; node 0
+     * has one always. */
+    bool host_wire;
+
+    /* At the host: the host gateway of the first generation.  Default: node 0;
+     * or a node that has a host port. */
+    uint16_t gateway;
+
+    /* Microseconds after which a link that was up, and then was down or silent,
+     * is dead.  Default: never; no limit. */
+    uint32_t dead_us;
+
+    /* Frames a direction on links to the host.  The same at both ends of such a
+     * link.  Default: window; limits as there. */
+    uint16_t host_window;
+
+    /* Bytes of a message in a frame.  The same at both ends of a wire.
+     * Default: a message a frame; limits: see link.h. */
+    uint16_t frame_payload;
+
+    /* Frames encoded ahead of the pipe.  Default and limits: see link.h. */
+    uint16_t staging;
+
+    /* Of the slowest serial wire of the cube: cube_for_serial() sets it.  The
+     * same at all ends.  Default: there is none; what is below 300 counts as
+     * 300. */
+    uint32_t serial_baud;
 };
 
 struct cube_message {

@@ -20,6 +20,19 @@ static void say_link(struct cube_text *t, const char *before, unsigned link)
     cube_text_number(t, link);
 }
 
+static void say_why(struct cube_text *t, unsigned refusal, unsigned dimension)
+{
+    if (refusal == LINK_WRONG_VERSION) {
+        cube_text_put(t, " has another protocol version, expected ");
+        cube_text_number(t, LINK_VERSION);
+    } else if (refusal == LINK_WRONG_GREETING) {
+        cube_text_put(t, " has another cube dimension, expected ");
+        cube_text_number(t, dimension);
+    } else {
+        cube_text_put(t, " has other sizes of frames or messages");
+    }
+}
+
 void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
                      uint16_t spare_node, char text[CUBE_FAULT_BYTES])
 {
@@ -42,11 +55,7 @@ void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
         say_link(&t, ", expected ", link);
     } else {
         say_end(&t, ": ", wrong->peer_node);
-        cube_text_put(&t, wrong->refusal == LINK_WRONG_VERSION
-                              ? " speaks another version of the protocol"
-                          : wrong->refusal == LINK_WRONG_GREETING
-                              ? " is set to a cube of another dimension"
-                              : " has other sizes of frames or messages");
+        say_why(&t, wrong->refusal, dimension);
     }
 }
 

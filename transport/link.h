@@ -23,6 +23,7 @@
 #include <stdint.h>
 
 enum {
+    LINK_VERSION = 1,            /* of the protocol on the wire */
     LINK_WINDOW_MAX = 64,        /* frames a direction */
     LINK_FRAME_PAYLOAD_MIN = 32, /* bytes */
     LINK_FRAME_PAYLOAD_MAX = 1616,
@@ -103,28 +104,66 @@ struct link_statistics {
     uint32_t timeout_us;                          /* retransmission timer */
 };
 
-/* Zero means the default for all but pipe, epoch and window. */
+/* link_bytes() is 0, and link_init gives NULL, where a limit is not kept.  A
+ * field that has a default takes it where it is 0. */
 struct link_config {
+    /* The bytes beneath.  No default; both functions are given. */
     struct link_pipe pipe;
-    uint32_t epoch; /* of this start, never repeated, never 0 */
-    uint16_t node;  /* who this end is, which port of it, */
+
+    /* This start of this end.  No default; 1 .. 2^32 - 1, never repeated. */
+    uint32_t epoch;
+
+    /* Who this end is, and which of its ports; who must be at the other end,
+     * and by which port.  No limits. */
+    uint16_t node;
     uint8_t port;
-    uint8_t peer_port; /* and who must be at the other */
+    uint8_t peer_port;
     uint16_t peer_node;
-    uint8_t greeting; /* of the level above: the peer's must be the same,
-                         unless one of them is 0 */
-    bool keeps_peer;  /* until it was not heard for silence_us: another epoch is
-                         told that the link is in use */
-    uint16_t window;  /* frames a direction, 1 .. LINK_WINDOW_MAX */
-    uint16_t message_max;    /* bytes; default LINK_MESSAGE_MAX */
-    uint16_t frame_payload;  /* bytes; default: a message a frame */
-    uint16_t staging;        /* frames; default half a window, 4 to 8 */
-    uint32_t timeout_min_us; /* retransmission: 100 ms, */
-    uint32_t timeout_max_us; /* and 1 s; a slow wire wants more */
-    uint32_t ack_delay_us;   /* of acknowledgements; 5 ms */
-    uint32_t hello_us;       /* between greetings; 50 ms */
-    uint32_t keep_alive_us;  /* a frame at least so often; 500 ms */
-    uint32_t silence_us;     /* then the peer counts as silent; 3 s */
+
+    /* What the level above agrees on: the peer's must be the same, unless one
+     * of them is 0.  No limits. */
+    uint8_t greeting;
+
+    /* Keep to the peer of now until it was silent for silence_us, and tell
+     * another epoch that the link is in use?  Default: no. */
+    bool keeps_peer;
+
+    /* Frames a direction that may be under way.  No default; 1 ..
+     * LINK_WINDOW_MAX, and enough for a message of message_max. */
+    uint16_t window;
+
+    /* Bytes of the longest message.  Default: LINK_MESSAGE_MAX, the most. */
+    uint16_t message_max;
+
+    /* Bytes of a message in a frame.  Default: message_max; a multiple of 8,
+     * LINK_FRAME_PAYLOAD_MIN .. LINK_FRAME_PAYLOAD_MAX. */
+    uint16_t frame_payload;
+
+    /* Frames encoded ahead of the pipe.  Default: half a window, 4 to 8, no
+     * more than the window; up to LINK_WINDOW_MAX. */
+    uint16_t staging;
+
+    /* Microseconds after which a frame that was not acknowledged is sent again:
+     * at least, and at most.  Defaults: 100,000 and 1,000,000; a slow wire
+     * wants more.  The first is no larger than the second. */
+    uint32_t timeout_min_us;
+    uint32_t timeout_max_us;
+
+    /* Microseconds that an acknowledgement may wait for data to ride on.
+     * Default: 5,000; no limit. */
+    uint32_t ack_delay_us;
+
+    /* Microseconds between greetings while the link is not up.  Default:
+     * 50,000; no limit. */
+    uint32_t hello_us;
+
+    /* Microseconds after which an end that has nothing to say sends a frame
+     * nevertheless.  Default: 500,000; no limit. */
+    uint32_t keep_alive_us;
+
+    /* Microseconds without a frame after which the peer counts as silent.
+     * Default: 3,000,000; no limit. */
+    uint32_t silence_us;
 };
 
 /* PROTOCOL.md's settings for a serial wire: all but pipe, epoch, who is at its
@@ -141,8 +180,8 @@ size_t link_bytes(const struct link_config *config);
 
 struct link;
 
-/* A link lives at the start of its
- * memory, which is aligned to 8 bytes and holds link_bytes(). NULL: no. */
+/* A link lives at the start of its memory, which is aligned to 8 bytes and
+ * holds link_bytes().  NULL: it does not, or the config is not sound. */
 struct link *link_init(void *memory, size_t bytes,
                        const struct link_config *config);
 

@@ -14,7 +14,6 @@
 #include "link.h"
 
 enum {
-    LINK_VERSION = 1,
     LINK_HELLO_SIZE = 24,
     LINK_SACK_SIZE = 8,
     LINK_CANDIDATE_HELLOS = 20 /* then an unconfirmed peer is forgotten */

@@ -307,9 +307,9 @@ static void wrong_wires_in_words(void **unused)
         {{CUBE_HOST, 3, 1, 1, LINK_WRONG_WIRE},
          "the host link 1 is wired to node 3, expected node 6"},
         {{2, 3, 0, 0, LINK_WRONG_VERSION},
-         "node 2 link 0: node 3 speaks another version of the protocol"},
+         "node 2 link 0: node 3 has another protocol version, expected 1"},
         {{2, 3, 0, 0, LINK_WRONG_GREETING},
-         "node 2 link 0: node 3 is set to a cube of another dimension"},
+         "node 2 link 0: node 3 has another cube dimension, expected 10"},
         {{2, 3, 0, 0, LINK_WRONG_SIZES},
          "node 2 link 0: node 3 has other sizes of frames or messages"},
     };
@@ -321,42 +321,71 @@ static void wrong_wires_in_words(void **unused)
     }
 }
 
-static void configs_that_make_no_sense(void **unused)
+static bool starts(const struct cube_config *config)
+{
+    size_t bytes = cube_arena_bytes(config), room = 1 << 21;
+    void *arena = aligned_alloc(64, room);
+    assert_non_null(arena);
+    struct cube *cube = cube_init(arena, room, config);
+    assert_true(bytes <= room && (cube != NULL) == (bytes > 0));
+    if (cube != NULL) {
+        assert_null(cube_init(arena, bytes - 1, config));
+    }
+    free(arena);
+    return cube != NULL;
+}
+
+/* That a field may have the one value, and may not have the other. */
+#define limit(config, field, good, bad)                                        \
+    do {                                                                       \
+        struct cube_config c_ = config;                                        \
+        c_.field = good;                                                       \
+        assert_true(starts(&c_));                                              \
+        c_.field = bad;                                                        \
+        assert_false(starts(&c_));                                             \
+    } while (0)
+
+static void limits_of_a_config(void **unused)
 {
     struct sim_end nowhere = {NULL, NULL, NULL};
-    struct link_pipe pipe = sim_pipe(&nowhere);
-    struct cube_config good = {.self = 3, .dimension = 2, .window = 1};
-    struct cube_config c;
+    struct link_pipe pipe = sim_pipe(&nowhere), none = {NULL, NULL, NULL};
+    struct cube_config node = {
+        .self = 3, .dimension = 2, .window = 4, .epoch = 1};
     (void)unused;
-    good.epoch = 1;
     for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
-        good.pipes[d] = pipe;
+        node.pipes[d] = pipe;
     }
-    assert_true(cube_arena_bytes(&good) > 0);
-    c = good;
-    c.self = 4;
-    assert_int_equal(cube_arena_bytes(&c), 0);
-    c = good;
-    c.window = 0;
-    assert_int_equal(cube_arena_bytes(&c), 0);
-    c.window = LINK_WINDOW_MAX + 1;
-    assert_int_equal(cube_arena_bytes(&c), 0);
-    c = good;
-    c.epoch = 0;
-    assert_int_equal(cube_arena_bytes(&c), 0);
-    c = good;
-    c.frame_payload = 408; /* a message would not fit a window of one */
-    assert_int_equal(cube_arena_bytes(&c), 0);
-    c = good;
-    c.host_wires = 4;
-    assert_true(cube_arena_bytes(&c) > cube_arena_bytes(&good));
-    c.host_wires = 3;
-    assert_int_equal(cube_arena_bytes(&c), 0);
-    c.host_wires = 8; /* of 4 nodes */
-    assert_int_equal(cube_arena_bytes(&c), 0);
-    c = good;
-    c.dimension = CUBE_DIMENSION_MAX + 1;
-    assert_int_equal(cube_arena_bytes(&c), 0);
+    struct cube_config host = node;
+    host.self = CUBE_HOST;
+    limit(node, self, 3, 4);
+    limit(node, self, CUBE_HOST, CUBE_HOST - 1);
+    limit(node, dimension, CUBE_DIMENSION_MAX, CUBE_DIMENSION_MAX + 1);
+    limit(node, dimension, 2, 255);
+    limit(node, window, 1, 0);
+    limit(node, window, LINK_WINDOW_MAX, LINK_WINDOW_MAX + 1);
+    limit(node, epoch, UINT32_MAX, 0);
+    limit(node, pipes[1], pipe, none);
+    limit(host, pipes[0], pipe, none);
+    limit(host, spare_node, 3, 4);
+    limit(host, host_wires, 4, 3);
+    limit(host, host_wires, 4, 8); /* of 4 nodes */
+    limit(host, gateway, 0, 3);
+    limit(host, host_window, LINK_WINDOW_MAX, LINK_WINDOW_MAX + 1);
+    limit(node, frame_payload, 1608, 1612);
+    limit(node, frame_payload, LINK_FRAME_PAYLOAD_MAX,
+          LINK_FRAME_PAYLOAD_MAX + 8);
+    limit(node, frame_payload, 408, 400); /* a message of 1,608, 4 frames */
+    limit(node, staging, LINK_WINDOW_MAX, LINK_WINDOW_MAX + 1);
+    host.dimension = CUBE_DIMENSION_MAX;
+    limit(host, host_wires, CUBE_HOST_WIRES_MAX, 2 * CUBE_HOST_WIRES_MAX);
+    host.host_wires = 4;
+    limit(host, spare_node, 0, 1);
+    limit(host, gateway, 3, 4);
+    host.host_wires = 0;
+    host.spare_node = 3;
+    limit(host, gateway, 3, 2);
+    node.host_wires = 4;
+    assert_true(starts(&node));
 }
 
 static void all_say_farewell(void **unused)
@@ -399,7 +428,7 @@ int main(void)
         cmocka_unit_test(a_flood_does_not_starve_the_node_it_passes),
         cmocka_unit_test(a_wrong_wire_is_named),
         cmocka_unit_test(wrong_wires_in_words),
-        cmocka_unit_test(configs_that_make_no_sense),
+        cmocka_unit_test(limits_of_a_config),
         cmocka_unit_test(all_say_farewell),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

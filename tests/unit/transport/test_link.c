@@ -208,7 +208,7 @@ static void sleeping_until_due_is_enough(void **unused)
     }
 }
 
-/* Share of the line rate, both directions at once, in 64 KB transfers. */
+/* Share of the wire's rate, both directions at once, in 64 KB transfers. */
 static double share(double baud, double bit_error, uint32_t step_us,
                     size_t *bytes)
 {
@@ -227,7 +227,7 @@ static double share(double baud, double bit_error, uint32_t step_us,
     return ideal / took;
 }
 
-static void throughput_on_serial_lines(void **unused)
+static void throughput_on_serial_wires(void **unused)
 {
     const double bauds[] = {115200, 921600, 3000000};
     (void)unused;
@@ -236,13 +236,63 @@ static void throughput_on_serial_lines(void **unused)
         uint32_t step_us = (uint32_t)(3e8 / bauds[i]);
         double clean = share(bauds[i], 0, step_us, &bytes);
         double noisy = share(bauds[i], 1e-5, step_us, &bytes);
-        print_message("%7.0f baud: %.1f %% of the line, at 1e-5 bit errors "
+        print_message("%7.0f baud: %.1f %% of the wire, at 1e-5 bit errors "
                       "%.1f %%; %zu bytes a link\n",
                       bauds[i], 100 * clean, 100 * noisy, bytes);
         assert_true(bytes <= 16384);
         assert_true(clean >= 0.90);
         assert_true(noisy >= 0.70);
     }
+}
+
+/* --- limits -------------------------------------------------------------- */
+
+static bool starts(const struct link_config *config)
+{
+    size_t bytes = link_bytes(config), room = 1 << 20;
+    void *memory = aligned_alloc(64, room);
+    assert_non_null(memory);
+    struct link *link = link_init(memory, room, config);
+    assert_true(bytes <= room && (link != NULL) == (bytes > 0));
+    if (link != NULL) {
+        assert_null(link_init(memory, bytes - 1, config));
+        assert_null(link_init((uint8_t *)memory + 4, room - 4, config));
+    }
+    free(memory);
+    return link != NULL;
+}
+
+/* That a field may have the one value, and may not have the other. */
+#define limit(config, field, good, bad)                                        \
+    do {                                                                       \
+        struct link_config c_ = config;                                        \
+        c_.field = good;                                                       \
+        assert_true(starts(&c_));                                              \
+        c_.field = bad;                                                        \
+        assert_false(starts(&c_));                                             \
+    } while (0)
+
+static void limits_of_a_config(void **unused)
+{
+    struct sim_end nowhere = {NULL, NULL, NULL};
+    struct link_config c = {
+        .pipe = sim_pipe(&nowhere), .epoch = 1, .window = 4};
+    (void)unused;
+    limit(c, pipe.send, c.pipe.send, NULL);
+    limit(c, pipe.receive, c.pipe.receive, NULL);
+    limit(c, epoch, UINT32_MAX, 0);
+    limit(c, window, 1, 0);
+    limit(c, window, LINK_WINDOW_MAX, LINK_WINDOW_MAX + 1);
+    c.frame_payload = 408;
+    limit(c, window, 4, 3); /* a message of 1,616, 4 frames */
+    limit(c, message_max, LINK_MESSAGE_MAX, LINK_MESSAGE_MAX + 1);
+    c.message_max = 32;
+    limit(c, frame_payload, LINK_FRAME_PAYLOAD_MIN, LINK_FRAME_PAYLOAD_MIN - 8);
+    limit(c, frame_payload, LINK_FRAME_PAYLOAD_MAX, LINK_FRAME_PAYLOAD_MAX + 8);
+    limit(c, frame_payload, 40, 44);
+    limit(c, staging, LINK_WINDOW_MAX, LINK_WINDOW_MAX + 1);
+    limit(c, timeout_min_us, 1000000, 1000001);
+    limit(c, timeout_max_us, 100000, 99999);
 }
 
 int main(void)
@@ -256,7 +306,8 @@ int main(void)
         cmocka_unit_test(every_kind_of_damage),
         cmocka_unit_test(garbage_between_frames),
         cmocka_unit_test(sleeping_until_due_is_enough),
-        cmocka_unit_test(throughput_on_serial_lines),
+        cmocka_unit_test(throughput_on_serial_wires),
+        cmocka_unit_test(limits_of_a_config),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
