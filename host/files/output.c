@@ -360,11 +360,6 @@ void host_output_bytes(struct host_output *out, const void *bytes, size_t n)
     }
 }
 
-void host_output_text(struct host_output *out, const char *text)
-{
-    host_output_bytes(out, text, strlen(text));
-}
-
 void host_output_unsigned(struct host_output *out, uint64_t value)
 {
     char digits[20];
@@ -513,6 +508,9 @@ int host_output_printed(struct host_error *error)
         (void)(putchar('\n') == EOF || fflush(stdout));
     }
     int reason = errno;
+    if (reason == 0 && write(STDOUT_FILENO, "\n", 1) < 0) {
+        reason = errno; /* as an earlier write had it, of a longer text */
+    }
     __fpurge(stdout); /* nor is it tried again */
     clearerr(stdout);
     return host_fail(error, HOST_INPUT, "standard output: %s; %s",

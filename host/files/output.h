@@ -18,6 +18,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 #include <sys/types.h>
 
 #include "host/base/error.h"
@@ -58,8 +59,11 @@ int host_output_probe(const char *path, struct host_error *error);
 
 /* None of these fails at once: host_output_close tells. */
 void host_output_bytes(struct host_output *out, const void *bytes, size_t n);
-void host_output_text(struct host_output *out, const char *text);
 void host_output_unsigned(struct host_output *out, uint64_t value);
+static inline void host_output_text(struct host_output *out, const char *text)
+{
+    host_output_bytes(out, text, strlen(text)); /* known of most, here */
+}
 
 /* So that reading it gives the same double. */
 void host_output_double(struct host_output *out, double value);
