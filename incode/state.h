@@ -4,7 +4,7 @@
  * Memory: the struct, at the start of the arena.  Work: none.
  *
  *     struct incode_triangulator *t = arena;
- *     t->front.room_faces = t->front.afl.capacity - 500;   spills soon
+ *     t->front.room_faces = t->front.afl.capacity - 500;   // it spills soon
  */
 #ifndef INCODE_STATE_H
 #define INCODE_STATE_H

@@ -9,9 +9,10 @@
  * `naive` and `grid` it builds at most one tetrahedron, and looks at no more
  * than 256 pages of points or about 4,096 rows of cells and points.
  *
- *     incode_triangulator_init(&t, arena, bytes, &setup, &outside, &error);
- *     incode_triangulator_start(&t, &job);
- *     while (incode_triangulator_step(&t) != INCODE_FINISHED) deliver pages;
+ *     t = incode_triangulator_init(arena, bytes, &setup, &outside, &why);
+ *     incode_triangulator_start(t, &job);
+ *     while (incode_triangulator_step(t) != INCODE_FINISHED)
+ *         deliver(t);   // by incode_triangulator_page, what was asked for
  */
 #ifndef INCODE_TRIANGULATOR_H
 #define INCODE_TRIANGULATOR_H

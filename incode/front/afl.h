@@ -6,8 +6,8 @@
  * faces of one key vertex and of those that share its hash, constant as long as
  * stars stay bounded (star.c sees to that).
  *
- *     incode_afl_toggle(&afl, key, b, c);    opens the face, or closes its twin
- *     n = incode_afl_take(&afl, v, pairs, 256);       empties the list of v
+ *     incode_afl_toggle(&afl, v, b, c);   // opens the face, or closes its twin
+ *     n = incode_afl_take(&afl, v, pairs, 256, &more);   // empties its list
  */
 #ifndef INCODE_AFL_H
 #define INCODE_AFL_H

@@ -11,18 +11,16 @@
  *     incode_front_init(&front, memory, &share, bricks, rule, &outside);
  *     incode_front_start(&front, &job);
  *     while ((turn = incode_front_turn(&front, 0, &task)) != INCODE_TURN_END)
- *         run the task, or let incode_front_next begin one;
+ *         if (turn == INCODE_TURN_NEXT)
+ *             turn = incode_front_next(&front, &task);   // and run the task
  *
- * A task is a vertex that is worked on; it may be suspended and resumed.  In a
- * task, either the whole star is opened, its faces are taken one by one, and
- * each answer is built:
- *
- *     incode_star_open(&front, v);
- *     while (incode_star_take(&front, &face)) incode_star_build(&front, ...);
- *     incode_star_shut(&front);
- *
- * or one face is looked at, and its answer used some time later, if the face is
- * still open then: incode_front_face, incode_front_use.
+ * A task is a vertex that is worked on; it may be suspended and resumed.  It
+ * runs between incode_front_run and incode_front_done or _suspend.  In it,
+ * either the whole star is opened (incode_star_open), its faces are taken one
+ * by one (_take), the answer to each is built (_build), and what has none yet
+ * is put back (_put, _shut); or one face is looked at (incode_front_face), and
+ * its answer is used some time later, if the face is still open
+ * (incode_front_use).
  */
 #ifndef INCODE_FRONT_H
 #define INCODE_FRONT_H

@@ -4,7 +4,7 @@
  *
  * Memory: none.  Work: three comparisons.
  *
- *     const double *const p[4] = {a, b, c, d};
+ *     const double *const p[4] = {pa, pb, pc, pd};
  *     uint32_t brick = vertex[incode_owner(p)] / INCODE_BRICK_POINTS;
  */
 #ifndef INCODE_OWNER_H

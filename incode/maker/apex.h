@@ -3,8 +3,8 @@
  *
  * Memory: the struct.  Work: constant a call.
  *
- *     make.best = apex among the local points, so far;
- *     if (incode_cap_fits(local->wall, &make.pencil, t)) it stands;
+ *     if (incode_cap_fits(local->wall, &make.pencil, place))
+ *         apex = local->id[make.best];   // no point outside can beat it
  */
 #ifndef INCODE_APEX_H
 #define INCODE_APEX_H

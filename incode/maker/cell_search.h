@@ -9,9 +9,9 @@
  * against the sphere, and halved as long as they hold many points.
  *
  *     incode_cell_search_begin(&c, &grid, &q);
- *     while ((r = incode_cell_search_run(&c, &grid, &q)) != INCODE_WALK_DONE)
- *         INCODE_WALK_WAIT: come back when page q.missing is there;
- *         INCODE_WALK_STOP: come back when you like;
+ *     walked = incode_cell_search_run(&c, &grid, &walker, &q);
+ *     if (walked == INCODE_WALK_WAIT)
+ *         page = q.missing;   // and INCODE_WALK_STOP: come back when you like
  */
 #ifndef INCODE_CELL_SEARCH_H
 #define INCODE_CELL_SEARCH_H

@@ -8,9 +8,10 @@
  *
  * Memory: struct incode_empty_spheres, about 1 KB.  Work: constant.
  *
- *     incode_empty_spheres_add(&empty, p, scale);      of a tetrahedron p
- *     incode_radical_bound_set(&bound, &empty, p, scale, n);
- *     if (g . r > level + slack (|x| + |y| + |z|)) outside;
+ *     incode_empty_spheres_add(&empty, tetrahedron, scale);
+ *     incode_radical_bound_set(&c, &empty, tetrahedron, scale, n);
+ *     if (incode_dot(c.g, r) > c.level + c.slack * sum)   // |x| + |y| + |z|
+ *         outside = true;
  */
 #ifndef INCODE_EMPTY_SPHERES_H
 #define INCODE_EMPTY_SPHERES_H

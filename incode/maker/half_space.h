@@ -7,7 +7,7 @@
  * Memory: the structs.  Work: constant.
  *
  *     degenerate.half_spaces = half_spaces, degenerate.count = 8;
- *     incode_near_degenerate_lessen(&degenerate, p, scale);
+ *     incode_near_degenerate_lessen(&degenerate, tetrahedron, scale);
  */
 #ifndef INCODE_HALF_SPACE_H
 #define INCODE_HALF_SPACE_H

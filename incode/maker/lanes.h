@@ -3,7 +3,7 @@
  * Memory: none.  Work: constant.
  *
  *     struct incode_lanes r = incode_lanes_difference(x, y, scale);
- *     value = incode_lanes_plus(value, incode_lanes_times(n, r));
+ *     value = incode_lanes_plus(value, incode_lanes_times(factor, r));
  */
 #ifndef INCODE_LANES_H
 #define INCODE_LANES_H

@@ -9,8 +9,8 @@
  * exact predicates.
  *
  *     incode_local_around(&local, &walker, &neighbours, leaf, lo, hi, radius);
- *     incode_local_centre(&local, v, p, radius, domain_lo, domain_hi);
- *     count = incode_local_first(&local, &pencil, &t, out);   first by distance
+ *     incode_local_centre(&local, v, p, radius, lo, hi);
+ *     count = incode_local_first(&local, &pencil, &t, out);   // by distance
  *     count = incode_local_inside(&local, &sphere, out);
  */
 #ifndef INCODE_LOCAL_POINTS_H

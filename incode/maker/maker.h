@@ -12,8 +12,9 @@
  * about 4,096 rows of cells and points.
  *
  *     incode_maker_init(&maker, memory, &share, &points, &source);
- *     r = incode_maker_apexes(&maker, 0, faces, count, answers, &done);
- *     if (r == INCODE_WAIT) deliver page maker.search[0].page and ask again;
+ *     happened = incode_maker_apexes(&maker, 0, faces, count, answers, &done);
+ *     if (happened == INCODE_WAIT)
+ *         page = maker.search[0].page;   // deliver it and ask again
  */
 #ifndef INCODE_MAKER_H
 #define INCODE_MAKER_H

@@ -7,8 +7,9 @@
  * search looks at every box of the list, a vector at a time, and at the points
  * of those that it cannot rule out.
  *
- *     incode_neighbours_make(&neighbours, &walker, brick, lo, hi, pages_max);
- *     r = incode_neighbours_visit(&neighbours, &walker, &query, visit,
+ *     incode_neighbours_make(&list, &walker, brick, lo, hi, &missing);
+ *     walked = incode_neighbours_visit(&list, &walker, &q, incode_visit_points,
+ *                                      NULL);
  * context);
  */
 #ifndef INCODE_NEIGHBOURS_H

@@ -4,9 +4,9 @@
  * Memory: the struct; stack for INCODE_LEVELS_MAX levels.  Work: the boxes of
  * the pages whose own box passes the question.
  *
- *     q.question = INCODE_QUERY_BOX, q.boxed = true;       and q.lo, q.hi
- *     while ((r = incode_walk(&w, &q, visit, context)) == INCODE_WALK_WAIT)
- *         come back when page q.missing is there;
+ *     q.question = INCODE_QUERY_BOX, q.boxed = true;   // and q.lo, q.hi
+ *     while (incode_walk(&walker, &q, visit, NULL) == INCODE_WALK_WAIT)
+ *         deliver(q.missing);
  */
 #ifndef INCODE_QUERY_H
 #define INCODE_QUERY_H

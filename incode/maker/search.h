@@ -5,7 +5,7 @@
  *
  *     incode_search_begin(m, s, face, pv, pb, pc, radius);
  *     while (incode_search_run(m, s) == INCODE_WAIT)
- *         come back when page s->query.missing is there;
+ *         deliver(s->query.missing);
  */
 #ifndef INCODE_SEARCH_H
 #define INCODE_SEARCH_H

@@ -3,14 +3,14 @@
  * forward error bounds: a small multiple of the unit roundoff times bounds of
  * the terms from the maximum norms (Higham, Accuracy and Stability, chapter 3).
  *
- *     plane:  n . p > 0                  p lies on the unknown side
- *     sphere: m . p - det |p|^2 > 0      p lies inside
+ *   plane:  n . p > 0                  p lies on the unknown side
+ *   sphere: m . p - det |p|^2 > 0      p lies inside
  *
  * Memory: the struct.  Work: constant.
  *
  *     incode_sphere_plane(&s, b, c);
  *     incode_sphere_apex(&s, b, c, a);
- *     if (incode_sphere_value(&s, p) < -incode_sphere_error(&s, p)) outside;
+ *     outside = incode_sphere_value(&s, p) < -incode_sphere_error(&s, p);
  */
 #ifndef INCODE_SPHERE_H
 #define INCODE_SPHERE_H

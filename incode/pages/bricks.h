@@ -1,6 +1,6 @@
 /* How vertices are numbered: in bricks of 64 in spatial order, so that
  *
- *     vertex = 64 * brick + slot
+ *   vertex = 64 * brick + slot
  *
  * Every brick is full but the last of each region.  Who has no page of points
  * still knows what lies together.

@@ -7,8 +7,8 @@
  * leaves.
  *
  *     struct incode_frame *f = incode_pager_get(&pager, page);
- *     if (f == NULL) wait: the page has been asked for, or will be;
- *     else use f->page until the next call that delivers;
+ *     if (f != NULL)
+ *         x = f->page.brick.x[slot];   // f stays until the next call
  */
 #ifndef INCODE_PAGER_H
 #define INCODE_PAGER_H

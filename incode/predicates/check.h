@@ -1,7 +1,7 @@
 /* Assertions that stay on in production: an invariant that fails stops the
  * node at once, on any board.
  *
- *     INCODE_ASSERT(count <= INCODE_BRICK_POINTS);
+ *     INCODE_ASSERT(count <= 64);
  */
 #ifndef INCODE_CHECK_H
 #define INCODE_CHECK_H

@@ -3,9 +3,10 @@
  * Memory: none.  Work: 8 operations a product, 20 a sum or a cross product, 40
  * a product of vectors.
  *
- *     struct incode_dd a = incode_dd_difference(p, q, scale);
- *     struct incode_dd d = incode_dd_cross(a, b, c, d);        a b - c d
- *     sign of d.hi, where |d.hi| exceeds the error
+ *     struct incode_dd a = incode_dd_difference(x, y, scale);
+ *     struct incode_dd d = incode_dd_cross(a, b, c, b);   // a b - c b
+ *     if (__builtin_fabs(d.hi) > error)
+ *         sign = d.hi > 0 ? 1 : -1;
  */
 #ifndef INCODE_DOUBLE_DOUBLE_H
 #define INCODE_DOUBLE_DOUBLE_H

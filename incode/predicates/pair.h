@@ -5,7 +5,8 @@
  * Memory: under 1 KB of stack.  Work: some 1,000 (orient3d) or 3,000
  * (in_sphere) operations at most, without branches.
  *
- *     if (incode_pair_in_sphere(p, most, &sign)) return sign;
+ *     if (incode_pair_in_sphere(p, most, &sign))
+ *         return sign;
  */
 #ifndef INCODE_PAIR_H
 #define INCODE_PAIR_H

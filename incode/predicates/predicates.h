@@ -5,9 +5,9 @@
  * predicates.c).  Work: bounded for any finite input, denormals and 2^1023
  * included.
  *
- *     struct incode_tally tally = {0};
- *     if (incode_orient3d(&tally, a, b, c, d) > 0 &&
- *         incode_in_sphere(&tally, a, b, c, d, e) > 0) ... e is inside
+ *     struct incode_tally tally = {0, 0};
+ *     if (incode_orient3d(&tally, a, b, c, d) > 0)
+ *         inside = incode_in_sphere(&tally, a, b, c, d, e) > 0;
  */
 #ifndef INCODE_PREDICATES_H
 #define INCODE_PREDICATES_H

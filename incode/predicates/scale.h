@@ -5,7 +5,8 @@
  * Memory: none.  Work: constant.
  *
  *     struct incode_scale s;
- *     if (incode_scale_init(&s, most)) y = x * s.up1 * s.up2;
+ *     if (incode_scale_init(&s, most))
+ *         x = x * s.up1 * s.up2;
  */
 #ifndef INCODE_SCALE_H
 #define INCODE_SCALE_H

@@ -6,8 +6,8 @@
  *
  * Memory: none.  Work: constant.
  *
- *     incode_vd d = incode_vd_load(box->lo[0]) - incode_vd_all(v[0]);
- *     uint32_t near = incode_vd_mask(d < limit);
+ *     incode_vd d = incode_vd_load(lo) - incode_vd_all(v);
+ *     uint32_t near = incode_vd_mask(d < incode_vd_all(limit));
  */
 #ifndef INCODE_SIMD_H
 #define INCODE_SIMD_H

@@ -12,7 +12,7 @@
  *
  * Memory: none.  Work: constant, without a branch to mispredict.
  *
- *     above += INCODE_TIE_ABOVE(i, j, p_i is larger than p_j);   for all i < j
+ *     above += INCODE_TIE_ABOVE(0, 1, larger);   // and so for all i < j
  *     cofactor[4] = -1;
  *     sign = incode_tie(above, cofactor);
  */

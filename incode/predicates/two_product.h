@@ -7,7 +7,7 @@
  * is just x * y + z).  Both give the same bits as long as no part of the
  * product falls below 2^-1022 and no factor exceeds 2^995.
  *
- *     double error, p = incode_two_product(a, b, &error);   a b = p + error
+ *     double error, p = incode_two_product(a, b, &error);   // a b = p + error
  */
 #ifndef INCODE_TWO_PRODUCT_H
 #define INCODE_TWO_PRODUCT_H
