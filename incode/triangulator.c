@@ -290,7 +290,7 @@ static void look_ahead(struct incode_triangulator *t)
         incode_maker_prefetch(&t->maker, front->job.first + t->ahead, more);
 }
 
-static enum incode_turn next(struct incode_triangulator *t, unsigned *task)
+static enum incode_turn next(struct incode_triangulator *t, uint32_t *task)
 {
     look_ahead(t);
     enum incode_turn turn = incode_front_next(&t->front, task);
@@ -306,7 +306,7 @@ static enum incode_turn next(struct incode_triangulator *t, unsigned *task)
 
 static enum incode_step step(struct incode_triangulator *t)
 {
-    unsigned task;
+    uint32_t task;
     uint32_t waiting = incode_maker_waiting(&t->maker, t->front.busy);
     enum incode_turn turn = incode_front_turn(&t->front, waiting, &task);
     if (turn == INCODE_TURN_NEXT)

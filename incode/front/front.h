@@ -157,7 +157,7 @@ enum incode_turn {
 /* Begins a step.  waiting: the suspended tasks, one bit each, whose answers are
  * not there yet. */
 enum incode_turn incode_front_turn(struct incode_front *front, uint32_t waiting,
-                                   unsigned *task);
+                                   uint32_t *task);
 
 /* The next vertex to work on: INCODE_TURN_TASK and *which the task, or
  * INCODE_TURN_COUNT and *which the brick, or INCODE_TURN_WAIT, _WORKED or _END.

@@ -72,7 +72,7 @@ void incode_front_done(struct incode_front *front, unsigned task)
 /* A task that may go on, the oldest first; INCODE_TURN_WAIT: one has been
  * suspended so often that nothing else may run before it. */
 static enum incode_turn ready_task(const struct incode_front *front,
-                                   uint32_t waiting, unsigned *task)
+                                   uint32_t waiting, uint32_t *task)
 {
     const struct incode_task *oldest = NULL, *ready = NULL;
     for (uint32_t left = front->busy; left != 0; left &= left - 1) {
@@ -105,7 +105,7 @@ static void drop_spilled_tasks(struct incode_front *front)
 }
 
 enum incode_turn incode_front_turn(struct incode_front *front, uint32_t waiting,
-                                   unsigned *task)
+                                   uint32_t *task)
 {
     if (front->finished)
         return INCODE_TURN_END;

@@ -466,7 +466,7 @@ static void refusals(void **unused)
 {
     (void)unused;
     struct world w = {.regions = 1};
-    unsigned task;
+    uint32_t task;
     open_world(&w, "uniform", 100);
     assert_int_equal(incode_front_turn(&w.front, 0, &task), INCODE_TURN_END);
     const struct incode_face face = {{0, 1, 2}};
