@@ -308,16 +308,8 @@ static int check_wire(struct host_service *s, uint64_t now_us,
                                "host; wait until its run is over, or end it",
                                gateway, s->machine->dimension);
     }
-    if (state == LINK_REFUSED) {
-        return host_fail(error, HOST_CUBE,
-                         "node %u link %u: the host's wire leads to node %u "
-                         "link %u, or to another version of the program; put "
-                         "the wire right, or run make",
-                         gateway, s->machine->dimension,
-                         cube_link_peer(s->cube, wire)->node,
-                         cube_link_peer(s->cube, wire)->port);
-    }
-    /* A wire that was never up is waited for: its node may start late. */
+    /* A wire that was never up is waited for: its node may start late.  What is
+     * wrong with one, the wiring will have in a moment. */
     if (state != LINK_DOWN ||
         cube_link_statistics(s->cube, wire)->sessions == 0) {
         s->wire_down_us = now_us;

@@ -311,6 +311,10 @@ static void test_wrong_wire(void **unused)
     start_world();
     swap(5, 2, 3, 1); /* 5 was to lead to 1, and 3 to 1 */
     fails_with("node 1 link 1 is wired to node 5, expected node 3");
+    prepare(); /* the host's own */
+    start_world();
+    swap(0, DIMENSION, 3, 2);
+    fails_with("host link 0 is wired to node 3, expected node 0");
 }
 
 int main(void)
