@@ -38,17 +38,17 @@ static unsigned draw_nodes(uint64_t *state)
     return 1u << cubes[i].dimension;
 }
 
-/* The first of the table keeps to one node, mostly: seldom; the others alike.
- */
+/* The first of the table, which keeps to one node, seldom; the others alike. */
 static const struct host_strategy *draw_strategy(const struct host_sim_plan *p,
                                                  bool first)
 {
     uint64_t state = sim_seed(p->seed, 81);
-    unsigned rows = 0;
-    while (host_strategy_row(rows) != NULL) {
-        rows++;
+    unsigned last = 0;
+    while (host_strategy_row(last + 1) != NULL) {
+        last++;
     }
-    return host_strategy_row(first ? 0 : (unsigned)draw(&state, 1, rows - 1));
+    first = first || last == 0;
+    return host_strategy_row(first ? 0 : (unsigned)draw(&state, 1, last));
 }
 
 static void draw_work(struct host_sim_plan *p, uint64_t *state)
