@@ -27,14 +27,29 @@
 
 /* What every node of a run is told once. */
 struct incode_setup {
+    /* Bricks of at most INCODE_BRICK_POINTS points, 1 or more; vertex numbers,
+     * brick * INCODE_BRICK_POINTS and up, stay below INCODE_NONE. */
     uint32_t bricks;
-    uint8_t index;     /* enum incode_index */
-    uint8_t face_rule; /* enum incode_face_rule */
-    uint16_t reserved;
-    uint64_t shuffle_seed; /* 0: pages are ready as they arrive */
-    double lo[3], hi[3];   /* box of all points, tight */
-    uint32_t cells[3];     /* index `grid`: cells in x, y, z; else 0 */
-    uint32_t reserved2;
+
+    /* How points are searched: enum incode_index. */
+    uint8_t index;
+
+    /* Which faces are pursued: enum incode_face_rule. */
+    uint8_t face_rule;
+
+    uint16_t reserved; /* 0 */
+
+    /* Of the order in which pages that have arrived are taken, for tests; 0: as
+     * they arrive. */
+    uint64_t shuffle_seed;
+
+    /* Box of all points, tight and finite, in the points' unit. */
+    double lo[3], hi[3];
+
+    /* Index `grid`: cells in x, y and z, 1 or more; else 0. */
+    uint32_t cells[3];
+
+    uint32_t reserved2; /* 0 */
 };
 
 enum incode_step {

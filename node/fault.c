@@ -11,12 +11,12 @@ void node_fault_set(struct node_fault *fault, const char *words, uint32_t a,
     }
     text = cube_text_in(fault->text, sizeof fault->text);
     for (uint32_t figure = a; *words != '\0'; words++) {
-        char letter[2] = {*words, '\0'};
+        char character[2] = {*words, '\0'};
         if (*words == '#') {
             cube_text_number(&text, figure);
             figure = b;
         } else {
-            cube_text_put(&text, letter);
+            cube_text_put(&text, character);
         }
     }
     fault->size = text.size;

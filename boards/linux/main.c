@@ -25,11 +25,11 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "boards/process.h"
 #include "node/node.h"
+#include "options.h"
 #include "transport/drivers/key_file.h"
 #include "transport/learn.h"
-#include "boards/process.h"
-#include "options.h"
 #include "wire.h"
 
 enum { SANITIZED_STATIC = 8192 };

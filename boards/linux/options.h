@@ -11,8 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "transport/cube.h"
 #include "fault.h"
+#include "transport/cube.h"
 
 #define LINUX_UNNAMED UINT64_MAX /* as a node: it is to learn who it is */
 

@@ -12,10 +12,10 @@
 #ifndef BOARDS_LINUX_WIRE_H
 #define BOARDS_LINUX_WIRE_H
 
+#include "fault.h"
 #include "transport/cube.h"
 #include "transport/drivers/serial.h"
 #include "transport/drivers/tcp_wire.h"
-#include "fault.h"
 
 enum linux_wire_kind { LINUX_SOCKET, LINUX_TERMINAL, LINUX_NET };
 

@@ -19,10 +19,10 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "boards/process.h"
 #include "node/node.h"
 #include "transport/drivers/mpi.h"
 #include "transport/drivers/mpi_environment.h"
-#include "boards/process.h"
 
 enum {
     STACK_BYTES = 65536, /* of a node's memory */

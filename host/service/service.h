@@ -30,7 +30,7 @@
 #include "spill.h"
 
 enum {
-    HOST_PAGES_QUEUED_MAX = 256,
+    HOST_PAGES_QUEUED_MAX = NODE_PAGES_IN_FLIGHT_MAX,
     HOST_UNSPILLS_MAX = 64,
     HOST_PATIENCE_US = 60000000 /* unless the caller says otherwise */
 };

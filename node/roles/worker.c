@@ -142,7 +142,7 @@ static size_t spill_room(const struct worker *w)
            w->spill_count;
 }
 
-/* Faces come in small numbers: they gather in one message until it is full or
+/* Faces come in small numbers: they wait in one message until it is full or
  * the link has nothing else to do. */
 static bool outside_spill(void *context, const struct incode_face *faces,
                           size_t count)

@@ -327,13 +327,52 @@ static void test_fault(void **unused)
     end();
 }
 
+/* What no node of this version sends is told in figures. */
+static void test_texts(void **unused)
+{
+    (void)unused;
+    static struct node_ready_message ready = {.protocol = NODE_PROTOCOL - 1};
+    static uint32_t many[HOST_PAGES_QUEUED_MAX + 1];
+    uint32_t page = 1000000;
+    const struct {
+        uint8_t type;
+        const void *data;
+        size_t size;
+        const char *text;
+    } wrong[] = {
+        {NODE_READY, &ready, sizeof ready, "protocol version 3, expected 4"},
+        {NODE_READY, &ready, 4, "protocol version 3, expected 4"},
+        {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
+        {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 20"},
+        {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
+        {NODE_RESULT, &ready, 2, "results in 2 bytes, expected 8"},
+        {NODE_PAGE_REQUEST, &page, 4, "page 1000000 out of range 0.."},
+        {NODE_PAGE_REQUEST, many, sizeof many, "more than 256 pages requested"},
+        {NODE_STOP, &ready, 0, "unknown type of message"},
+        {NODE_FAULT, "role 7 is not known", 19,
+         "role 7 is not known; run the "
+         "same version"}};
+    assert_int_equal(NODE_PROTOCOL, 4);
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        struct host_error error = {0};
+        begin();
+        assert_int_equal(
+            send(3, wrong[i].type, wrong[i].data, wrong[i].size, &error),
+            HOST_CUBE);
+        if (strstr(error.text, wrong[i].text) == NULL) {
+            fail_msg("%s: not %s", error.text, wrong[i].text);
+        }
+        end();
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_any_bytes), cmocka_unit_test(test_epochs),
         cmocka_unit_test(test_gaps),      cmocka_unit_test(test_unfinished),
         cmocka_unit_test(test_answers),   cmocka_unit_test(test_starts),
-        cmocka_unit_test(test_fault),
+        cmocka_unit_test(test_fault),     cmocka_unit_test(test_texts),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
