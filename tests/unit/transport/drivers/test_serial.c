@@ -1,5 +1,5 @@
-/* Serial wires: pseudo-terminals pass every byte, lines that break come back, a
- * port in use is named with its user, and a link fills a paced line. */
+/* Serial wires: pseudo-terminals pass every byte, wires that break come back, a
+ * port in use is named with its user, and a link fills a paced wire. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -53,7 +53,7 @@ static void a_pair_passes_every_byte(void **unused)
 }
 
 /* The slave goes and comes back; then the master goes for good. */
-static void a_line_that_breaks_comes_back(void **unused)
+static void a_wire_that_breaks_comes_back(void **unused)
 {
     int fds[2];
     char path[64];
@@ -213,7 +213,7 @@ static void ports_that_are_not_there(void **unused)
     }
 }
 
-/* --- paced lines ---------------------------------------------------------- */
+/* --- paced wires ---------------------------------------------------------- */
 
 /* Real descriptors and the real driver, in the test's own time: between two
  * socket pairs the relay carries baud / 10 bytes a second each way. */
@@ -236,7 +236,7 @@ struct lane {
     double credit, until_flip;
 };
 
-struct line {
+struct wire {
     uint32_t baud;
     double error_rate;
     uint64_t random, flips;
@@ -248,11 +248,11 @@ struct line {
 enum { STEP_US = 20, MESSAGE = 1600, TRANSFER = 65536 };
 
 /* Bits until the next error, about exponential: a sum of many small chances. */
-static double next_flip(struct line *line)
+static double next_flip(struct wire *wire)
 {
-    line->random = line->random * 6364136223846793005u + 1442695040888963407u;
-    double u = (double)(line->random >> 11) * 0x1p-53, sum = 0, term;
-    if (line->error_rate <= 0) {
+    wire->random = wire->random * 6364136223846793005u + 1442695040888963407u;
+    double u = (double)(wire->random >> 11) * 0x1p-53, sum = 0, term;
+    if (wire->error_rate <= 0) {
         return 1e300;
     }
     /* -ln(1 - u) by its series. */
@@ -260,18 +260,18 @@ static double next_flip(struct line *line)
     for (int k = 1; k < 2000 && term > 1e-9; k++, term *= u) {
         sum += term / k;
     }
-    return sum / line->error_rate;
+    return sum / wire->error_rate;
 }
 
-static void carry(struct line *line, struct lane *lane)
+static void carry(struct wire *wire, struct lane *lane)
 {
     uint8_t bytes[64];
-    lane->credit += STEP_US * 1e-7 * line->baud;
+    lane->credit += STEP_US * 1e-7 * wire->baud;
     size_t most =
         lane->credit > sizeof bytes ? sizeof bytes : (size_t)lane->credit;
     ssize_t n = most == 0 ? 0 : read(lane->from, bytes, most);
     if (n <= 0) {
-        /* An idle line keeps nothing but the part of a byte. */
+        /* An idle wire keeps nothing but the part of a byte. */
         lane->credit = lane->credit > 1 ? 1 : lane->credit;
         return;
     }
@@ -279,36 +279,36 @@ static void carry(struct line *line, struct lane *lane)
     for (ssize_t i = 0; i < n; i++) {
         lane->until_flip -= 8;
         if (lane->until_flip < 0) {
-            bytes[i] ^= (uint8_t)(1u << (line->random >> 60 & 7));
-            lane->until_flip = next_flip(line);
-            line->flips++;
+            bytes[i] ^= (uint8_t)(1u << (wire->random >> 60 & 7));
+            lane->until_flip = next_flip(wire);
+            wire->flips++;
         }
     }
     assert_int_equal(write(lane->to, bytes, (size_t)n), n);
 }
 
-static void open_line(struct line *line, uint32_t baud, double error_rate)
+static void open_wire(struct wire *wire, uint32_t baud, double error_rate)
 {
-    memset(line, 0, sizeof *line);
-    line->baud = baud;
-    line->error_rate = error_rate;
-    line->random = baud + 17;
+    memset(wire, 0, sizeof *wire);
+    wire->baud = baud;
+    wire->error_rate = error_rate;
+    wire->random = baud + 17;
     for (unsigned i = 0; i < 4; i += 2) {
         assert_int_equal(
-            socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, line->fds + i),
+            socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, wire->fds + i),
             0);
     }
-    line->lanes[0] = (struct lane){line->fds[1], line->fds[2], 0, 0};
-    line->lanes[1] = (struct lane){line->fds[2], line->fds[1], 0, 0};
+    wire->lanes[0] = (struct lane){wire->fds[1], wire->fds[2], 0, 0};
+    wire->lanes[1] = (struct lane){wire->fds[2], wire->fds[1], 0, 0};
     for (unsigned who = 0; who < 2; who++) {
-        struct end *end = &line->ends[who];
+        struct end *end = &wire->ends[who];
         struct link_config c = {.epoch = 7 + who,
                                 .node = (uint16_t)who,
                                 .peer_node = (uint16_t)(1 - who),
                                 .window = 14,
                                 .message_max = 1608};
         link_for_serial(&c, baud);
-        serial_pipe_init(&end->pipe, line->fds[3 * who], baud);
+        serial_pipe_init(&end->pipe, wire->fds[3 * who], baud);
         end->pipe.now_us = test_clock;
         end->pipe.ahead_us = now;
         c.pipe = serial_link_pipe(&end->pipe);
@@ -317,20 +317,20 @@ static void open_line(struct line *line, uint32_t baud, double error_rate)
         assert_non_null(end->memory);
         end->link = link_init(end->memory, end->bytes, &c);
         assert_non_null(end->link);
-        line->lanes[who].until_flip = next_flip(line);
+        wire->lanes[who].until_flip = next_flip(wire);
     }
 }
 
 /* Moves `transfers` times 64 KB each way; returns the payload's share of
  * baud / 10. */
-static double transfer(struct line *line, unsigned transfers)
+static double transfer(struct wire *wire, unsigned transfers)
 {
     static uint8_t bytes[MESSAGE];
     uint64_t wanted = (uint64_t)transfers * TRANSFER, begin = 0;
-    while (line->ends[0].read < wanted || line->ends[1].read < wanted) {
+    while (wire->ends[0].read < wanted || wire->ends[1].read < wanted) {
         now += STEP_US;
         for (unsigned who = 0; who < 2; who++) {
-            struct end *end = &line->ends[who];
+            struct end *end = &wire->ends[who];
             struct link_message message;
             link_poll_receive(end->link, now);
             while (link_read(end->link, &message)) {
@@ -352,33 +352,33 @@ static double transfer(struct line *line, unsigned transfers)
             }
             link_poll_send(end->link, now);
         }
-        carry(line, &line->lanes[0]);
-        carry(line, &line->lanes[1]);
+        carry(wire, &wire->lanes[0]);
+        carry(wire, &wire->lanes[1]);
         assert_true(begin == 0 || now - begin < 60000000);
     }
-    return (double)wanted / (1e-6 * (double)(now - begin)) / (0.1 * line->baud);
+    return (double)wanted / (1e-6 * (double)(now - begin)) / (0.1 * wire->baud);
 }
 
-static void close_line(struct line *line)
+static void close_wire(struct wire *wire)
 {
     for (unsigned i = 0; i < 4; i++) {
-        close(line->fds[i]);
+        close(wire->fds[i]);
     }
-    free(line->ends[0].memory);
-    free(line->ends[1].memory);
+    free(wire->ends[0].memory);
+    free(wire->ends[1].memory);
 }
 
 /* A message from end 0, and its echo. */
-static void echo(struct line *line, size_t size)
+static void echo(struct wire *wire, size_t size)
 {
     static uint8_t bytes[MESSAGE];
     struct link_message message;
     bool back = false;
-    assert_int_equal(link_write(line->ends[0].link, bytes, size, NULL, 0), 0);
+    assert_int_equal(link_write(wire->ends[0].link, bytes, size, NULL, 0), 0);
     while (!back) {
         now += STEP_US;
         for (unsigned who = 0; who < 2; who++) {
-            struct link *link = line->ends[who].link;
+            struct link *link = wire->ends[who].link;
             link_poll_receive(link, now);
             while (link_read(link, &message)) {
                 back = who == 0;
@@ -388,64 +388,64 @@ static void echo(struct line *line, size_t size)
             }
             link_poll_send(link, now);
         }
-        carry(line, &line->lanes[0]);
-        carry(line, &line->lanes[1]);
+        carry(wire, &wire->lanes[0]);
+        carry(wire, &wire->lanes[1]);
     }
 }
 
 /* Short messages, long ones and both directions at once, in turn: what waits
  * behind others is not lost. */
-static void a_clean_line_resends_nothing(void **unused)
+static void a_clean_wire_resends_nothing(void **unused)
 {
     static const uint32_t bauds[] = {19200, 57600, 115200, 921600, 3000000};
     (void)unused;
     for (size_t i = 0; i < sizeof bauds / sizeof bauds[0]; i++) {
-        struct line line;
-        open_line(&line, bauds[i], 0);
+        struct wire wire;
+        open_wire(&wire, bauds[i], 0);
         for (unsigned turn = 0; turn < 3; turn++) {
             for (unsigned k = 0; k < 20; k++) {
-                echo(&line, 16);
+                echo(&wire, 16);
             }
-            echo(&line, MESSAGE);
-            echo(&line, 16);
-            line.ends[0].written = line.ends[0].read = 0;
-            line.ends[1].written = line.ends[1].read = 0;
-            (void)transfer(&line, bauds[i] < 100000 ? 1 : 2);
+            echo(&wire, MESSAGE);
+            echo(&wire, 16);
+            wire.ends[0].written = wire.ends[0].read = 0;
+            wire.ends[1].written = wire.ends[1].read = 0;
+            (void)transfer(&wire, bauds[i] < 100000 ? 1 : 2);
         }
         for (unsigned who = 0; who < 2; who++) {
             const struct link_statistics *s =
-                link_statistics(line.ends[who].link);
+                link_statistics(wire.ends[who].link);
             if (s->retransmitted != 0 || s->timeouts != 0) {
                 fail_msg("%u baud: %u frames again, %u timeouts", bauds[i],
                          (unsigned)s->retransmitted, (unsigned)s->timeouts);
             }
         }
-        close_line(&line);
+        close_wire(&wire);
     }
 }
 
-static void a_link_fills_a_paced_line(void **unused)
+static void a_link_fills_a_paced_wire(void **unused)
 {
     static const uint32_t bauds[] = {115200, 921600, 3000000};
     (void)unused;
     for (size_t i = 0; i < sizeof bauds / sizeof bauds[0]; i++) {
         for (unsigned noisy = 0; noisy < 2; noisy++) {
-            struct line line;
-            open_line(&line, bauds[i], noisy ? 1e-5 : 0);
-            double share = transfer(&line, noisy ? 4 : 1);
+            struct wire wire;
+            open_wire(&wire, bauds[i], noisy ? 1e-5 : 0);
+            double share = transfer(&wire, noisy ? 4 : 1);
             print_message("%u baud%s: %.1f %% of baud/10 each way, %zu bytes "
                           "of memory, %llu bit errors\n",
                           bauds[i], noisy ? ", 1e-5" : "", 100 * share,
-                          line.ends[0].bytes, (unsigned long long)line.flips);
-            assert_true(line.ends[0].bytes <= 16384);
+                          wire.ends[0].bytes, (unsigned long long)wire.flips);
+            assert_true(wire.ends[0].bytes <= 16384);
             assert_true(share >= (noisy ? 0.7 : 0.9) && share <= 1);
-            assert_true((line.flips > 0) == (noisy != 0));
-            close_line(&line);
+            assert_true((wire.flips > 0) == (noisy != 0));
+            close_wire(&wire);
         }
     }
 }
 
-/* What is given to the kernel ahead of the line is bounded by the clock. */
+/* What is given to the kernel ahead of the wire is bounded by the clock. */
 static void little_is_written_ahead(void **unused)
 {
     static uint8_t bytes[4096];
@@ -479,13 +479,13 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_pair_passes_every_byte),
-        cmocka_unit_test(a_line_that_breaks_comes_back),
+        cmocka_unit_test(a_wire_that_breaks_comes_back),
         cmocka_unit_test(rates_and_modes),
         cmocka_unit_test(a_port_in_use_says_by_whom),
         cmocka_unit_test(a_link_is_followed_each_time),
         cmocka_unit_test(ports_that_are_not_there),
-        cmocka_unit_test(a_clean_line_resends_nothing),
-        cmocka_unit_test(a_link_fills_a_paced_line),
+        cmocka_unit_test(a_clean_wire_resends_nothing),
+        cmocka_unit_test(a_link_fills_a_paced_wire),
         cmocka_unit_test(little_is_written_ahead),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
