@@ -115,6 +115,7 @@ static void add_extensions(struct text *text, const struct host_format *f)
 void host_format_list(enum host_use use, char *text, size_t size)
 {
     struct text list = {text, size};
+    text[0] = '\0';
     const struct host_format *f;
     const char *between = "";
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
@@ -140,6 +141,7 @@ static void add_beside(struct text *text, const struct host_format *f)
 void host_format_help(enum host_use use, char *text, size_t size)
 {
     struct text list = {text, size};
+    text[0] = '\0';
     const struct host_format *f;
     const char *between = "";
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {

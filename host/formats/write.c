@@ -38,38 +38,33 @@ int host_write_check(const char *path, struct host_error *error)
                      path, list);
 }
 
-/* The extensions of the files that belong to the output `path`. */
-static const char *const *beside_of(const char *path)
+/* The extension of file k of those that belong beside the output `path`; NULL:
+ * there are not so many. */
+static const char *beside(const char *path, unsigned k)
 {
-    static const char *const none[] = {NULL};
     const struct host_format *format =
         host_format_of(path, HOST_WRITE_TETRAHEDRA);
-    return format == NULL || strcmp(path, "-") == 0 ? none : format->beside;
-}
-
-static unsigned count_of(const char *const *names)
-{
-    unsigned count = 0;
-    while (names[count] != NULL) {
-        count++;
-    }
-    return count;
+    return format == NULL || strcmp(path, "-") == 0 || k >= HOST_BESIDE_MAX
+               ? NULL
+               : format->beside[k];
 }
 
 const char *host_write_file(const char *path, unsigned k, char *name,
                             size_t size)
 {
-    const char *const *beside = beside_of(path);
     size_t length = strlen(path);
-    if (strcmp(path, "-") == 0 || length + 8 > size || k > count_of(beside)) {
+    if (strcmp(path, "-") == 0 || length + 8 > size) {
         return NULL;
     }
     if (k == 0) {
         return path;
     }
+    const char *extension = beside(path, k - 1);
     const char *dot = strrchr(path, '.'); /* the format was known by it */
-    (void)snprintf(name, size, "%.*s%s", (int)(dot - path), path,
-                   beside[k - 1]);
+    if (extension == NULL || dot == NULL) {
+        return NULL;
+    }
+    (void)snprintf(name, size, "%.*s%s", (int)(dot - path), path, extension);
     return name;
 }
 
@@ -93,14 +88,17 @@ int host_write(const char *path, const struct host_points *points,
     char names[HOST_BESIDE_MAX][HOST_PATH_MAX];
     const struct host_format *format =
         host_format_of(path, HOST_WRITE_TETRAHEDRA);
-    unsigned beside = count_of(beside_of(path)), opened = 0;
+    unsigned others = 0, opened = 0;
     if (format == NULL) {
         return host_write_check(path, error);
     }
+    while (beside(path, others) != NULL) {
+        others++;
+    }
     /* Itself comes last: where it is, those beside it are. */
-    for (; opened <= beside; opened++) {
+    for (; opened <= others; opened++) {
         const char *file =
-            opened == beside ? path
+            opened == others ? path
                              : host_write_file(path, opened + 1, names[opened],
                                                sizeof names[opened]);
         if (file == NULL) {
@@ -113,7 +111,7 @@ int host_write(const char *path, const struct host_points *points,
         }
     }
     if (error->code == 0) {
-        format->write_tetrahedra(&out[beside], beside > 0 ? out : NULL, points,
+        format->write_tetrahedra(&out[others], others > 0 ? out : NULL, points,
                                  tets, error);
     }
     return host_output_close(out, opened, error);
