@@ -4,7 +4,7 @@
  *
  * Memory: incode_afl_bytes(faces, bricks), fixed.  Work: a toggle looks at the
  * faces of one key vertex and of those that share its hash, constant as long as
- * stars stay bounded (star.c sees to that).
+ * stars stay bounded (front.h: hubs).
  *
  *     incode_afl_toggle(&afl, v, b, c);   // opens the face, or closes its twin
  *     n = incode_afl_take(&afl, v, pairs, 256, &more);   // empties its list

@@ -3,7 +3,7 @@
  * not fit, and asks for apexes; who answers, from what points, it does not
  * know.
  *
- * Memory: struct incode_front, about 25 KB, and the share of an arena that
+ * Memory: struct incode_front, about 19 KB, and the share of an arena that
  * incode_front_bytes states, for the active face list.  Work: constant a call,
  * but for a face put into or taken out of a list, which looks at the faces of
  * one vertex; a call never does more than one star's work.

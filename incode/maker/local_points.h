@@ -3,7 +3,7 @@
  * for every tetrahedron that is built there.  Far vertices are appended as they
  * are met.
  *
- * Memory: struct incode_local_points, about 35 KB.  Work: one walk a leaf, one
+ * Memory: struct incode_local_points, about 43 KB.  Work: one walk a leaf, one
  * pass a vertex; a scan looks at every point around the vertex, a vector at a
  * time in single precision, and leaves what its error bound cannot tell to the
  * exact predicates.

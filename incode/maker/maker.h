@@ -5,7 +5,7 @@
  * INCODE_SEARCHES of them at a time, and resumed when the page is there.  It
  * knows no list of faces and no order of work.
  *
- * Memory: struct incode_maker, about 85 KB, and the share of an arena that
+ * Memory: struct incode_maker, about 68 KB, and the share of an arena that
  * incode_maker_bytes states: copies of neighbour bricks, frames of pages.
  * Work: a call takes one search as far as its next missing page; with the
  * indexes `naive` and `grid` it looks at no more than 256 pages of points or

@@ -282,8 +282,10 @@ static void do_job(struct world *w, const struct incode_job *job)
             fail_msg("%s", w->front.fault);
         if (turn == INCODE_TURN_END)
             break;
-        if (w->front.hub_count > w->hubs)
+        if (w->front.hub_count > w->hubs) {
             w->hubs = w->front.hub_count;
+            assert_int_equal(w->front.hubs[w->hubs - 1], w->points.count / 3);
+        }
         bool came =
             (turn == INCODE_TURN_WAIT || by_chance(w, 8)) && return_spilled(w);
         idle = turn == INCODE_TURN_WAIT && !came ? idle + 1 : 0;
