@@ -67,6 +67,36 @@ static int check(void *context, struct host_error *error)
     return t->machine.check(t->machine.context, error);
 }
 
+static void missing(void *context, unsigned node, unsigned link)
+{
+    struct host_throttled *t = context;
+    t->machine.missing(t->machine.context, node, link);
+}
+
+static unsigned restarts(void *context)
+{
+    struct host_throttled *t = context;
+    return t->machine.restarts(t->machine.context);
+}
+
+static bool kill_node(void *context, unsigned node)
+{
+    struct host_throttled *t = context;
+    return t->machine.kill(t->machine.context, node);
+}
+
+static const char *doubt(void *context, unsigned node)
+{
+    struct host_throttled *t = context;
+    return t->machine.doubt(t->machine.context, node);
+}
+
+static void rest(void *context, uint64_t rest_us)
+{
+    struct host_throttled *t = context;
+    t->machine.rest(t->machine.context, rest_us);
+}
+
 static bool ended(void *context)
 {
     struct host_throttled *t = context;
@@ -94,6 +124,11 @@ struct host_machine host_throttle_machine(struct host_throttled *throttled,
     result.now_us = now_us;
     result.idle = idle;
     result.check = check;
+    result.missing = machine->missing != NULL ? missing : NULL;
+    result.restarts = machine->restarts != NULL ? restarts : NULL;
+    result.kill = machine->kill != NULL ? kill_node : NULL;
+    result.doubt = machine->doubt != NULL ? doubt : NULL;
+    result.rest = machine->rest != NULL ? rest : NULL;
     result.ended = ended;
     result.stop = stop;
     return result;
