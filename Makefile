@@ -71,8 +71,9 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all ncube unit points planted bare run test test-full bench firmware fuzz fuzzers lint install \
-	clean help deps deps-run deps-test deps-bench deps-full FORCE
+.PHONY: all ncube unit points planted bare fuzzers run check test test-full \
+	bench firmware fuzz lint install clean help deps deps-run deps-test \
+	deps-bench deps-full FORCE
 
 all: $(BUILD)/incode $(BUILD)/incode-node $(BUILD)/incode-mpi \
 	$(BUILD)/incode-node-mpi
@@ -245,6 +246,9 @@ endif
 	set -x; $(BUILD)/incode run '$(points)' --strategy spatial --nodes 8 \
 		--verify --table --stats "$$result.json" -o "$$result.vtu"
 
+check: deps-test
+	@exec env BUILD='$(BUILD)' bash tests/run --check
+
 test: deps-test
 	@exec env BUILD='$(BUILD)' bash tests/run
 
@@ -278,7 +282,9 @@ clean:
 help:
 	@echo 'make run [POINTS=FILE]   the main job: set up, build, triangulate'
 	@echo '                         on 8 nodes, verify, write out/, report'
-	@echo 'make test                set up, build, pass all tests (16 to 20 minutes)'
+	@echo 'make test                set up, build, pass all tests (10 minutes)'
+	@echo 'make check               build, unit tests, quick lint, half a minute of'
+	@echo '                         simulation (3 minutes)'
 	@echo 'make                     build/incode, build/incode-node, and both for'
 	@echo '                         ranks of MPI'
 	@echo 'make deps                install missing Debian packages'
@@ -288,9 +294,10 @@ help:
 	@echo 'make firmware            compile the freestanding rooms for'
 	@echo '                         Cortex-M3 and M7, print their sizes'
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
-	@echo 'make lint                formatters, analysers, warnings as errors'
-	@echo 'make ncube               build/libncube.a: the nCUBE'"'"'s calls, for porting'
-	@echo '                         programs that were written for them'
+	@echo 'make lint                the order of rooms, format, examples, sizes,'
+	@echo '                         warnings as errors, analysers'
+	@echo 'make ncube               build/libncube.a: the calls of the nCUBE, for'
+	@echo '                         porting programs that were written for them'
 	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
