@@ -29,14 +29,6 @@ static void test_layouts(void **unused)
     assert_int_equal(sizeof(struct node_ready_message) % 4, 0);
 }
 
-/* Types of the two directions do not meet, so a stray one is noticed. */
-static void test_types(void **unused)
-{
-    (void)unused;
-    assert_true(NODE_STOP < NODE_READY);
-    assert_true(NODE_FAULT < 256);
-}
-
 static void test_outbox(void **unused)
 {
     (void)unused;
@@ -72,7 +64,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_layouts),
-        cmocka_unit_test(test_types),
         cmocka_unit_test(test_outbox),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -6,12 +6,10 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include <cmocka.h>
 
 #include "node/result.h"
-#include "tests/unit/emulated.h"
 
 enum { BATCH = 1592, STARS = 4000, APEXES = 40 };
 
@@ -191,75 +189,12 @@ static void test_truncated(void **unused)
     }
 }
 
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-/* The stated speed, with room for a slow or instrumented machine. */
-static void test_speed(void **unused)
-{
-    (void)unused;
-    if (emulated()) {
-        print_message("no speed is to be had under valgrind\n");
-        skip();
-    }
-    static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
-    static uint32_t apexes[1024][7][3];
-    struct node_result_writer writer;
-    size_t total = 0, bytes = 0, seen = 0;
-    double writing = 0.0, reading = 0.0;
-    for (size_t s = 0; s < 1024; s++) {
-        for (size_t i = 0; i < 21; i++) {
-            apexes[s][i / 3][i % 3] = 100000 + (draw() >> (20 + draw() % 6));
-        }
-    }
-    for (size_t round = 0; round < 2000; round++) {
-        double start = seconds();
-        size_t batch = 0;
-        node_result_begin(&writer, buffer, BATCH);
-        for (size_t s = round % 900;; s++) {
-            size_t n = node_result_star(
-                &writer, (uint32_t)(100000 + s),
-                (const uint32_t(*)[3])(const void *)apexes[s % 1024], 7);
-            batch += n;
-            if (n < 7) {
-                break;
-            }
-        }
-        double middle = seconds();
-        struct node_result_reader reader;
-        uint32_t rows[256][4];
-        size_t count;
-        enum node_result_event event;
-        node_result_open(&reader, buffer, writer.size, 1 << 20);
-        do {
-            event = node_result_read(&reader, rows, 256, &count);
-            seen += count;
-        } while (event == NODE_RESULT_ROWS);
-        assert_int_equal(event, NODE_RESULT_END);
-        writing += middle - start;
-        reading += seconds() - middle;
-        total += batch;
-        bytes += writer.size;
-    }
-    assert_int_equal(total, seen);
-    print_message("%.1f bytes, write %.1f ns, read %.1f ns a tetrahedron\n",
-                  (double)bytes / (double)total, 1e9 * writing / (double)total,
-                  1e9 * reading / (double)total);
-    assert_true(1e9 * writing / (double)total < 200.0);
-    assert_true(1e9 * reading / (double)total < 200.0);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_garbage),
         cmocka_unit_test(test_truncated),
-        cmocka_unit_test(test_speed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
