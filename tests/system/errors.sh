@@ -156,25 +156,26 @@ done
 
 # A pipe has a name like a file; its reader is there, or it is not.
 mkfifo "$in/pipe.npy"
-refuses 'errors/a pipe without a reader' 3 'pipe.npy: .*no.* reads' timeout 20 \
-    "$INCODE" run "$good" -q -o "$left/o.vtu" -o "$in/pipe.npy"
+refuses 'errors/a pipe without a reader' 3 'pipe.npy: .*no.* reads' \
+    incode run "$good" -q -o "$left/o.vtu" -o "$in/pipe.npy"
 exec 7<> "$in/pipe.npy" 8< "$in/pipe.npy" # both ends, before anybody looks
-timeout 20 cat <&8 7>&- > "$scratch/piped.npy" &
-timeout 20 "$INCODE" run "$good" -q -o "$in/pipe.npy" -o "$scratch/plain.npy" 7>&-
+within cat <&8 7>&- > "$scratch/piped.npy" &
+incode run "$good" -q -o "$in/pipe.npy" -o "$scratch/plain.npy" 7>&-
 status=$?
 exec 7>&- 8<&-
 check 'errors/a pipe with a reader' "exit $status" \
     eval 'wait $! && [ $status = 0 ] && cmp "$scratch/piped.npy" "$scratch/plain.npy"'
 # Whatever started it.
-check 'errors/a closed standard input' "exit $?" timeout 8 \
-    "$INCODE" run "$good" -q --nodes 2 --link serial <&-
-check 'errors/nothing is open' "exit $?" timeout 8 "$INCODE" run "$good" -q \
+has_terminals 'errors/a closed standard input' &&
+    check 'errors/a closed standard input' "exit $?" \
+        incode run "$good" -q --nodes 2 --link serial <&-
+check 'errors/nothing is open' "exit $?" incode run "$good" -q \
     --nodes 2 -o "$scratch/closed.npy" <&- >&- 2>&-
 refuses 'errors/a closed standard output' 3 'standard output: Bad file' \
     bash -c '"$@" >&-' - "$INCODE" run "$good" --nodes 2 -o "$left/o.vtu"
 refuses 'errors/tetrahedra to a closed standard output' 3 '-: .*Bad file' \
     bash -c '"$@" >&-' - "$INCODE" run "$good" -q --nodes 2 -o -
-refuses 'errors/ends of children are ignored' 4 'ended 3 times, .*status 1;' timeout 20 \
+refuses 'errors/ends of children are ignored' 4 'ended 3 times, .*status 1;' within \
     env --ignore-signal=CHLD "$INCODE" run "$good" -q --nodes 2 \
     --node-program /bin/false -o "$left/o.vtu"
 
@@ -188,11 +189,9 @@ contained=(unshare ${user:+"$user"} -m bash -c 'mount -t devpts -o \
 if "${contained[@]}" true 2> /dev/null; then
     "${contained[@]}" "$INCODE" run "$in/many.xyz" -q --nodes 16 \
         --link serial --host-rate 2000 &
-    for _ in $(seq 100); do
-        [ "$(pgrep -c -P $! incode-node)" = 16 ] && break
-        sleep 0.05
-    done
-    succeeds "$name" timeout 20 "$INCODE" run "$good" -q --nodes 16 \
+    all_there() { [ "$(pgrep -c -P $! incode-node)" = 16 ]; }
+    await all_there
+    succeeds "$name" incode run "$good" -q --nodes 16 \
         --link serial
     kill $!
     wait $! 2> /dev/null
@@ -250,10 +249,8 @@ interrupted() { # SIGNAL
     mkfifo "$pipe"
     exec 7<> "$pipe"
     "$INCODE" run "$in/many.xyz" -q -o "$left/o.npy" -o "$left/o.ele" &
-    for _ in $(seq 300); do
-        [ "$(find "$left" -name '*.part-*' | wc -l)" = 4 ] && break
-        sleep 0.05
-    done
+    all_parts() { [ "$(find "$left" -name '*.part-*' | wc -l)" = 4 ]; }
+    await all_parts
     # shellcheck disable=SC2012
     parts=$(ls "$left" | wc -l)
     kill -s "$1" $!
@@ -395,7 +392,7 @@ check 'cube/from a pipe' "exit $?" grep -q -e '--board linux' "$scratch/output"
 node() { # NAME PATTERN ARGUMENT...
     local name=node/$1 pattern=$2 status
     shift 2
-    timeout 5 "$BUILD/incode-node" "$@" > "$scratch/output" 2> "$scratch/errors"
+    within "$BUILD/incode-node" "$@" > "$scratch/output" 2> "$scratch/errors"
     status=$?
     check "$name" "exit $status: $(last "$scratch/errors")" test $status = 2 \
         -a -n "$(grep -E -e "^incode-node: $pattern.*; " "$scratch/errors")"

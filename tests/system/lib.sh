@@ -83,8 +83,51 @@ list_sets() {
 # A failed run may say more than its last line; the stat of a run by its name.
 stat_of() { jq -r ".$2" "$1"; }
 
-# The program, ended where it would hang.
-incode() { timeout -k 5 "${SECONDS_MAX:-120}" "$INCODE" "$@"; }
+# The program, or a command, ended where it would hang: after so long that no
+# machine is too slow for it.
+hang=${SECONDS_MAX:-900}
+within() { timeout -k 5 "$hang" "$@"; }
+incode() { within "$INCODE" "$@"; }
+
+# await COMMAND...: waits until it succeeds; false after two minutes.
+await() {
+    local end=$((SECONDS + 120))
+    until "$@"; do
+        [ $SECONDS -lt $end ] || return 1
+        sleep 0.01
+    done
+}
+
+# What needs no waiting is told long before a node's patience of 60 s is over,
+# however slow the machine is.
+# shellcheck disable=SC2034
+soon=45
+
+# Whether there are pseudo-terminals here; if not, NAME is skipped.
+has_terminals() {
+    [ -d /dev/pts ] && { : <> /dev/ptmx; } 2> /dev/null && return
+    skip "$1" 'there are no pseudo-terminals here: no /dev/pts'
+    return 1
+}
+
+# Takes ports $base .. $base + 499 of this machine, in which nobody listens; no
+# other script takes them before all that was started here has ended.
+take_ports() {
+    local lock port taken
+    for base in $(seq 10000 500 29500 | shuf); do
+        { exec {lock}>> "/tmp/incode-test-ports.$base"; } 2> /dev/null ||
+            continue
+        taken=$(cat /proc/net/tcp /proc/net/tcp6 2> /dev/null |
+            sed -n 's/^ *[0-9]*: [0-9A-F]*:\([0-9A-F]*\) .*/\1/p' |
+            while read -r port; do
+                [ $((16#$port / 500 * 500)) = "$base" ] && echo "$port"
+            done)
+        [ -z "$taken" ] && flock -n "$lock" && return
+        exec {lock}>&-
+    done
+    fail "$(basename "$0" .sh)" 'no range of ports is free'
+    exit 1
+}
 
 # --- runs ----------------------------------------------------------------------
 

@@ -4,14 +4,12 @@
 # for `spatial`.  That the rows cover every pair is checked too.
 # Sets past `naive_max` points are left out with `naive`, whose work is n^2, and
 # past `grid_max` with `grid`; those past `kd_max` are for digests.sh, and for
-# `make test-full`; so are, for their pages' long ways, those past `way_max` on
-# 32 nodes of 512 KiB, and `grid` and `naive` on many nodes of little memory.
+# `make test-full`; so are `grid` and `naive` on many nodes of little memory.
 . tests/system/lib.sh
 need_data pairs
 naive_max=${NAIVE_MAX:-5000}
 grid_max=${GRID_MAX:-15000}
-way_max=${WAY_MAX:-20000}
-kd_max=${KD_MAX:-100000}
+kd_max=${KD_MAX:-20000}
 
 rows='
 sequential grid 1 1M 1
@@ -79,8 +77,6 @@ while read -r set file points _ tetrahedra digest; do
         [ -n "$strategy" ] || continue
         [ "$index" = naive ] && [ "$points" -gt "$naive_max" ] && continue
         [ "$index" = grid ] && [ "$points" -gt "$grid_max" ] && continue
-        [ "$nodes $memory" = '32 512K' ] && [ "$points" -gt "$way_max" ] &&
-            continue
         triangulates "pairs/$set $strategy $index $nodes $memory $seed \
 ${partition:-} ${rule:-}" "$set" "$INCODE_DATA/$file" "$digest" \
             --strategy "$strategy" --index "$index" --nodes "$nodes" \

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Nodes that are killed and stopped in mid-run, and nodes that cannot live: the
 # digest is that of the undisturbed run, or the run ends with status 4 and
-# leaves nothing.  Half a minute.
+# leaves nothing.
 . tests/system/lib.sh
 
 points=$scratch/points.npy
@@ -12,6 +12,8 @@ digest=$(stat_of "$scratch/first.json" digest)
 tetrahedra=$(stat_of "$scratch/first.json" tetrahedra)
 
 # start [OPTION...]: a run on 8 nodes in the background, $host its process.
+# at_work [OPTION...]: one whose host reads slowly for three seconds, so that it
+# is not over before, however slow this script is.
 start() {
     rm -f "$scratch/out.npy" "$scratch/stats.json"
     "$INCODE" run "$points" -q --nodes 8 -o "$scratch/out.npy" \
@@ -19,17 +21,21 @@ start() {
     host=$!
 }
 
+at_work() { start --host-rate 100000 --host-rate-time 3 "$@"; }
+
 # The process of node I, once it is there.
 node_of() {
+    local found=
+    await look_for "$1"
+    echo "$found"
+}
+look_for() {
     local pid words
-    for _ in $(seq 200); do
-        for pid in $(pgrep -P $host -x incode-node); do
-            { words=$(tr '\0' ' ' < "/proc/$pid/cmdline"); } 2> /dev/null
-            case $words in *"--node $1 "*) echo "$pid"; return ;; esac
-        done
-        kill -0 $host 2> /dev/null || return
-        sleep 0.005
+    for pid in $(pgrep -P $host -x incode-node); do
+        { words=$(tr '\0' ' ' < "/proc/$pid/cmdline"); } 2> /dev/null
+        case $words in *"--node $1 "*) found=$pid; return ;; esac
     done
+    ! kill -0 $host 2> /dev/null
 }
 
 # strike SIGNAL NODE: false where the run is over already.
@@ -66,16 +72,21 @@ survives() {
 
 # --- kill -9 -----------------------------------------------------------------
 
+# Where the run was over before, on a machine where this script is slow, once
+# more, with a host that reads slowly.
 for strategy in spatial sequential; do
     for node in 0 1 2 3 4 5 6 7; do
-        start --strategy $strategy
-        node_of 7 > "$scratch/said"
-        sleep 0.0$((node + 2))
-        strike KILL $node
+        for how in start at_work; do
+            $how --strategy $strategy
+            node_of 7 > "$scratch/said"
+            sleep 0.0$((node + 2))
+            strike KILL $node && break
+            wait $host
+        done
         survives "kill -9 of node $node, $strategy"
     done
     for node in 0 5; do
-        start --strategy $strategy --index grid
+        at_work --strategy $strategy --index grid
         sleep 0.3
         strike KILL $node
         survives "kill -9 of node $node, $strategy, grid"
@@ -107,7 +118,7 @@ done
 # --- kill -STOP --------------------------------------------------------------
 
 for strategy in spatial sequential; do
-    start --strategy $strategy
+    at_work --strategy $strategy
     sleep 0.05
     strike STOP 0
     sleep 0.5
@@ -120,7 +131,7 @@ for strategy in spatial sequential; do
         'a stopped node was given up' test \
         "$(stat_of "$scratch/stats.json" node_restarts)" = 0
 done
-start --strategy spatial --patience 1
+at_work --strategy spatial --patience 1
 sleep 0.05
 strike STOP 0
 strike STOP 5
@@ -130,31 +141,31 @@ check 'survival/they were started again' 'not both' test \
 
 # --- it cannot go on ---------------------------------------------------------
 
-# hopeless NAME PROGRAM: exit 4 within 10 s, node and link named, no output
-# left.
+# hopeless NAME PROGRAM: exit 4 soon, node and link named, no output left.
 hopeless() {
     local began=$SECONDS
     refuses "survival/$1" 4 '^incode: node [0-7] link [0-3]: ' \
-        "$INCODE" run "$points" -q --nodes 8 --node-program "$2" \
+        incode run "$points" -q --nodes 8 --node-program "$2" \
         -o "$scratch/left/out.npy"
-    check "survival/$1: within 10 s" "$((SECONDS - began)) s" \
-        test $((SECONDS - began)) -le 10
+    check "survival/$1: soon" "$((SECONDS - began)) s" \
+        test $((SECONDS - began)) -le $soon
 }
 hopeless 'a node program that ends at once' /bin/false
 printf '#!/bin/sh\nkill -SEGV $$\n' > "$scratch/dies"
-printf '#!/bin/sh\nexec sleep 60\n' > "$scratch/mute"
+printf '#!/bin/sh\nexec sleep 600\n' > "$scratch/mute"
 chmod +x "$scratch/dies" "$scratch/mute"
 hopeless 'a node program that a signal ends' "$scratch/dies"
 hopeless 'a node program that says nothing' "$scratch/mute"
+take_ports
 cat > "$scratch/one.cube" <<-END
 	dimension = 0;
 	start = [0];
 	links = ( { node = 0; to = "host";
-	            tcp = "127.0.0.1:$((10000 + RANDOM % 20000))"; } );
+	            tcp = "127.0.0.1:$base"; } );
 END
 refuses 'survival/a node of a cube file that a signal ends' 4 \
     '^incode: node 0 link 0: ended 3 times, the last by signal 11 ' \
-    "$INCODE" run "$points" -q --cube "$scratch/one.cube" \
+    incode run "$points" -q --cube "$scratch/one.cube" \
     --node-program "$scratch/dies" -o "$scratch/left/out.npy"
 
 # A node that is killed whenever it comes up; the host reads slowly, so that the

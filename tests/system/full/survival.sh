@@ -33,7 +33,7 @@ for run in $(seq 100); do
 --face-rule $(pick own paper) --link $(pick tcp serial) \
 --nodes $(pick 2 4 8 16) --memory $(pick 512K 1M 4M)"
     # shellcheck disable=SC2086
-    timeout 120 "$INCODE" run "$points" -q --stats "$scratch/stats.json" $how \
+    within "$INCODE" run "$points" -q --stats "$scratch/stats.json" $how \
         2> "$scratch/errors" &
     timer=$!
     sleep 0.03

@@ -51,7 +51,8 @@ check 'vm/the host program for arm64' "$(last "$scratch/said")" \
 
 # --- the machine --------------------------------------------------------------
 
-port=$((10000 + RANDOM % 20000))
+take_ports
+port=$base
 disk=$scratch/disk
 mkdir -p "$disk/bin" "$disk/proc" "$disk/sys" "$disk/dev"
 cp "$vm/root/bin/busybox" "$vm/build/incode" "$disk/bin/"
