@@ -126,7 +126,8 @@ if ! "${MAKE:-make}" -C "$tree" --no-print-directory -o build/flags \
     fail adding/build "$(grep -m 1 error "$scratch/log")"
     exit 1
 fi
-check adding/build 'a warning' [ "$(grep -c warning "$scratch/log")" = 0 ]
+check adding/build 'a warning' \
+    [ "$(grep -cE '\.c:[0-9:]+ warning' "$scratch/log")" = 0 ]
 cp "$tree/build/incode-node" "$tree/build/incode-node-toy"
 
 old=$INCODE new=$tree/build/incode
