@@ -61,7 +61,7 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     put_real(o, "wall_s", 1e-6 * (double)f->wall_us);
     put(o, "vertices", s->vertices);
     put(o, "vertices_waited", s->vertices_waited);
-    put(o, "wide_searches", s->tree_searches);
+    put(o, "tree_searches", s->tree_searches);
     put(o, "seeds", s->seeds);
     put(o, "page_requests", s->page_requests);
     put(o, "page_faults", s->page_faults);
