@@ -41,17 +41,12 @@ size_t host_strategy_arena(const struct host_strategy *strategy, unsigned nodes,
                            const struct node_setup_message *given)
 {
     const struct host_work work = {.nodes = nodes, .living = nodes};
-    struct node_setup_message before;
     size_t most = 0;
     for (unsigned i = 0; i < nodes; i++) {
         struct node_setup_message setup = *given;
         strategy->set_up(&work, i, &setup);
-        /* Many nodes are alike. */
-        if (i == 0 || memcmp(&setup, &before, sizeof setup) != 0) {
-            size_t needed = node_arena_needed(identity, memory, &setup);
-            most = needed > most ? needed : most;
-        }
-        before = setup;
+        size_t needed = node_arena_needed(identity, memory, &setup);
+        most = needed > most ? needed : most;
     }
     return most;
 }
