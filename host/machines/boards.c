@@ -20,14 +20,17 @@ const struct host_board *host_board_row(unsigned i)
 
 const char *host_board_name(unsigned i)
 {
-    return host_board_row(i) == NULL ? NULL : boards[i]->name;
+    const struct host_board *board = host_board_row(i);
+    return board == NULL ? NULL : board->name;
 }
 
 const struct host_board *host_board_named(const char *name)
 {
-    const struct host_board *board = NULL;
-    for (unsigned i = 0; host_board_row(i) != NULL; i++) {
-        board = strcmp(name, boards[i]->name) == 0 ? boards[i] : board;
+    const struct host_board *board;
+    for (unsigned i = 0; (board = host_board_row(i)) != NULL; i++) {
+        if (strcmp(name, board->name) == 0) {
+            break;
+        }
     }
     return board;
 }
