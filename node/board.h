@@ -35,14 +35,12 @@ struct node_identity {
     /* Of this start; not 0, and never used before by this node. */
     uint32_t epoch;
 
-    /* The host's second wire leads to this node, to link `dimension`; node 0
-     * always has one. */
-    bool host_wire;
+    /* This node has a host port, at link `dimension`; node 0 always has. */
+    bool host_port;
 
-    /* Nodes 0 .. host_wires - 1 have a wire to the host, the same on all: a
-     * power of two, 2 .. CUBE_HOST_WIRES_MAX; 0: node 0 has, and who has
-     * host_wire. */
-    uint8_t host_wires;
+    /* Nodes 0 .. host_ports - 1 have host ports, the same on all: a power of
+     * two, 2 .. CUBE_HOST_PORTS_MAX; 0: node 0 has, and who has host_port. */
+    uint8_t host_ports;
 
     /* Microseconds after which a link that is down or silent is given up for
      * the run; 0: never. */
@@ -56,7 +54,7 @@ struct node_board {
     void *context;
     struct node_identity identity;
     /* Sends and receives bytes on link i: 0 .. dimension - 1 to the neighbours;
-     * node 0, and the one with host_wire, have the host at link `dimension`. */
+     * node 0, and the one with host_port, have the host at link `dimension`. */
     struct link_pipe pipes[CUBE_LINKS_MAX];
     /* Microseconds since any fixed time, never going back. */
     uint64_t (*now_us)(void *context);

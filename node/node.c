@@ -46,8 +46,8 @@ static struct cube_config configure(const struct node_identity *identity,
     config.window =
         identity->window != 0 ? identity->window : window_for(memory);
     config.epoch = identity->epoch;
-    config.host_wire = identity->host_wire;
-    config.host_wires = identity->host_wires;
+    config.host_port = identity->host_port;
+    config.host_ports = identity->host_ports;
     config.dead_us = identity->dead_us;
     cube_for_serial(&config, identity->serial_baud);
     return config;

@@ -26,21 +26,21 @@ static unsigned nodes(const struct cube *cube)
  * at the gateway. */
 static bool many_host_ports(const struct cube *cube)
 {
-    return cube->config.host_wires > 1 && !cube->routes.tree;
+    return cube->config.host_ports > 1 && !cube->routes.tree;
 }
 
 /* The node by whose host port a node and the host reach each other.  Between
  * the two e-cube's dimensions are above those in which these nodes differ. */
 static unsigned host_port_of(const struct cube *cube, unsigned node)
 {
-    return many_host_ports(cube) ? node & (cube->config.host_wires - 1u)
+    return many_host_ports(cube) ? node & (cube->config.host_ports - 1u)
                                  : cube->wiring.gateway;
 }
 
 /* The host's link to the host port of a node. */
 static unsigned link_of_host_port(const struct cube *cube, unsigned node)
 {
-    if (cube->config.host_wires > 1) {
+    if (cube->config.host_ports > 1) {
         return node;
     }
     return cube->count > 1 && node == cube->config.spare_node ? 1 : 0;
@@ -72,7 +72,7 @@ static uint32_t ways_to_all(const struct cube *cube, unsigned source)
 {
     unsigned self = cube->config.self;
     unsigned root = source == CUBE_HOST ? host_port_of(cube, self) : source;
-    uint32_t between = many_host_ports(cube) ? cube->config.host_wires - 1u : 0;
+    uint32_t between = many_host_ports(cube) ? cube->config.host_ports - 1u : 0;
     if (is_host(cube)) {
         return between != 0
                    ? ((uint32_t)1 << cube->count) - 1
@@ -114,7 +114,7 @@ static struct link_config link_config_of(const struct cube_config *config,
     c.epoch = config->epoch;
     c.node = config->self;
     c.port = (uint8_t)d;
-    bool many = config->host_wires > 1;
+    bool many = config->host_ports > 1;
     c.peer_node = (uint16_t)(host      ? many || d == 0 ? d : config->spare_node
                              : to_host ? CUBE_HOST
                                        : config->self ^ 1u << d);
@@ -137,26 +137,26 @@ static struct link_config link_config_of(const struct cube_config *config,
 
 static unsigned links_of(const struct cube_config *config)
 {
-    if (config->host_wires > 1) {
+    if (config->host_ports > 1) {
         return config->self == CUBE_HOST
-                   ? config->host_wires
+                   ? config->host_ports
                    : config->dimension +
-                         (config->self < config->host_wires ? 1u : 0u);
+                         (config->self < config->host_ports ? 1u : 0u);
     }
     if (config->self == CUBE_HOST) {
         return config->spare_node != 0 ? 2 : 1;
     }
     return config->dimension +
-           (config->self == 0 || config->host_wire ? 1u : 0u);
+           (config->self == 0 || config->host_port ? 1u : 0u);
 }
 
 static bool sound(const struct cube_config *config)
 {
-    unsigned wires = config->host_wires;
+    unsigned wires = config->host_ports;
     if (config->dimension > CUBE_DIMENSION_MAX) {
         return false;
     }
-    bool even = (wires & (wires - 1)) == 0 && wires <= CUBE_HOST_WIRES_MAX &&
+    bool even = (wires & (wires - 1)) == 0 && wires <= CUBE_HOST_PORTS_MAX &&
                 wires <= 1u << config->dimension &&
                 (wires < 2 || config->spare_node == 0);
     return even &&

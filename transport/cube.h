@@ -41,7 +41,7 @@ enum {
     CUBE_WHOLE_NODE = 0xff, /* as the dimension of struct cube_dead */
     CUBE_HOST = 0xfffe,
     CUBE_ALL = 0xffff,
-    CUBE_HOST_WIRES_MAX = 8
+    CUBE_HOST_PORTS_MAX = 8
 };
 
 /* A link that is dead for the run, named by its lower end (its host's wire:
@@ -96,19 +96,19 @@ struct cube_config {
     struct link_pipe pipes[CUBE_LINKS_MAX];
 
     /* At the host: another node that has a host port, beside node 0; pipes[1]
-     * leads there.  Default: none; 1 .. 2^dimension - 1, with host_wires 0. */
+     * leads there.  Default: none; 1 .. 2^dimension - 1, with host_ports 0. */
     uint16_t spare_node;
 
-    /* Instead of it: nodes 0 .. host_wires - 1 have host ports, pipes[i] of the
+    /* Instead of it: nodes 0 .. host_ports - 1 have host ports, pipes[i] of the
      * host leads to node i, and what goes between the host and a node takes
      * that node's, or that of the node with the same low bits.  The same at all
      * ends.  Default, as for 1: node 0 alone; a power of two, up to
-     * CUBE_HOST_WIRES_MAX and 2^dimension. */
-    uint8_t host_wires;
+     * CUBE_HOST_PORTS_MAX and 2^dimension. */
+    uint8_t host_ports;
 
     /* At the spare node: that it has a host port.  Default: it has none; node 0
      * has one always. */
-    bool host_wire;
+    bool host_port;
 
     /* At the host: the host gateway of the first generation.  Default: node 0;
      * or a node that has a host port. */

@@ -120,7 +120,7 @@ static struct cube_dead name_of(const struct cube *cube, unsigned d)
     const struct cube_config *c = &cube->config;
     struct cube_dead name = {c->self, (uint8_t)d};
     if (is_host(cube)) {
-        name.node = c->host_wires > 1 || d == 0 ? (uint16_t)d : c->spare_node;
+        name.node = c->host_ports > 1 || d == 0 ? (uint16_t)d : c->spare_node;
         name.dimension = c->dimension;
     }
     return name;

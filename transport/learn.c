@@ -43,7 +43,7 @@ static bool take_hello(struct learner *learner, unsigned d,
     learned->self = (uint16_t)field16(hello + 4);
     learned->dimension = (uint8_t)(hello[7] - 1);
     learned->link = (uint8_t)d;
-    learned->host_wire = learned->teacher == CUBE_HOST && learned->self != 0;
+    learned->host_port = learned->teacher == CUBE_HOST && learned->self != 0;
     if (!sensible(learned, expected)) {
         return false;
     }

@@ -20,7 +20,7 @@ enum { LEARN_BYTES = 64 }; /* a greeting takes 44 on the wire */
 struct learned {
     uint16_t self; /* who this node is, */
     uint8_t dimension;
-    bool host_wire;   /* (other than node 0) the host itself says so */
+    bool host_port;   /* (other than node 0) the host itself says so */
     uint16_t teacher; /* by the account of this node or CUBE_HOST, */
     uint8_t link;     /* on this link */
 };

@@ -38,7 +38,7 @@ struct linux_board {
     struct linux_wire wire[CUBE_LINKS_MAX];
     unsigned links_count;
     uint8_t key[SECURE_KEY_BYTES];
-    uint64_t watch_us;
+    uint64_t awake_us;
     char **again; /* arguments of the next start; NULL: there is none */
 };
 
@@ -57,7 +57,7 @@ static uint64_t busy_us(void *context)
 static void idle(void *context, uint64_t wait_us)
 {
     struct linux_board *board = context;
-    linux_wires_idle(board->wire, board->links_count, wait_us, board->watch_us);
+    linux_wires_idle(board->wire, board->links_count, wait_us, board->awake_us);
 }
 
 /* A node that a user started begins anew, with an epoch of its own. */
@@ -138,10 +138,10 @@ static bool learn(const struct node_board *board, struct linux_options *options)
     }
     options->node = learned.self;
     options->dimension = learned.dimension;
-    options->host_wire =
+    options->host_port =
         learned.self != 0 && links->links_count > learned.dimension;
     unsigned count = learned.dimension +
-                     (options->node == 0 || options->host_wire != 0 ? 1u : 0u);
+                     (options->node == 0 || options->host_port != 0 ? 1u : 0u);
     return count == links->links_count;
 }
 
@@ -155,7 +155,7 @@ static struct node_identity identity_of(const struct linux_options *options)
     id.epoch = (uint32_t)options->epoch;
     id.serial_baud = (uint32_t)options->serial_baud;
     id.dead_us = (uint32_t)options->dead;
-    id.host_wire = options->host_wire != 0;
+    id.host_port = options->host_port != 0;
     return id;
 }
 
@@ -223,7 +223,7 @@ static int prepare(char **argv, struct linux_options *options,
                         4);
     }
     linux_board->links_count = options->links_count + options->wires_count;
-    linux_board->watch_us = options->watch;
+    linux_board->awake_us = options->awake;
     if (options->wires_count > 0 &&
         !open_wires(linux_board, options, net, &fault)) {
         return complain(fault, 2);

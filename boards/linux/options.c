@@ -15,8 +15,8 @@ static const char help[] =
     "  --memory BYTES     data memory in all, stack included (4194304)\n"
     "  --stack BYTES      of it (65536)\n"
     "  --window N         frames a link and direction, 1 to 64; by memory\n"
-    "  --lines BAUD       the cube has serial wires, the slowest so fast\n"
-    "  --host-wire 0|1    besides node 0, this node has a wire to the host\n"
+    "  --serial-baud BAUD the cube has serial wires, the slowest so fast\n"
+    "  --host-port 0|1    besides node 0, this node has a host port\n"
     "  --dead US          microseconds of silence after which a link is given "
     "up; 0: never\n"
     "  --key FILE         64 hexadecimal digits: the key of the cube\n"
@@ -31,7 +31,7 @@ static const char help[] =
     "Of the host that starts nodes itself:\n"
     "  --links FD,FD,..   the wires of links 0, 1, .. are these open files\n"
     "  --epoch N          of this start, never repeated\n"
-    "  --watch US         microseconds to stay awake when there is nothing to "
+    "  --awake US         microseconds to stay awake when there is nothing to "
     "do\n"
     "\n"
     "Exit status: 0 done, 2 wrong usage, 4 it cannot start.\n";
@@ -102,10 +102,10 @@ static const char *read_one(const char *name, const char *text,
                  {"--stack", &options->stack, UINT64_C(1) << 40},
                  {"--window", &options->window, LINK_WINDOW_MAX},
                  {"--epoch", &options->epoch, UINT32_MAX},
-                 {"--lines", &options->serial_baud, UINT32_MAX},
-                 {"--host-wire", &options->host_wire, 1},
+                 {"--serial-baud", &options->serial_baud, UINT32_MAX},
+                 {"--host-port", &options->host_port, 1},
                  {"--dead", &options->dead, UINT32_MAX},
-                 {"--watch", &options->watch, UINT32_MAX}};
+                 {"--awake", &options->awake, UINT32_MAX}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
         if (strcmp(name, known[i].name) == 0) {
             bool good = read_number(&text, known[i].value) && *text == '\0';
@@ -135,7 +135,7 @@ static const char *read_one(const char *name, const char *text,
 static bool wires_fit(const struct linux_options *options)
 {
     unsigned links = (unsigned)options->dimension +
-                     (options->node == 0 || options->host_wire != 0 ? 1 : 0);
+                     (options->node == 0 || options->host_port != 0 ? 1 : 0);
     if (options->node == LINUX_UNNAMED) {
         links = options->links_count + options->wires_count;
         if (links == 0) {
@@ -178,7 +178,7 @@ bool linux_options_read(char **argv, struct linux_options *options,
     }
     fault->where = options->links_count > 0 ? "--links" : "--wire";
     fault->what = "not one for each link: those to neighbours, and to the host "
-                  "from node 0 and with --host-wire 1";
+                  "from node 0 and with --host-port 1";
     fault->next = "incode cube FILE prints those of a cube";
     return wires_fit(options);
 }

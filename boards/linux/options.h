@@ -24,9 +24,9 @@ struct linux_options {
     uint64_t window;      /* frames a link and direction; 0: by memory */
     uint64_t epoch;       /* of this start; 0: it draws one */
     uint64_t serial_baud; /* of the slowest serial wire; 0: there is none */
-    uint64_t host_wire;   /* 1: it has a wire to the host although not node 0 */
+    uint64_t host_port;   /* 1: it has a host port although not node 0 */
     uint64_t dead;        /* microseconds until a link is given up; 0: never */
-    uint64_t watch;       /* microseconds to stay awake with nothing to do */
+    uint64_t awake;       /* microseconds to stay awake with nothing to do */
     int links[CUBE_LINKS_MAX]; /* open files, given by who starts the node */
     unsigned links_count;
     /* Wires that it opens itself: the arguments, as "2=call:10.0.0.1:7001". */

@@ -190,7 +190,7 @@ static void tell_of_key(struct linux_wire *wire)
 }
 
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
-                      uint64_t wait_us, uint64_t watch_us)
+                      uint64_t wait_us, uint64_t awake_us)
 {
     struct pollfd fds[CUBE_LINKS_MAX * TCP_WIRE_FDS_MAX];
     unsigned first[CUBE_LINKS_MAX + 1], used = 0;
@@ -207,7 +207,7 @@ void linux_wires_idle(struct linux_wire *wires, unsigned count,
         used += add_events(wire, fds + used);
     }
     first[count] = used;
-    wait_files(fds, used, wait_us, watch_us);
+    wait_files(fds, used, wait_us, awake_us);
     for (unsigned i = 0; i < count; i++) {
         hear(&wires[i], fds + first[i], first[i + 1] - first[i]);
         tell_of_key(&wires[i]);

@@ -46,9 +46,9 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
 struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 
 /* Sleeps until bytes have come, or room for them where there was none, but no
- * longer than wait_us; watch_us: as in wait.h.  At most CUBE_LINKS_MAX wires.
+ * longer than wait_us; awake_us: as in wait.h.  At most CUBE_LINKS_MAX wires.
  */
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
-                      uint64_t wait_us, uint64_t watch_us);
+                      uint64_t wait_us, uint64_t awake_us);
 
 #endif

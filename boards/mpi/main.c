@@ -122,7 +122,7 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
     board->arena = process_arena(board->arena_bytes);
     b->tag = order->tag;
     b->links =
-        order->dimension + (self < order->host_wires || self == 0 ? 1u : 0u);
+        order->dimension + (self < order->host_ports || self == 0 ? 1u : 0u);
     b->pipes = calloc(CUBE_LINKS_MAX, sizeof *b->pipes);
     if (board->arena == NULL || b->pipes == NULL) {
         give_up(self, "this machine does not grant a node's memory");
@@ -137,7 +137,7 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
     board->identity.self = (uint16_t)self;
     board->identity.dimension = (uint8_t)order->dimension;
     board->identity.window = (uint8_t)order->window;
-    board->identity.host_wires = (uint8_t)order->host_wires;
+    board->identity.host_ports = (uint8_t)order->host_ports;
     board->identity.epoch = order->epoch + self;
     board->now_us = now_us;
     board->busy_us = busy_us;

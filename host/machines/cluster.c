@@ -21,7 +21,7 @@
 #define LIMITED true
 #endif
 
-enum { WATCH_US = 100 }; /* a page's way to a node, where nobody sleeps */
+enum { AWAKE_US = 100 }; /* a page's way to a node, where nobody sleeps */
 
 extern char **environ;
 
@@ -79,7 +79,7 @@ static void become_node(const void *context, unsigned node)
     snprintf(text[3], sizeof text[3], "%d", (int)HOST_STACK_BYTES);
     snprintf(text[4], sizeof text[4], "%u", c->options.window);
     snprintf(text[5], sizeof text[5], "%lu", (unsigned long)c->epoch);
-    snprintf(text[6], sizeof text[6], "%llu", (unsigned long long)c->watch_us);
+    snprintf(text[6], sizeof text[6], "%llu", (unsigned long long)c->awake_us);
     char *argv[] = {(char[]){"incode-node"},
                     (char[]){"--node"},
                     text[0],
@@ -93,7 +93,7 @@ static void become_node(const void *context, unsigned node)
                     text[4],
                     (char[]){"--epoch"},
                     text[5],
-                    (char[]){"--watch"},
+                    (char[]){"--awake"},
                     text[6],
                     (char[]){"--links"},
                     links,
@@ -155,7 +155,7 @@ int host_cluster_start(struct host_cluster *cluster,
     cluster->options = *options;
     cluster->limited = LIMITED;
     /* Not where others wait for the processor. */
-    cluster->watch_us = options->nodes < host_threads() ? WATCH_US : 0;
+    cluster->awake_us = options->nodes < host_threads() ? AWAKE_US : 0;
     cluster->epoch = first_epoch();
     while (1u << cluster->dimension < options->nodes) {
         cluster->dimension++;
@@ -233,7 +233,7 @@ static uint64_t machine_now_us(void *context)
 static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_cluster *cluster = context;
-    host_port_idle(&cluster->port, 1, wait_us, cluster->watch_us);
+    host_port_idle(&cluster->port, 1, wait_us, cluster->awake_us);
 }
 
 static int machine_check(void *context, struct host_error *error)

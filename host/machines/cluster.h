@@ -47,7 +47,7 @@ struct host_cluster {
     unsigned restarts;       /* of nodes */
     struct host_wires wires; /* the nodes' ends, for those that start again */
     struct host_port port;   /* the wire to node 0 */
-    uint64_t watch_us;       /* that nodes and host stay awake for each other */
+    uint64_t awake_us;       /* that nodes and host stay awake for each other */
     bool limited;            /* the kernel holds the nodes to their memory */
     struct host_process process[HOST_PROCESSES_MAX];
     char path[4096]; /* of the node program */

@@ -37,8 +37,8 @@ unsigned host_cube_node_options(
                    {"--memory", file->memory},
                    {"--window", file->window},
                    {"--dead", UINT64_C(1000000) * file->dead_s},
-                   {"--lines", file->serial_baud},
-                   {"--host-wire", host != NULL ? 1 : 0}};
+                   {"--serial-baud", file->serial_baud},
+                   {"--host-port", host != NULL ? 1 : 0}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", numbers[i].name);
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%llu",

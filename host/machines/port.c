@@ -83,7 +83,7 @@ static unsigned add_events(const struct host_port *port, struct pollfd *fds)
 }
 
 void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
-                    uint64_t watch_us)
+                    uint64_t awake_us)
 {
     struct pollfd fds[HOST_PORTS_MAX * TCP_WIRE_FDS_MAX];
     nfds_t used = 0;
@@ -99,7 +99,7 @@ void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
             unplug(port);
         }
     }
-    wait_files(fds, used, wait_us, watch_us);
+    wait_files(fds, used, wait_us, awake_us);
 }
 
 void host_port_rest(struct host_port *port, uint64_t rest_us)

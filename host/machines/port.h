@@ -48,11 +48,11 @@ int host_port_net(struct host_port *port, const struct tcp_wire_config *config,
 struct link_pipe host_port_pipe(struct host_port *port);
 
 /* Sleeps until one of the ports has bytes, or room for them where there was
- * none, but no longer than wait_us; watch_us: as in wait.h.  At most
+ * none, but no longer than wait_us; awake_us: as in wait.h.  At most
  * HOST_PORTS_MAX ports. */
 enum { HOST_PORTS_MAX = 2 };
 void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
-                    uint64_t watch_us);
+                    uint64_t awake_us);
 
 /* Where the other end is in use: leaves it alone for a time, if it can be
  * called again then. */

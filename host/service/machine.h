@@ -29,9 +29,9 @@ struct host_machine {
     /* A second wire, to another node, for when node 0 is lost; 0: none. */
     uint16_t spare_node;
     struct link_pipe spare;
-    /* Instead of it, wires to nodes 0 .. host_wires - 1; see cube.h. */
-    uint8_t host_wires;
-    struct link_pipe wires[CUBE_HOST_WIRES_MAX]; /* [0] is `pipe` */
+    /* Instead of it, wires to nodes 0 .. host_ports - 1; see cube.h. */
+    uint8_t host_ports;
+    struct link_pipe wires[CUBE_HOST_PORTS_MAX]; /* [0] is `pipe` */
     /* A wire that is missing from the start is gone round, and later one that
      * was not up for so many seconds; 0: the machine has made its wires. */
     uint8_t absent_s;

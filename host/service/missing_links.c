@@ -162,10 +162,10 @@ void host_missing_links_heard(struct host_service *service, unsigned node,
     }
 }
 
-static bool has_host_wire(const struct host_machine *m, unsigned node)
+static bool has_host_port(const struct host_machine *m, unsigned node)
 {
-    return m->host_wires > 1
-               ? node < m->host_wires
+    return m->host_ports > 1
+               ? node < m->host_ports
                : node == 0 || (m->spare_node != 0 && node == m->spare_node);
 }
 
@@ -175,7 +175,7 @@ static uint32_t missing_of(const struct host_service *s, unsigned node)
 {
     const struct cube_wiring *w = cube_wiring(s->cube);
     unsigned dimension = s->machine->dimension;
-    uint32_t missing = has_host_wire(s->machine, node) ? bit_of(dimension) : 0;
+    uint32_t missing = has_host_port(s->machine, node) ? bit_of(dimension) : 0;
     missing |= ~node & (bit_of(dimension) - 1);
     missing &= ~s->node[node].links;
     for (unsigned d = 0; missing >> d != 0; d++) {

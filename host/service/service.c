@@ -36,8 +36,8 @@ static int make_cube(struct host_service *s, struct host_error *error)
     config.pipes[0] = s->machine->pipe;
     config.pipes[1] = s->machine->spare;
     config.spare_node = s->machine->spare_node;
-    config.host_wires = s->machine->host_wires;
-    for (unsigned i = 1; i < config.host_wires; i++) {
+    config.host_ports = s->machine->host_ports;
+    for (unsigned i = 1; i < config.host_ports; i++) {
         config.pipes[i] = s->machine->wires[i];
     }
     cube_for_serial(&config, s->machine->serial_baud);

@@ -8,7 +8,7 @@
 static unsigned host_wires_of(const struct host_sim_cube *c)
 {
     const struct host_sim_cube_options *o = &c->options;
-    return o->spare_node != 0 ? 2 : o->host_wires > 1 ? o->host_wires : 1;
+    return o->spare_node != 0 ? 2 : o->host_ports > 1 ? o->host_ports : 1;
 }
 
 /* The node at the end of the host's k-th wire. */

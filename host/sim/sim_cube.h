@@ -26,8 +26,8 @@ struct host_sim_cube_options {
     uint64_t seed;      /* of what befalls the wires by chance */
     struct sim_quality wire, host_wire; /* host_wire.bytes 0: as `wire` */
     struct sim_faults faults;           /* of chance, on all wires */
-    unsigned host_wires; /* nodes 0 .. host_wires - 1 have one, 1 (as 0) to
-                            CUBE_HOST_WIRES_MAX; see cube.h */
+    unsigned host_ports; /* nodes 0 .. host_ports - 1 have one, 1 (as 0) to
+                            CUBE_HOST_PORTS_MAX; see cube.h */
     uint16_t spare_node; /* has the host's second wire; 0: none */
     bool second_host;    /* there is a place for one, at node 0 */
     uint32_t gather_us;  /* bytes that come closer together wake a place once */

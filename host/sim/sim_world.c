@@ -451,7 +451,7 @@ static int open_node(struct host_world *w, unsigned i)
     n->board.identity.self = (uint16_t)i;
     n->board.identity.dimension = (uint8_t)o->cube.dimension;
     n->board.identity.window = o->window;
-    n->board.identity.host_wire = i != 0 && i == o->cube.spare_node;
+    n->board.identity.host_port = i != 0 && i == o->cube.spare_node;
     n->board.identity.dead_us = o->dead_us;
     n->board.now_us = node_now_us;
     n->board.busy_us = node_busy_us;

@@ -46,7 +46,7 @@ enum mpi_word { MPI_WORD_BEGIN, MPI_WORD_END, MPI_WORD_LEAVE };
 struct mpi_order {
     uint32_t word;
     uint32_t nodes, dimension, window, epoch; /* of the cube that begins */
-    uint32_t host_wires;                      /* see cube.h */
+    uint32_t host_ports;                      /* see cube.h */
     uint32_t tag;                             /* of its pipes */
     uint64_t memory;                          /* bytes a node */
 };

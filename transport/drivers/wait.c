@@ -12,11 +12,11 @@ static uint64_t clock_us(void)
 }
 
 void wait_files(struct pollfd *fds, nfds_t count, uint64_t wait_us,
-                uint64_t watch_us)
+                uint64_t awake_us)
 {
-    uint64_t watch = watch_us < wait_us ? watch_us : wait_us;
-    uint64_t start = watch > 0 ? clock_us() : 0;
-    while (watch > 0 && clock_us() - start < watch) {
+    uint64_t awake = awake_us < wait_us ? awake_us : wait_us;
+    uint64_t start = awake > 0 ? clock_us() : 0;
+    while (awake > 0 && clock_us() - start < awake) {
         if (poll(fds, count, 0) != 0) {
             return;
         }

@@ -10,10 +10,10 @@
 #include <poll.h>
 #include <stdint.h>
 
-/* Sleeps until a file is ready, or wait_us are over.  For the first watch_us it
+/* Sleeps until a file is ready, or wait_us are over.  For the first awake_us it
  * stays awake, and gives way to whoever has work: where a processor is free,
  * what comes soon need not wait to be woken for. */
 void wait_files(struct pollfd *fds, nfds_t count, uint64_t wait_us,
-                uint64_t watch_us);
+                uint64_t awake_us);
 
 #endif

@@ -89,8 +89,8 @@ int host_ranks_begin(struct host_ranks *ranks, unsigned nodes, uint64_t memory,
     }
     order->tag = MPI_TAG_PIPES + ranks->cubes++ % TAGS;
     ranks->ended = 0;
-    ranks->wires = nodes < CUBE_HOST_WIRES_MAX ? nodes : CUBE_HOST_WIRES_MAX;
-    order->host_wires = ranks->wires;
+    ranks->wires = nodes < CUBE_HOST_PORTS_MAX ? nodes : CUBE_HOST_PORTS_MAX;
+    order->host_ports = ranks->wires;
     for (unsigned i = 0; i < ranks->wires; i++) {
         mpi_pipe_open(&ranks->pipe[i], &ranks->place, (int)i + 1,
                       (int)order->tag);
@@ -219,7 +219,7 @@ struct host_machine host_ranks_machine(struct host_ranks *ranks)
     machine.dimension = ranks->order.dimension;
     machine.epoch = ranks->order.epoch - 1;
     machine.pipe = mpi_link_pipe(&ranks->pipe[0]);
-    machine.host_wires = (uint8_t)ranks->wires;
+    machine.host_ports = (uint8_t)ranks->wires;
     for (unsigned i = 0; i < ranks->wires; i++) {
         machine.wires[i] = mpi_link_pipe(&ranks->pipe[i]);
     }

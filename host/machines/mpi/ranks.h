@@ -5,7 +5,7 @@
  * With the last cube that is due the other ranks leave, and MPI ends: what is
  * done afterwards is not lost with a rank.
  *
- * Memory: CUBE_HOST_WIRES_MAX pipes of 64 KiB.  Work: constant a call,
+ * Memory: CUBE_HOST_PORTS_MAX pipes of 64 KiB.  Work: constant a call,
  * but for check, which looks at every rank of this machine.
  *
  *     MPI_Init(NULL, NULL);
@@ -25,7 +25,7 @@
 
 struct host_ranks {
     struct mpi_place place;
-    struct mpi_pipe pipe[CUBE_HOST_WIRES_MAX]; /* to nodes 0 .. */
+    struct mpi_pipe pipe[CUBE_HOST_PORTS_MAX]; /* to nodes 0 .. */
     unsigned wires;
     struct mpi_order order;   /* of the present cube */
     unsigned cubes_due;       /* until the ranks may leave */

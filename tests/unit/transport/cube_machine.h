@@ -105,7 +105,7 @@ static inline struct machine *build(unsigned dimension,
     struct host_error error = {0};
     options.dimension = dimension;
     options.seed = seed;
-    options.host_wires = config->host_wires;
+    options.host_ports = config->host_ports;
     options.spare_node = config->spare_node;
     assert_int_equal(host_sim_cube_open(&m->cube, &options, &m->now_us, &error),
                      0);
@@ -117,7 +117,7 @@ static inline struct machine *build(unsigned dimension,
         p->config.dimension = (uint8_t)dimension;
         p->config.epoch = draw(m) | 1;
         p->next = i;
-        p->config.host_wire = i > 0 && i == config->spare_node;
+        p->config.host_port = i > 0 && i == config->spare_node;
         for (unsigned d = 0; d < host_sim_cube_links(&m->cube, i); d++) {
             p->config.pipes[d] = host_sim_cube_pipe(&m->cube, i, d);
         }

@@ -80,7 +80,7 @@ static void a_host_with_many_wires(void **unused)
     (void)unused;
     for (unsigned d = 1; d <= 5; d++) {
         for (unsigned wires = 2; wires <= 1u << d && wires <= 8; wires *= 2) {
-            struct cube_config c = {.window = 1, .host_wires = (uint8_t)wires};
+            struct cube_config c = {.window = 1, .host_ports = (uint8_t)wires};
             struct machine *m = build(d, &c, &perfect, d);
             m->broadcasts = 10;
             run(m, 5, 1000000000);
@@ -93,7 +93,7 @@ static void a_host_with_many_wires(void **unused)
 
 static void a_host_wired_to_all_needs_nobody_between(void **unused)
 {
-    struct cube_config c = {.window = 2, .host_wires = 8};
+    struct cube_config c = {.window = 2, .host_ports = 8};
     (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
     for (unsigned turn = 0; turn < 2000; turn++) { /* all come up */
@@ -367,8 +367,8 @@ static void limits_of_a_config(void **unused)
     limit(node, pipes[1], pipe, none);
     limit(host, pipes[0], pipe, none);
     limit(host, spare_node, 3, 4);
-    limit(host, host_wires, 4, 3);
-    limit(host, host_wires, 4, 8); /* of 4 nodes */
+    limit(host, host_ports, 4, 3);
+    limit(host, host_ports, 4, 8); /* of 4 nodes */
     limit(host, gateway, 0, 3);
     limit(host, host_window, LINK_WINDOW_MAX, LINK_WINDOW_MAX + 1);
     limit(node, frame_payload, 1608, 1612);
@@ -377,14 +377,14 @@ static void limits_of_a_config(void **unused)
     limit(node, frame_payload, 408, 400); /* a message of 1,608, 4 frames */
     limit(node, staging, LINK_WINDOW_MAX, LINK_WINDOW_MAX + 1);
     host.dimension = CUBE_DIMENSION_MAX;
-    limit(host, host_wires, CUBE_HOST_WIRES_MAX, 2 * CUBE_HOST_WIRES_MAX);
-    host.host_wires = 4;
+    limit(host, host_ports, CUBE_HOST_PORTS_MAX, 2 * CUBE_HOST_PORTS_MAX);
+    host.host_ports = 4;
     limit(host, spare_node, 0, 1);
     limit(host, gateway, 3, 4);
-    host.host_wires = 0;
+    host.host_ports = 0;
     host.spare_node = 3;
     limit(host, gateway, 3, 2);
-    node.host_wires = 4;
+    node.host_ports = 4;
     assert_true(starts(&node));
 }
 

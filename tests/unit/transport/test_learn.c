@@ -9,10 +9,10 @@ static void forget(struct machine *m, struct learner *learners)
 {
     for (unsigned i = 0; i < m->nodes; i++) {
         struct place *p = &m->places[i];
-        bool host_wire = i == 0 || p->config.host_wire;
+        bool host_port = i == 0 || p->config.host_port;
         p->gone = true;
         learner_init(&learners[i], p->config.pipes,
-                     m->dimension + (host_wire ? 1u : 0u));
+                     m->dimension + (host_port ? 1u : 0u));
     }
 }
 
@@ -30,7 +30,7 @@ static void learn_all(struct machine *m, struct learner *learners,
             }
             assert_int_equal(learned.self, i);
             assert_int_equal(learned.dimension, m->dimension);
-            *heard_host += learned.host_wire;
+            *heard_host += learned.host_port;
             free(p->arena);
             p->config.epoch = draw(m) | 1;
             open_place(m, i);

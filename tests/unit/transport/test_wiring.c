@@ -110,9 +110,9 @@ static void a_node_whose_links_are_dead_is_one_entry(void **unused)
         dead.node = (uint16_t)(6u ^ 1u << d); /* the same by its other end */
         assert_false(wiring_add_dead(&w, dead, DIMENSION));
     }
-    struct cube_dead another = {0, 3}, host_wire = {0, DIMENSION};
+    struct cube_dead another = {0, 3}, host_port = {0, DIMENSION};
     assert_true(wiring_add_dead(&w, another, DIMENSION));
-    assert_true(wiring_add_dead(&w, host_wire, DIMENSION));
+    assert_true(wiring_add_dead(&w, host_port, DIMENSION));
     assert_int_equal(w.dead_count, 6);
     wiring_settle(&w, DIMENSION);
     assert_int_equal(w.dead_count, 3);

@@ -83,14 +83,14 @@ static void nodes_are_started_as_it_says(void **unused)
     unsigned count = host_cube_node_options(&file, 0, options);
     assert_true(has(options, count, "--node", "0"));
     assert_true(has(options, count, "--memory", "524288"));
-    assert_true(has(options, count, "--lines", "921600"));
+    assert_true(has(options, count, "--serial-baud", "921600"));
     assert_true(has(options, count, "--key", key_path));
     assert_true(has(options, count, "--board", "linux"));
     assert_true(
         has(options, count, "--wire", "0=serial:/dev/ttyUSB0:921600:rtscts"));
     assert_true(has(options, count, "--wire", "1=listen:10.0.0.1:7000"));
     count = host_cube_node_options(&file, 1, options);
-    assert_true(has(options, count, "--host-wire", "1"));
+    assert_true(has(options, count, "--host-port", "1"));
     assert_true(
         has(options, count, "--wire", "0=serial:/dev/ttyS1:921600:rtscts"));
     assert_true(has(options, count, "--wire", "1=listen:127.0.0.1:7001") ||

@@ -229,7 +229,7 @@ static void test_missing_wire_and_late_node(void **unused)
 }
 
 /* The host's own wire to node 0, where it has another. */
-static void test_missing_host_wire(void **unused)
+static void test_missing_host_port(void **unused)
 {
     (void)unused;
     prepare();
@@ -333,7 +333,7 @@ int main(void)
         cmocka_unit_test(test_missing_wire_and_late_node),
         cmocka_unit_test(test_late_node),
         cmocka_unit_test(test_late_wire),
-        cmocka_unit_test(test_missing_host_wire),
+        cmocka_unit_test(test_missing_host_port),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

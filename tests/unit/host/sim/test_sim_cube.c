@@ -91,13 +91,13 @@ static void a_host_may_have_more_wires(void **unused)
     struct host_sim_cube_options o = plain;
     (void)unused;
     o.dimension = 3;
-    o.host_wires = 4;
+    o.host_ports = 4;
     open_cube(&cube, &o);
     for (unsigned k = 0; k < 4; k++) {
         check_wire(&cube, 8, k, k, 3);
     }
     host_sim_cube_close(&cube);
-    o.host_wires = 0;
+    o.host_ports = 0;
     o.spare_node = 6;
     open_cube(&cube, &o);
     check_wire(&cube, 8, 0, 0, 3);
