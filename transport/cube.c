@@ -5,7 +5,7 @@
 
 /* A message's own header: dest, source (16 bits, low byte first), type, hops,
  * generation (16 bits of it). */
-enum { HEAD = 8, STAMP = 6, MESSAGE_MAX = HEAD + CUBE_PAYLOAD_MAX };
+enum { HEAD = CUBE_HEAD, STAMP = 6 };
 
 enum { HOPS_MAX = 255 };         /* off the e-cube paths */
 enum { LOCAL = CUBE_LINKS_MAX }; /* bit of this node among the ways */
@@ -103,98 +103,21 @@ static uint32_t ways_of(const struct cube *cube, unsigned source, unsigned dest)
 
 /* --- memory -------------------------------------------------------------- */
 
-static struct link_config link_config_of(const struct cube_config *config,
-                                         unsigned d)
-{
-    bool host = config->self == CUBE_HOST;
-    bool to_host = !host && d == config->dimension;
-    struct link_config c;
-    memset(&c, 0, sizeof c);
-    c.pipe = config->pipes[d];
-    c.epoch = config->epoch;
-    c.node = config->self;
-    c.port = (uint8_t)d;
-    bool many = config->host_ports > 1;
-    c.peer_node = (uint16_t)(host      ? many || d == 0 ? d : config->spare_node
-                             : to_host ? CUBE_HOST
-                                       : config->self ^ 1u << d);
-    c.peer_port = (uint8_t)(host      ? config->dimension
-                            : to_host ? many ? config->self : config->self != 0
-                                      : d);
-    c.keeps_peer = to_host;
-    c.greeting = (uint8_t)(config->dimension + 1);
-    c.window = (host || to_host) && config->host_window != 0
-                   ? config->host_window
-                   : config->window;
-    c.message_max = MESSAGE_MAX;
-    c.frame_payload = config->frame_payload;
-    c.staging = config->staging;
-    if (config->serial_baud != 0) {
-        link_for_serial(&c, config->serial_baud);
-    }
-    return c;
-}
-
-static unsigned links_of(const struct cube_config *config)
-{
-    if (config->host_ports > 1) {
-        return config->self == CUBE_HOST
-                   ? config->host_ports
-                   : config->dimension +
-                         (config->self < config->host_ports ? 1u : 0u);
-    }
-    if (config->self == CUBE_HOST) {
-        return config->spare_node != 0 ? 2 : 1;
-    }
-    return config->dimension +
-           (config->self == 0 || config->host_port ? 1u : 0u);
-}
-
-static bool sound(const struct cube_config *config)
-{
-    unsigned wires = config->host_ports;
-    if (config->dimension > CUBE_DIMENSION_MAX) {
-        return false;
-    }
-    bool even = (wires & (wires - 1)) == 0 && wires <= CUBE_HOST_PORTS_MAX &&
-                wires <= 1u << config->dimension &&
-                (wires < 2 || config->spare_node == 0);
-    return even &&
-           (config->self == CUBE_HOST
-                ? config->gateway == 0 ||
-                      config->gateway == config->spare_node ||
-                      config->gateway < wires
-                : config->self < 1u << config->dimension) &&
-           config->spare_node < 1u << config->dimension;
-}
-
 static size_t up64(size_t bytes)
 {
     return (bytes + 63) / 64 * 64;
 }
 
-void cube_for_serial(struct cube_config *config, uint32_t baud)
-{
-    config->serial_baud = baud;
-    if (baud != 0) {
-        config->window = config->window >= 8 ? 14 : 7;
-    }
-}
-
 size_t cube_arena_bytes(const struct cube_config *config)
 {
-    if (!sound(config)) {
+    if (cube_config_fault(config) != NULL) {
         return 0;
     }
     size_t bytes =
         up64(sizeof(struct cube)) + up64(routes_bytes(config->dimension));
-    for (unsigned d = 0; d < links_of(config); d++) {
-        struct link_config c = link_config_of(config, d);
-        size_t link = link_bytes(&c);
-        if (link == 0) {
-            return 0;
-        }
-        bytes += up64(link);
+    for (unsigned d = 0; d < cube_links_of(config); d++) {
+        struct link_config c = cube_link_config(config, d);
+        bytes += up64(link_bytes(&c));
     }
     return bytes;
 }
@@ -210,12 +133,12 @@ struct cube *cube_init(void *arena, size_t bytes,
     uint8_t *rest = (uint8_t *)arena + up64(sizeof *cube);
     memset(cube, 0, sizeof *cube);
     cube->config = *config;
-    cube->count = links_of(config);
+    cube->count = cube_links_of(config);
     cube->held = CUBE_LINKS_MAX;
     routes_init(&cube->routes, rest, config->dimension);
     rest += up64(routes_bytes(config->dimension));
     for (unsigned d = 0; d < cube->count; d++) {
-        struct link_config c = link_config_of(config, d);
+        struct link_config c = cube_link_config(config, d);
         cube->links[d] = link_init(rest, link_bytes(&c), &c);
         if (cube->links[d] == NULL) {
             return NULL;
@@ -372,7 +295,7 @@ int cube_poll(struct cube *cube, uint64_t now_us)
     }
     for (unsigned d = 0; d < cube->count; d++) {
         /* Kept back for one poll with room, no longer. */
-        if (link_room(cube->links[d], MESSAGE_MAX) > 0) {
+        if (link_room(cube->links[d], CUBE_MESSAGE_MAX) > 0) {
             cube->kept_back &= ~(kept_before & (uint32_t)1 << d);
         }
         count += link_poll_send(cube->links[d], now_us);
@@ -433,7 +356,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
 
 unsigned cube_room(const struct cube *cube, uint16_t dest)
 {
-    return room_on(cube, ways_out(cube, dest), MESSAGE_MAX);
+    return room_on(cube, ways_out(cube, dest), CUBE_MESSAGE_MAX);
 }
 
 bool cube_read_from(struct cube *cube, unsigned d, struct cube_message *message)

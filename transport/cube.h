@@ -73,8 +73,9 @@ struct cube_wiring {
 };
 
 /* cube_arena_bytes() is 0, and cube_init gives NULL, where a limit is not kept,
- * or one of struct link_config.  A field that has a default takes it where it
- * is 0.  All ends of a cube are given the same where it says so. */
+ * or one of struct link_config: cube_config_fault() says which.  A field that
+ * has a default takes it where it is 0.  All ends of a cube are given the same
+ * where it says so. */
 struct cube_config {
     /* This node, 0 .. 2^dimension - 1; or CUBE_HOST. */
     uint16_t self;
@@ -156,6 +157,10 @@ struct cube_statistics {
  * there are none, and nothing changes. */
 void cube_for_serial(struct cube_config *config, uint32_t baud);
 
+/* The first field that breaks its limit, and which, as in "dimension is above
+ * 10" (`window` stands for host_window too); NULL: the config is sound. */
+const char *cube_config_fault(const struct cube_config *config);
+
 struct cube; /* opaque: lives at the start of its arena */
 
 size_t cube_arena_bytes(const struct cube_config *config);
@@ -181,7 +186,8 @@ unsigned cube_room(const struct cube *cube, uint16_t dest);
 bool cube_read(struct cube *cube, struct cube_message *message);
 void cube_release(struct cube *cube);
 
-/* The same from link d alone; and instead of cube_release, to leave it unread
+/* For a reader that takes some messages before others, as transport/ncube does:
+ * the same from link d alone; and instead of cube_release, to leave it unread
  * so far. */
 bool cube_read_from(struct cube *cube, unsigned d,
                     struct cube_message *message);
@@ -216,9 +222,10 @@ bool cube_link_is_dead(const struct cube *cube, unsigned d);
 enum { CUBE_FAULT_BYTES = 80 };
 bool cube_wiring_fault(const struct cube *cube, char text[CUBE_FAULT_BYTES]);
 
-/* The same of any one; dimension is the cube's. */
-void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
-                     uint16_t spare_node, char text[CUBE_FAULT_BYTES]);
+/* The same of any one, in a cube with the config's dimension and host ports. */
+void cube_wrong_text(const struct cube_wrong *wrong,
+                     const struct cube_config *config,
+                     char text[CUBE_FAULT_BYTES]);
 
 /* True when the neighbours have acknowledged all that is written here and no
  * message waits to be passed on: a node may leave then. */

@@ -1,5 +1,6 @@
-/* What the parts of a cube share: cube.c (memory, messages), gossip.c (what
- * neighbours tell each other).  Not for others.
+/* What the parts of a cube share: cube_config.c (what a config means), cube.c
+ * (memory, messages), gossip.c (what neighbours tell each other), fault.c
+ * (wrong wires in words).  Not for others.
  *
  * Memory and work: see cube.h.
  *
@@ -10,7 +11,17 @@
 
 #include "routes.h"
 
-enum { CUBE_GOSSIP_US = 50000 }; /* between datagrams that are not answered */
+enum {
+    CUBE_GOSSIP_US = 50000, /* between datagrams that are not answered */
+    CUBE_HEAD = 8,          /* bytes of a message before the application's */
+    CUBE_MESSAGE_MAX = CUBE_HEAD + CUBE_PAYLOAD_MAX
+};
+
+/* An end of a link. */
+struct cube_end {
+    uint16_t node; /* or CUBE_HOST */
+    uint8_t port;
+};
 
 /* The oldest message of a link, while it is under way. */
 struct cube_arrival {
@@ -47,6 +58,14 @@ struct cube {
     uint64_t now_us;    /* of the last poll */
     uint64_t looked_us; /* when links were looked at last */
 };
+
+/* cube_config.c: the end to which link d of an end must lead; links of the
+ * config's own end, and the config of each. */
+struct cube_end cube_peer_of(const struct cube_config *config, unsigned self,
+                             unsigned d);
+unsigned cube_links_of(const struct cube_config *config);
+struct link_config cube_link_config(const struct cube_config *config,
+                                    unsigned d);
 
 /* cube.c: the messages of the generation before go. */
 void cube_drop_all(struct cube *cube);

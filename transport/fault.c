@@ -33,29 +33,24 @@ static void say_why(struct cube_text *t, unsigned refusal, unsigned dimension)
     }
 }
 
-void cube_wrong_text(const struct cube_wrong *wrong, unsigned dimension,
-                     uint16_t spare_node, char text[CUBE_FAULT_BYTES])
+void cube_wrong_text(const struct cube_wrong *wrong,
+                     const struct cube_config *config,
+                     char text[CUBE_FAULT_BYTES])
 {
     struct cube_text t = cube_text_in(text, CUBE_FAULT_BYTES);
-    bool host = wrong->node == CUBE_HOST;
-    bool to_host = !host && wrong->link >= dimension;
-    unsigned node =
-        host ? wrong->link == 0 || spare_node == 0 ? wrong->link : spare_node
-        : to_host ? CUBE_HOST
-                  : wrong->node ^ 1u << wrong->link;
-    unsigned link = host ? dimension : to_host ? wrong->node != 0 : wrong->link;
+    struct cube_end peer = cube_peer_of(config, wrong->node, wrong->link);
     say_end(&t, "", wrong->node);
     say_link(&t, " ", wrong->link);
-    if (wrong->refusal == LINK_WRONG_WIRE && wrong->peer_node != node) {
+    if (wrong->refusal == LINK_WRONG_WIRE && wrong->peer_node != peer.node) {
         say_end(&t, " is wired to ", wrong->peer_node);
-        say_end(&t, ", expected ", node);
+        say_end(&t, ", expected ", peer.node);
     } else if (wrong->refusal == LINK_WRONG_WIRE) {
         say_end(&t, " is wired to ", wrong->peer_node);
         say_link(&t, " ", wrong->peer_link);
-        say_link(&t, ", expected ", link);
+        say_link(&t, ", expected ", peer.port);
     } else {
         say_end(&t, ": ", wrong->peer_node);
-        say_why(&t, wrong->refusal, dimension);
+        say_why(&t, wrong->refusal, config->dimension);
     }
 }
 
@@ -65,7 +60,6 @@ bool cube_wiring_fault(const struct cube *cube, char text[CUBE_FAULT_BYTES])
     if (cube->wiring.wrong_count == 0) {
         return false;
     }
-    cube_wrong_text(&cube->wiring.wrong[0], cube->config.dimension,
-                    cube->config.spare_node, text);
+    cube_wrong_text(&cube->wiring.wrong[0], &cube->config, text);
     return true;
 }

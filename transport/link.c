@@ -1,5 +1,6 @@
 #include "link.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "check.h"
@@ -65,16 +66,47 @@ static unsigned fragments(const struct link_config *c, size_t size)
                : (unsigned)((size + c->frame_payload - 1u) / c->frame_payload);
 }
 
-static bool sound(const struct link_config *c)
+static_assert(LINK_WINDOW_MAX == 64 && LINK_MESSAGE_MAX == 1616 &&
+                  LINK_FRAME_PAYLOAD_MIN == 32 &&
+                  LINK_FRAME_PAYLOAD_MAX == 1616,
+              "the texts of a fault say so");
+
+/* Of a config that is complete. */
+static const char *fault_of(const struct link_config *c)
 {
-    return c->epoch != 0 && c->window >= 1 && c->window <= LINK_WINDOW_MAX &&
-           c->message_max <= LINK_MESSAGE_MAX &&
-           c->frame_payload >= LINK_FRAME_PAYLOAD_MIN &&
-           c->frame_payload <= LINK_FRAME_PAYLOAD_MAX &&
-           c->frame_payload % 8 == 0 &&
-           fragments(c, c->message_max) <= c->window &&
-           c->staging <= LINK_WINDOW_MAX && c->pipe.send != NULL &&
-           c->pipe.receive != NULL && c->timeout_min_us <= c->timeout_max_us;
+    if (c->pipe.send == NULL || c->pipe.receive == NULL) {
+        return "a pipe has no functions";
+    }
+    if (c->epoch == 0) {
+        return "epoch is 0";
+    }
+    if (c->window < 1 || c->window > LINK_WINDOW_MAX) {
+        return "window is not 1 .. 64 frames";
+    }
+    if (c->message_max > LINK_MESSAGE_MAX) {
+        return "message_max is above 1616 bytes";
+    }
+    if (c->frame_payload % 8 != 0 ||
+        c->frame_payload < LINK_FRAME_PAYLOAD_MIN ||
+        c->frame_payload > LINK_FRAME_PAYLOAD_MAX) {
+        return "frame_payload is no multiple of 8 from 32 to 1616 bytes";
+    }
+    if (fragments(c, c->message_max) > c->window) {
+        return "window does not hold the frames of a message";
+    }
+    if (c->staging > LINK_WINDOW_MAX) {
+        return "staging is above 64 frames";
+    }
+    if (c->timeout_min_us > c->timeout_max_us) {
+        return "timeout_min_us is above timeout_max_us";
+    }
+    return NULL;
+}
+
+const char *link_config_fault(const struct link_config *config)
+{
+    struct link_config c = complete(config);
+    return fault_of(&c);
 }
 
 static size_t up8(size_t bytes)
@@ -99,7 +131,7 @@ static size_t receive_bytes(const struct link_config *c)
 size_t link_bytes(const struct link_config *config)
 {
     struct link_config c = complete(config);
-    if (!sound(&c)) {
+    if (fault_of(&c) != NULL) {
         return 0;
     }
     return up8(sizeof(struct link)) +

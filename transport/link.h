@@ -175,6 +175,10 @@ struct link_message {
     size_t size;
 };
 
+/* The first field that breaks its limit, and which, as in "epoch is 0"; NULL:
+ * the config is sound. */
+const char *link_config_fault(const struct link_config *config);
+
 /* Bytes that link_init needs for this config; 0: the config is not sound. */
 size_t link_bytes(const struct link_config *config);
 

@@ -281,7 +281,7 @@ static void a_wrong_wire_is_named(void **unused)
         assert_true(cube_wiring_fault(m->places[k].cube, text));
         assert_string_equal(text, said[0]);
         for (unsigned i = 0; i < 4; i++) {
-            cube_wrong_text(&w->wrong[i], 3, 0, text);
+            cube_wrong_text(&w->wrong[i], &m->places[k].config, text);
             assert_string_equal(text, said[i]);
         }
     }
@@ -313,12 +313,24 @@ static void wrong_wires_in_words(void **unused)
         {{2, 3, 0, 0, LINK_WRONG_SIZES},
          "node 2 link 0: node 3 has other sizes of frames or messages"},
     };
+    static const struct cube_config spare = {.dimension = 10, .spare_node = 6};
     char text[CUBE_FAULT_BYTES];
     (void)unused;
     for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        cube_wrong_text(&cases[i].wrong, 10, 6, text);
+        cube_wrong_text(&cases[i].wrong, &spare, text);
         assert_string_equal(text, cases[i].text);
     }
+    static const struct cube_config four = {.dimension = 10, .host_ports = 4};
+    static const struct cube_wrong port = {3, CUBE_HOST, 10, 2,
+                                           LINK_WRONG_WIRE};
+    static const struct cube_wrong at_host = {CUBE_HOST, 2, 3, 10,
+                                              LINK_WRONG_WIRE};
+    cube_wrong_text(&port, &four, text);
+    assert_string_equal(
+        text, "node 3 link 10 is wired to the host link 2, expected link 3");
+    cube_wrong_text(&at_host, &four, text);
+    assert_string_equal(text,
+                        "the host link 3 is wired to node 2, expected node 3");
 }
 
 static bool starts(const struct cube_config *config)
@@ -328,6 +340,7 @@ static bool starts(const struct cube_config *config)
     assert_non_null(arena);
     struct cube *cube = cube_init(arena, room, config);
     assert_true(bytes <= room && (cube != NULL) == (bytes > 0));
+    assert_true((cube != NULL) == (cube_config_fault(config) == NULL));
     if (cube != NULL) {
         assert_null(cube_init(arena, bytes - 1, config));
     }
@@ -384,6 +397,12 @@ static void limits_of_a_config(void **unused)
     host.host_ports = 0;
     host.spare_node = 3;
     limit(host, gateway, 3, 2);
+    host.gateway = 2;
+    assert_string_equal(cube_config_fault(&host), "gateway has no host port");
+    host.window = 0;
+    host.gateway = 3;
+    assert_string_equal(cube_config_fault(&host),
+                        "window is not 1 .. 64 frames");
     node.host_ports = 4;
     assert_true(starts(&node));
 }
