@@ -49,7 +49,10 @@ drivers      := $(filter-out %/mpi.c,$(wildcard transport/drivers/*.c))
 # Those that need what a static node has not.
 host_drivers := transport/drivers/serial_port.c
 node_drivers := $(filter-out $(host_drivers),$(drivers))
-board        := $(wildcard boards/*.c boards/linux/*.c)
+# A folder a board.  Its program is incode-node-NAME, that of linux incode-node;
+# mpi's is no static one.
+board        := $(wildcard boards/*.c)
+boards       := $(filter-out mpi,$(patsubst boards/%/,%,$(wildcard boards/*/)))
 # Host and node as ranks of Open MPI: no other program is linked with it.
 host_mpi     := host/main_mpi.c $(wildcard host/*/mpi/*.c)
 host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
@@ -63,6 +66,8 @@ core_objects := $(freestanding:%.c=$(obj)/%.o)
 host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 	$(node_drivers:%.c=$(BUILD)/node/%.o)
+node          = $(BUILD)/incode-node$(if $(filter-out linux,$(1)),-$(1))
+nodes        := $(foreach b,$(boards),$(call node,$(b)))
 mpi_host     := $(host_mpi:%.c=$(obj)/%.o) $(obj)/transport/drivers/mpi.o
 mpi_node     := $(obj)/boards/mpi/main.o $(obj)/boards/process.o \
 	$(obj)/transport/drivers/mpi.o
@@ -75,17 +80,21 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 	bench firmware fuzz lint install clean help deps deps-run deps-test \
 	deps-bench deps-full FORCE
 
-all: $(BUILD)/incode $(BUILD)/incode-node $(BUILD)/incode-mpi \
-	$(BUILD)/incode-node-mpi
+programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
+	$(nodes)
+all: $(programs)
 
 $(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) -o $@
 
 # Static, so that a node's data memory is what the node itself declares.
-$(BUILD)/incode-node: $(node_objects) $(BUILD)/libcore.a
+$(foreach b,$(boards),$(eval $(call node,$(b)): \
+	$(patsubst %.c,$(BUILD)/node/%.o,$(wildcard boards/$(b)/*.c))))
+$(nodes): $(node_objects) $(BUILD)/libcore.a
 	$(say) LINK $@
-	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $^ $(NODE_LIBS) -o $@
+	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $(filter %.o,$^) \
+		$(BUILD)/libcore.a $(NODE_LIBS) -o $@
 
 $(BUILD)/incode-mpi: $(mpi_host) $(BUILD)/libhost.a $(BUILD)/libcore.a
 	$(say) LINK $@
@@ -273,8 +282,7 @@ lint: deps-test
 
 install: all
 	install -d '$(DESTDIR)$(PREFIX)/bin'
-	install $(BUILD)/incode $(BUILD)/incode-node $(BUILD)/incode-mpi \
-		$(BUILD)/incode-node-mpi '$(DESTDIR)$(PREFIX)/bin'
+	install $(programs) '$(DESTDIR)$(PREFIX)/bin'
 
 clean:
 	rm -rf '$(BUILD)'

@@ -251,10 +251,10 @@ static bool run_mpi(struct host_bench_row *row)
 {
     char path[4096], command[4400];
     struct host_error ignored = {0};
-    if (host_cluster_program(NULL, path, sizeof path - 8, &ignored) != 0) {
+    if (host_cluster_program(NULL, "incode-mpi", path, sizeof path, &ignored) !=
+        0) {
         return false;
     }
-    strcpy(strrchr(path, '/') + 1, "incode-mpi");
     snprintf(command, sizeof command,
              "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "
              "timeout 30 mpirun --oversubscribe --bind-to none "

@@ -22,12 +22,26 @@ static int check_claims(const char *in, const char *out,
     return error->code;
 }
 
-/* The points of a file of tetrahedra that holds none: the .node beside it. */
+/* The extension of the file beside `path` that holds its points.  A format that
+ * makes none has its points where that of standard input has them. */
+static const char *points_extension(const char *path)
+{
+    const struct host_format *f = host_format_named(path);
+    if (f == NULL || f->beside[0] == NULL) {
+        f = host_format_of("-", HOST_READ_TETRAHEDRA);
+    }
+    return f->beside[0];
+}
+
+/* The points of a file of tetrahedra that holds none: from the one beside it,
+ * packed or not. */
 static int points_beside(const char *in, const char *out,
                          struct host_points *points, struct host_error *error)
 {
+    const char *extension = points_extension(in);
     size_t n = strlen(in) - (host_is_packed(in) ? strlen(".gz") : 0);
-    char *name = malloc(n + sizeof ".node.gz");
+    size_t more = strlen(extension);
+    char *name = malloc(n + more + sizeof ".gz");
     if (name == NULL) {
         return host_fail_memory(error, "a name");
     }
@@ -35,12 +49,12 @@ static int points_beside(const char *in, const char *out,
     name[n] = '\0';
     char *end = strrchr(name, '.'); /* the format was known by it */
     end = end == NULL ? name + n : end;
-    strcpy(end, ".node");
+    strcpy(end, extension);
     if (access(name, R_OK) != 0) {
-        strcpy(end, ".node.gz");
+        strcpy(end + more, ".gz");
     }
     if (access(name, R_OK) != 0) {
-        strcpy(end, ".node");
+        end[more] = '\0';
         host_fail(error, HOST_INPUT,
                   "%s: it holds no points and there is no %s; put the points "
                   "there",

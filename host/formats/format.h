@@ -55,7 +55,8 @@ struct host_format {
     host_points_writer *write_points;
     host_tetrahedra_writer *write_tetrahedra;
     /* Of the files that belong to an output of tetrahedra, and are written
-     * beside it. */
+     * beside it.  If it holds no points, the first has them, and its extension
+     * is that of a format that reads points. */
     const char *beside[HOST_BESIDE_MAX + 1];
     bool rows_only; /* a file of tetrahedra holds no points */
 };

@@ -25,15 +25,15 @@ enum { AWAKE_US = 100 }; /* a page's way to a node, where nobody sleeps */
 
 extern char **environ;
 
-int host_cluster_program(const char *given, char *path, size_t size,
-                         struct host_error *error)
+int host_cluster_program(const char *given, const char *name, char *path,
+                         size_t size, struct host_error *error)
 {
     ssize_t length;
     char *slash;
     if (given != NULL) {
         snprintf(path, size, "%s", given);
     } else {
-        length = readlink("/proc/self/exe", path, size - 16);
+        length = readlink("/proc/self/exe", path, size - strlen(name) - 1);
         if (length <= 0) {
             return host_fail(error, HOST_BROKEN,
                              "/proc/self/exe: %s; is /proc mounted?",
@@ -41,7 +41,7 @@ int host_cluster_program(const char *given, char *path, size_t size,
         }
         path[length] = '\0';
         slash = strrchr(path, '/');
-        strcpy(slash == NULL ? path : slash + 1, "incode-node");
+        strcpy(slash == NULL ? path : slash + 1, name);
     }
     if (access(path, X_OK) != 0) {
         return host_fail(error, HOST_CUBE,
@@ -160,7 +160,7 @@ int host_cluster_start(struct host_cluster *cluster,
     while (1u << cluster->dimension < options->nodes) {
         cluster->dimension++;
     }
-    if (host_cluster_program(options->program, cluster->path,
+    if (host_cluster_program(options->program, "incode-node", cluster->path,
                              sizeof cluster->path, error) != 0) {
         return error->code;
     }

@@ -53,10 +53,10 @@ struct host_cluster {
     char path[4096]; /* of the node program */
 };
 
-/* The node program: the one given, or if NULL incode-node beside this
+/* The node program: the one given, or if NULL that of this name beside this
  * executable, as `make` and `make install` put it. */
-int host_cluster_program(const char *given, char *path, size_t size,
-                         struct host_error *error);
+int host_cluster_program(const char *given, const char *name, char *path,
+                         size_t size, struct host_error *error);
 
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,

@@ -4,12 +4,16 @@
 # already is copied with the sources, so that little is built again.
 . tests/system/lib.sh
 
+if grep -q fsanitize "$BUILD/flags"; then
+    skip adding 'a copy of a sanitizer build is not built on'
+    exit 0
+fi
 tree=$scratch/tree
 mkdir -p "$tree/build"
 cp -a Makefile boards host incode node transport "$tree"
 mkdir -p "$tree/tests"
 cp -a "$BUILD/flags" "$BUILD/commit" "$BUILD/obj" "$BUILD"/*.a \
-    "$BUILD/incode-node" "$tree/build"
+    "$BUILD/node" "$BUILD/include" "$tree/build"
 
 cat > "$tree/host/formats/toy.c" <<'END'
 /* A count, then as many rows; tetrahedra in the same way, with a sibling that
@@ -86,11 +90,21 @@ const struct host_format host_format_toy = {
     .beside = {".toypoints"},
     .rows_only = true,
 };
+
+const struct host_format host_format_toypoints = {
+    .name = "points of a toy",
+    .extensions = {".toypoints"},
+    .read_points = read_points,
+    .write_points = write_points,
+};
 END
+# The board: a process, as on Linux, under its own name.
+mkdir "$tree/boards/toy"
+for file in boards/linux/*.c; do
+    printf '#include "%s"\n' "$file" > "$tree/boards/toy/${file##*/}"
+done
 cat > "$tree/host/machines/board_toy.c" <<'END'
 /* Processes of a program of their own, incode-node-toy. */
-#include <string.h>
-
 #include "boards.h"
 
 static int start(const struct host_cluster_options *options,
@@ -99,10 +113,11 @@ static int start(const struct host_cluster_options *options,
     static struct host_cluster cluster;
     static char program[4096];
     struct host_cluster_options mine = *options;
-    if (host_cluster_program(NULL, program, sizeof program - 8, error) != 0) {
+    if (host_cluster_program(options->program, "incode-node-toy", program,
+                             sizeof program, error) != 0) {
         return error->code;
     }
-    mine.program = strcat(program, "-toy");
+    mine.program = program;
     if (host_cluster_start(&cluster, &mine, error) != 0) {
         return error->code;
     }
@@ -116,19 +131,39 @@ const struct host_board host_board_toy = {
     .start = start,
 };
 END
-sed -i 's/ROW(plot3d)$/ROW(plot3d) ROW(toy)/' "$tree/host/formats/formats.c"
+# The fuzzer of points, which takes its formats from the table.
+mkdir -p "$tree/tests/unit"
+cp -a tests/fuzz "$tree/tests"
+cat > "$tree/tests/unit/test_fuzzed.c" <<'END'
+#include "tests/fuzz/fuzz_points.c"
+
+int main(void)
+{
+    for (unsigned choice = 0; choice < 256; choice++) {
+        char name[FILE_NAME_MAX];
+        uint8_t bytes[] = "?1 0 0 0\n";
+        bytes[0] = (uint8_t)choice;
+        file_name(HOST_READ_POINTS, choice, name);
+        puts(name);
+        LLVMFuzzerTestOneInput(bytes, sizeof bytes - 1);
+    }
+    return 0;
+}
+END
+sed -i 's/ROW(plot3d)$/ROW(plot3d) ROW(toy) ROW(toypoints)/' "$tree/host/formats/formats.c"
 sed -i 's/ROW(linux)$/ROW(linux) ROW(toy)/' "$tree/host/machines/boards.c"
 
 # The flags of what is copied, whatever they were: only what has changed is
 # built, and without optimisation.
 if ! "${MAKE:-make}" -C "$tree" --no-print-directory -o build/flags \
-    BUILD=build OPT=-O0 build/incode > "$scratch/log" 2>&1; then
+    BUILD=build OPT=-O0 build/incode build/incode-node-toy \
+    build/tests/test_fuzzed \
+    > "$scratch/log" 2>&1; then
     fail adding/build "$(grep -m 1 error "$scratch/log")"
     exit 1
 fi
 check adding/build 'a warning' \
     [ "$(grep -cE '\.c:[0-9:]+ warning' "$scratch/log")" = 0 ]
-cp "$tree/build/incode-node" "$tree/build/incode-node-toy"
 
 old=$INCODE new=$tree/build/incode
 "$old" gen uniform 500 -o "$scratch/a.xyz"
@@ -142,11 +177,11 @@ says() {
         "$scratch/said"
 }
 
-says adding/format/help '(PLOT3D), .toy (a toy);' "$new" run --help
+says adding/format/help '(PLOT3D), .toy (a toy), .toypoints (points of a toy);' "$new" run --help
 says adding/format/help-out '.toy (a toy; with .toypoints beside it);' \
     "$new" run --help
-says adding/format/points-in '.bin .toy, or any' "$new" run "$scratch/a.pdf"
-says adding/format/points-out '.npy .toy, or -' \
+says adding/format/points-in '.bin .toy .toypoints, or any' "$new" run "$scratch/a.pdf"
+says adding/format/points-out '.npy .toy .toypoints, or -' \
     "$new" convert "$scratch/a.xyz" "$scratch/a.pdf"
 says adding/format/tetrahedra-in '.npy .toy, or any' \
     "$new" digest "$scratch/a.pdf"
@@ -168,6 +203,25 @@ check adding/format/beside 'other points' \
     cmp -s "$scratch/a.toy" "$scratch/t.toypoints"
 check adding/format/digest 'another triangulation' test \
     "$("$new" digest "$scratch/t.toy")" = "$("$old" digest "$scratch/t.ele")"
+
+"$tree/build/tests/test_fuzzed" > "$scratch/fuzzed" 2>&1
+check adding/format/fuzzed "$(last "$scratch/fuzzed")" [ $? = 0 ]
+for name in a.toy a.toy.gz; do
+    check "adding/format/fuzzed-$name" 'the fuzzer does not try it' \
+        grep -qx "$name" "$scratch/fuzzed"
+done
+succeeds adding/format/convert "$new" convert "$scratch/t.toy" "$scratch/t.vtu"
+succeeds adding/format/convert-other \
+    "$old" convert "$scratch/t.ele" "$scratch/other.vtu"
+check adding/format/points-beside 'other bytes' \
+    cmp -s "$scratch/t.vtu" "$scratch/other.vtu"
+gzip "$scratch/a.toy" "$scratch/t.toypoints"
+succeeds adding/format/packed \
+    "$new" convert "$scratch/a.toy.gz" "$scratch/c.xyz"
+check adding/format/same-packed 'other bytes' \
+    cmp -s "$scratch/a.xyz" "$scratch/c.xyz"
+succeeds adding/format/packed-beside \
+    "$new" convert "$scratch/t.toy" "$scratch/t.vtk"
 
 says adding/board/help 'linux (processes of this machine; the default), toy' \
     "$new" run --help
