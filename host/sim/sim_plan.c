@@ -38,17 +38,30 @@ static unsigned draw_nodes(uint64_t *state)
     return 1u << cubes[i].dimension;
 }
 
-/* The first of the table, which keeps to one node, seldom; the others alike. */
+/* Of the strategies that keep to one node, or of the others, one at random;
+ * NULL: there is none. */
+static const struct host_strategy *draw_row(uint64_t *state, bool one_node)
+{
+    const struct host_strategy *row, *drawn = NULL;
+    unsigned rows = 0;
+    for (unsigned i = 0; (row = host_strategy_row(i)) != NULL; i++) {
+        rows += (row->nodes_default == 1) == one_node;
+    }
+    uint64_t left = rows == 0 ? 0 : draw(state, 1, rows);
+    for (unsigned i = 0; left > 0; i++) {
+        drawn = host_strategy_row(i);
+        left -= (drawn->nodes_default == 1) == one_node;
+    }
+    return drawn;
+}
+
+/* One that keeps to one node is drawn seldom: most of a cube idles under it. */
 static const struct host_strategy *draw_strategy(const struct host_sim_plan *p,
-                                                 bool first)
+                                                 bool one_node)
 {
     uint64_t state = sim_seed(p->seed, 81);
-    unsigned last = 0;
-    while (host_strategy_row(last + 1) != NULL) {
-        last++;
-    }
-    first = first || last == 0;
-    return host_strategy_row(first ? 0 : (unsigned)draw(&state, 1, last));
+    const struct host_strategy *row = draw_row(&state, one_node);
+    return row != NULL ? row : draw_row(&state, !one_node);
 }
 
 static void draw_work(struct host_sim_plan *p, uint64_t *state)
