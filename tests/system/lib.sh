@@ -194,6 +194,10 @@ refuses() {
     fi
 }
 
+# fault_table FILE: of what a simulation said, its table of the kinds of fault
+# without the heading: the name, strikes, and seeds in which it struck.
+fault_table() { sed '1,/^fault /d' "$1"; }
+
 # no_set FILE POINTS: why a set of the index is not used here, or nothing.
 no_set() {
     if [ ! -r "$INCODE_DATA/$1" ]; then

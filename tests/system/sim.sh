@@ -35,7 +35,7 @@ seeds() {
 # However slow the machine is, these are run to their end.
 # shellcheck disable=SC2046
 seeds fixed $(printf ' --seed %s' "${fixed[@]}")
-sed '1,/^fault /d' "$said" > "$scratch/kinds"
+fault_table "$said" > "$scratch/kinds"
 while read -r kind _ struck; do
     check "sim/strikes $kind" "it struck in no seed" [ "$struck" -gt 0 ]
 done < "$scratch/kinds"

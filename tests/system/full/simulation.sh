@@ -16,13 +16,13 @@ seeds() {
 }
 
 seeds 1 1000
-tail -n 19 "$said"
-for kind in loss flip delete insert repeat burst stall one-way cut partition \
-    pause crash slow-host tiny dead-wire dead-node missing-wire second-host; do
-    strikes=$(awk -v kind="$kind" '$1 == kind { print $2 }' "$said" | tail -n 1)
-    check "simulation/strikes $kind" "only ${strikes:-0} times" \
-        [ "${strikes:-0}" -ge 100 ]
-done
+fault_table "$said" > "$scratch/kinds"
+cat "$scratch/kinds"
+while read -r kind strikes _; do
+    check "simulation/strikes $kind" "only $strikes times" [ "$strikes" -ge 100 ]
+done < "$scratch/kinds"
+check simulation/kinds "a kind of fault is not in the table" \
+    [ "$(wc -l < "$scratch/kinds")" -ge 18 ]
 seeds 1001 5000
 
 # 90 s, 550 MB.
