@@ -3,7 +3,7 @@
  * vertex) is committed; what a loss left uncommitted is dropped by
  * host_ledger_abandon, and those bricks are given out again, in ranges.
  *
- * Memory: a bit a brick and 24 bytes a node.  Work: constant a call, but for
+ * Memory: a bit a brick and 16 bytes a node.  Work: constant a call, but for
  * host_ledger_abandon, one pass over the tetrahedra, and host_ledger_next,
  * which passes over the bricks once between two calls of the former.
  *
@@ -16,6 +16,7 @@
 #ifndef HOST_LEDGER_H
 #define HOST_LEDGER_H
 
+#include <assert.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -27,6 +28,7 @@ struct host_job {
     uint32_t first, last;
     uint32_t committed; /* bricks of [first, last) */
 };
+static_assert(sizeof(struct host_job) == 16, "16 bytes a node");
 
 struct host_ledger {
     uint32_t bricks, nodes;
