@@ -249,30 +249,51 @@ static void test_spatial_restart(void **unused)
     end();
 }
 
+/* The first node that is given bricks at the beginning, and its job; NODES: a
+ * strategy that gives none. */
+static unsigned first_with_bricks(const struct host_strategy *s,
+                                  struct incode_job *job)
+{
+    unsigned node = 0;
+    while (node < NODES &&
+           !(s->first(&work, node, job) && job->first + 2 <= job->last)) {
+        node++;
+    }
+    return node;
+}
+
 /* What comes of a brick that is not committed goes with a loss. */
 static void test_lost_tetrahedra(void **unused)
 {
     (void)unused;
+    unsigned tried = 0;
     for (unsigned r = 0; host_strategy_row(r) != NULL; r++) {
         const struct host_strategy *s = host_strategy_row(r);
         struct host_error error = {0};
         struct incode_job job;
         begin(s);
-        assert_true(s->first(&work, 0, &job));
-        (void)give(0, &job);
+        unsigned node = first_with_bricks(s, &job);
+        if (node == NODES) {
+            end();
+            continue;
+        }
+        tried++;
+        (void)give(node, &job);
+        uint32_t v = job.first * INCODE_BRICK_POINTS; /* of its first brick */
         uint32_t(*row)[4] = host_tetrahedra_room(&tets, 2, &error);
         assert_non_null(row);
         for (uint32_t i = 0; i < 4; i++) {
-            row[0][i] = i;                       /* of brick 0 */
-            row[1][i] = INCODE_BRICK_POINTS + i; /* of brick 1 */
+            row[0][i] = v + i;
+            row[1][i] = v + INCODE_BRICK_POINTS + i;
         }
         host_tetrahedra_keep(&tets, 2);
-        assert_int_equal(s->commit(&work, 0, 1), 0);
+        assert_int_equal(s->commit(&work, node, job.first + 1), 0);
         s->lose(&work);
         assert_int_equal(tets.count, 1);
-        assert_int_equal(tets.v[0][0], INCODE_BRICK_POINTS);
+        assert_int_equal(tets.v[0][0], v + INCODE_BRICK_POINTS);
         end();
     }
+    assert_true(tried > 0);
 }
 
 /* Every row can be run and named, and only by its own name. */
