@@ -109,6 +109,26 @@ void host_sending_begin(struct host_service *service)
     }
 }
 
+/* What the strategy has, and what the node has asked for, in turn: a strategy
+ * that always has something would leave no room for pages. */
+static bool serve_data(struct host_service *s, uint16_t to,
+                       struct host_error *error)
+{
+    struct host_node *node = &s->node[to];
+    bool asked = node->unspills_count > 0 || node->pages_count > 0;
+    if (s->strategy->send != NULL && !(asked && node->strategy_last) &&
+        s->strategy->send(&s->work, to)) {
+        node->strategy_last = true;
+        return true;
+    }
+    if (asked && (node->unspills_count > 0 ? send_unspill(s, to, error)
+                                           : send_page(s, to))) {
+        node->strategy_last = false;
+        return true;
+    }
+    return false;
+}
+
 /* The next message that is due to this node, pings apart; false: none, or no
  * room. */
 static bool serve_work(struct host_service *s, uint16_t to,
@@ -147,13 +167,7 @@ static bool serve_work(struct host_service *s, uint16_t to,
         node->credit = credit;
         return true;
     }
-    if (s->strategy->send != NULL && s->strategy->send(&s->work, to)) {
-        return true;
-    }
-    if (node->unspills_count > 0) {
-        return send_unspill(s, to, error);
-    }
-    return node->pages_count > 0 && send_page(s, to);
+    return serve_data(s, to, error);
 }
 
 /* A ping and a message of work in turn: on a slow wire the pings of many nodes

@@ -48,6 +48,7 @@ struct host_node {
     uint32_t credit;  /* messages allowed, as the node knows */
     /* What is to be sent, in this order. */
     bool ping_due, setup_due, job_due, report_due;
+    bool strategy_last; /* of what may wait, that was sent last */
     struct node_job_message job;
     bool working;  /* a job is out */
     bool reported; /* statistics of all that it has done are here */
