@@ -51,10 +51,14 @@ static int take_requests(struct host_service *s,
 {
     struct host_node *node = &s->node[message->source];
     uint32_t count = message->size / 4u;
-    if (message->size % 4 != 0 ||
-        node->pages_count + count > HOST_PAGES_QUEUED_MAX) {
-        return unsound(message, error, "more than %d pages requested",
-                       HOST_PAGES_QUEUED_MAX);
+    if (message->size % 4 != 0) {
+        return unsound(message, error,
+                       "page numbers in %u bytes, expected 4 each",
+                       message->size);
+    }
+    if (node->pages_count + count > HOST_PAGES_QUEUED_MAX) {
+        return unsound(message, error, "more than %d pages requested: %u",
+                       HOST_PAGES_QUEUED_MAX, node->pages_count + count);
     }
     for (uint32_t i = 0; i < count; i++) {
         uint32_t page;
@@ -128,9 +132,16 @@ static int take_spill(struct host_service *s,
         return wrong_size(message, "spilled faces", sizeof header, error);
     }
     memcpy(&header, message->data, sizeof header);
-    if (header.count > NODE_FACES_A_MESSAGE ||
-        message->size != sizeof header + header.count * sizeof faces[0]) {
-        return unsound(message, error, "%u spilled faces", header.count);
+    size_t size = sizeof header + header.count * sizeof faces[0];
+    if (message->size != size) {
+        return unsound(message, error,
+                       "%u spilled faces in %u bytes, expected %zu",
+                       header.count, message->size, size);
+    }
+    if (header.count > NODE_FACES_A_MESSAGE) {
+        return unsound(message, error,
+                       "more than %d spilled faces in a message: %u",
+                       NODE_FACES_A_MESSAGE, header.count);
     }
     if (!host_ledger_current(&s->ledger, message->source, header.epoch)) {
         return 0;
@@ -147,8 +158,11 @@ static int take_unspill_request(struct host_service *s,
 {
     struct host_node *node = &s->node[message->source];
     struct node_spill_header header;
-    if (message->size != sizeof header ||
-        node->unspills_count == HOST_UNSPILLS_MAX) {
+    if (message->size != sizeof header) {
+        return wrong_size(message, "request for a spilled list", sizeof header,
+                          error);
+    }
+    if (node->unspills_count == HOST_UNSPILLS_MAX) {
         return unsound(message, error, "more than %d spilled lists requested",
                        HOST_UNSPILLS_MAX);
     }
@@ -256,13 +270,27 @@ static int take_fault(const struct cube_message *message,
                      advice(text));
 }
 
-/* What the strategy's roles have to say. */
+/* What the strategy's roles have to say.  An error that it has set stays. */
 static int take_other(struct host_service *s,
                       const struct cube_message *message,
                       struct host_error *error)
 {
     const struct host_strategy *strategy = s->strategy;
-    if (strategy->take == NULL || !strategy->take(&s->work, message, error)) {
+    struct node_result_header header;
+    if (strategy->take == NULL) {
+        return unsound(message, error, "unknown type of message");
+    }
+    if (message->size < sizeof header) {
+        return wrong_size(message, "message of a role", sizeof header, error);
+    }
+    memcpy(&header, message->data, sizeof header);
+    if (missing(s, &s->node[message->source], header.sent) ||
+        (header.epoch != 0 &&
+         !host_ledger_current(&s->ledger, message->source, header.epoch))) {
+        return 0;
+    }
+    int status = strategy->take(&s->work, message, error);
+    if (status != 0 && error->code == 0) {
         return unsound(message, error, "unknown type of message");
     }
     return error->code;

@@ -80,10 +80,13 @@ struct host_strategy {
     /* Sends a node what else is due to it, a message at most: true where it has
      * sent one.  NULL: there is nothing else. */
     bool (*send)(struct host_work *work, unsigned node);
-    /* A message of a type that the service does not know: false where the
-     * strategy does not either, or where it is not sound.  NULL: never. */
-    bool (*take)(struct host_work *work, const struct cube_message *message,
-                 struct host_error *error);
+    /* A message of a type that the service does not know, behind a struct
+     * node_result_header: none before it is lost, and its epoch is 0 or that of
+     * the node's job.  0; -1 where the strategy does not know the type either;
+     * or the code of `error`, filled in, where it is not sound.  NULL: there is
+     * none of them. */
+    int (*take)(struct host_work *work, const struct cube_message *message,
+                struct host_error *error);
 };
 
 #endif

@@ -327,12 +327,74 @@ static void test_fault(void **unused)
     end();
 }
 
+enum { NODE_OWN = 100, NODE_UNSOUND };
+
+static unsigned taken;
+
+/* Of a strategy that knows two types of message. */
+static int take_own(struct host_work *work, const struct cube_message *message,
+                    struct host_error *error)
+{
+    (void)work;
+    if (message->type == NODE_UNSOUND) {
+        return host_fail(error, HOST_CUBE, "node %u: tuple 5 of 3; look at it",
+                         message->source);
+    }
+    taken += message->type == NODE_OWN;
+    return message->type == NODE_OWN ? 0 : -1;
+}
+
+/* A strategy has the messages of its roles, none of which follows a gap or is
+ * of a job that is no more; what it says of a wrong one is kept. */
+static void test_strategy(void **unused)
+{
+    (void)unused;
+    struct host_strategy strategy = host_spatial;
+    strategy.take = take_own;
+    for (uint32_t sent = 0; sent < 2; sent++) {
+        struct node_result_header header = {0, sent};
+        struct host_error error = {0};
+        begin();
+        service.strategy = &strategy;
+        taken = 0;
+        assert_int_equal(send(1, NODE_OWN, &header, sizeof header, &error), 0);
+        assert_int_equal(taken, sent == 0);
+        assert_int_equal(service.loss, sent == 1);
+        end();
+    }
+    static const struct {
+        uint8_t type;
+        uint32_t epoch;
+        size_t size;
+        const char *text;
+    } then[] = {{NODE_OWN, 1000, 8, ""},
+                {NODE_OWN, 0, 7, "message of a role in 7 bytes, expected 8"},
+                {NODE_UNSOUND, 0, 8, "node 1: tuple 5 of 3; look at it"},
+                {NODE_OWN + 9, 0, 8, "unknown type of message"}};
+    for (size_t i = 0; i < sizeof then / sizeof then[0]; i++) {
+        struct node_result_header header = {then[i].epoch, 0};
+        struct host_error error = {0};
+        begin();
+        service.strategy = &strategy;
+        taken = 0;
+        assert_int_equal(send(1, then[i].type, &header, then[i].size, &error),
+                         then[i].text[0] == '\0' ? 0 : HOST_CUBE);
+        assert_non_null(strstr(error.text, then[i].text));
+        assert_int_equal(taken, 0);
+        end();
+    }
+}
+
 /* What no node of this version sends is told in figures. */
 static void test_texts(void **unused)
 {
     (void)unused;
     static struct node_ready_message ready = {.protocol = NODE_PROTOCOL - 1};
     static uint32_t many[HOST_PAGES_QUEUED_MAX + 1];
+    static struct {
+        struct node_spill_header header;
+        struct incode_face faces[NODE_FACES_A_MESSAGE + 1];
+    } spill = {.header = {.count = NODE_FACES_A_MESSAGE + 1}};
     uint32_t page = 1000000;
     const struct {
         uint8_t type;
@@ -347,7 +409,18 @@ static void test_texts(void **unused)
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
         {NODE_RESULT, &ready, 2, "results in 2 bytes, expected 8"},
         {NODE_PAGE_REQUEST, &page, 4, "page 1000000 out of range 0.."},
-        {NODE_PAGE_REQUEST, many, sizeof many, "more than 256 pages requested"},
+        {NODE_PAGE_REQUEST, many, sizeof many,
+         "more than 256 pages requested: 257"},
+        {NODE_PAGE_REQUEST, many, 7, "page numbers in 7 bytes, expected 4"},
+        {NODE_SPILL, &spill, 19, "spilled faces in 19 bytes, expected 20"},
+        {NODE_SPILL, &spill, 32,
+         "129 spilled faces in 32 bytes, expected 1568"},
+        {NODE_SPILL, &spill, sizeof spill,
+         "more than 128 spilled faces in a message: 129"},
+        {NODE_UNSPILL_REQUEST, &spill, 24,
+         "request for a spilled list in 24 bytes, expected 20"},
+        {NODE_UNSPILL_REQUEST, &spill, 20,
+         "more than 64 spilled lists requested"},
         {NODE_STOP, &ready, 0, "unknown type of message"},
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
@@ -356,6 +429,7 @@ static void test_texts(void **unused)
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();
+        service.node[3].unspills_count = HOST_UNSPILLS_MAX;
         assert_int_equal(
             send(3, wrong[i].type, wrong[i].data, wrong[i].size, &error),
             HOST_CUBE);
@@ -372,7 +446,8 @@ int main(void)
         cmocka_unit_test(test_any_bytes), cmocka_unit_test(test_epochs),
         cmocka_unit_test(test_gaps),      cmocka_unit_test(test_unfinished),
         cmocka_unit_test(test_answers),   cmocka_unit_test(test_starts),
-        cmocka_unit_test(test_fault),     cmocka_unit_test(test_texts),
+        cmocka_unit_test(test_fault),     cmocka_unit_test(test_strategy),
+        cmocka_unit_test(test_texts),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
