@@ -3,6 +3,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "incode/pages/bricks.h"
+
 enum { KIND_TETRAHEDRON, KIND_STAR, KIND_COMMIT };
 
 static inline uint32_t zigzag(uint32_t difference)
@@ -80,7 +82,8 @@ int node_result_commit(struct node_result_writer *writer, uint32_t brick)
     if (writer->size_max - writer->size < NODE_RESULT_COMMIT_MAX) {
         return 0;
     }
-    put_single(writer, KIND_COMMIT, brick - writer->vertex / 64);
+    put_single(writer, KIND_COMMIT,
+               brick - writer->vertex / INCODE_BRICK_POINTS);
     return 1;
 }
 
@@ -159,9 +162,10 @@ static size_t read_slowly(struct node_result_reader *reader, uint32_t row[4],
         reader->in_star = 1;
         return reader->vertex < reader->vertices ? size : 0;
     }
-    reader->brick = reader->vertex / 64 + difference;
+    reader->brick = reader->vertex / INCODE_BRICK_POINTS + difference;
     *committed = 1;
-    return reader->brick <= (reader->vertices - 1) / 64 ? size : 0;
+    return reader->brick <= (reader->vertices - 1) / INCODE_BRICK_POINTS ? size
+                                                                         : 0;
 }
 
 /* Tetrahedra one after another while none can reach past the end. */

@@ -5,7 +5,6 @@
  *     fault = (struct linux_fault){"--key", path, "does not open",
  *                                  "name a file that can be read", errno};
  *     fault_print(&fault);
- * errno}; fault_print(&fault);
  */
 #ifndef BOARDS_LINUX_FAULT_H
 #define BOARDS_LINUX_FAULT_H
