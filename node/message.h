@@ -50,8 +50,9 @@ enum node_message_type {
 
 /* What a node does in a generation of the wiring: a row of roles/roles.c. */
 enum node_role_number {
-    NODE_WORKER = 1, /* triangulates the jobs that it is given */
-    NODE_HOLDER = 2  /* keeps pages for node 0 */
+    NODE_WORKER = 1,         /* triangulates the jobs that it is given */
+    NODE_HOLDER = 2,         /* keeps pages for others */
+    NODE_ROLES = NODE_HOLDER /* the last */
 };
 
 /* Counted messages are all that go between the host and one node, NODE_STOP
@@ -80,8 +81,8 @@ struct node_setup_message {
     /* Nodes of the cube: 2^dimension, as the node's board has it. */
     uint16_t nodes;
 
-    /* Nodes that keep pages: nodes 1 .. holders do, page p is node
-     * 1 + p % holders's; less than `nodes`.  0: the host sends all pages. */
+    /* Nodes that keep pages: nodes 1 .. holders do, in turn (keepers.h); less
+     * than `nodes`.  0: the host sends all pages. */
     uint16_t holders;
 
     /* NODE_RESULT messages that the node may send before the first NODE_CREDIT,
@@ -170,10 +171,17 @@ static_assert(sizeof(struct incode_face) == 12, "face layout");
 static_assert(sizeof(struct incode_job) == 56, "job layout");
 static_assert(sizeof(struct node_job_message) == 64, "job layout");
 static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
-static_assert(sizeof(struct node_setup_message) ==
-                  16 + sizeof(struct incode_setup),
-              "setup layout");
+static_assert(sizeof(struct node_setup_message) == 96, "setup layout");
+static_assert(offsetof(struct node_setup_message, setup) == 16, "setup layout");
+static_assert(sizeof(struct node_map) == 32 + 8 * NODE_TABLES_MAX,
+              "map layout");
+static_assert(sizeof(struct node_ready_message) == 8 + sizeof(struct node_map),
+              "ready layout");
+static_assert(sizeof(struct node_ready_message) <= CUBE_PAYLOAD_MAX,
+              "a memory map fits a message");
 static_assert(offsetof(struct node_finished_message, wall_us) == 16,
+              "statistics layout");
+static_assert(offsetof(struct node_finished_message, statistics) == 80,
               "statistics layout");
 static_assert(sizeof(struct node_finished_message) <= CUBE_PAYLOAD_MAX,
               "statistics fit a message");

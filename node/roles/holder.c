@@ -2,6 +2,9 @@
 
 #include <string.h>
 
+#include "incode/predicates/check.h"
+#include "node/keepers.h"
+
 enum { PAGE_MESSAGE_MAX = sizeof(uint32_t) + INCODE_PAGE_BYTES };
 
 struct frame {
@@ -9,7 +12,7 @@ struct frame {
     uint8_t data[INCODE_PAGE_BYTES];
     uint16_t size; /* of data; 0: nothing here */
     bool loading;  /* the host has been asked */
-    bool fresh;    /* there, but not yet passed on to whom it was got for */
+    bool fresh;    /* there, but not yet passed on to who it was got for */
 };
 
 struct holder {
@@ -18,7 +21,9 @@ struct holder {
     uint32_t holders;
     struct frame *frames;
     uint32_t frame_count, frames_used;
-    uint32_t queue[NODE_PAGES_IN_FLIGHT_MAX]; /* pages that node 0 waits for */
+    /* Requests that wait: for this page, by that node. */
+    uint32_t page[NODE_PAGES_IN_FLIGHT_MAX];
+    uint16_t source[NODE_PAGES_IN_FLIGHT_MAX];
     uint32_t queued;
     uint64_t hits, misses, bytes_in, bytes_out;
 };
@@ -44,6 +49,9 @@ static bool holder_start(void *self, size_t bytes,
         node_fault_set(fault, "invalid setup: a holder among # holders", 0, 0);
         return false;
     }
+    if (!node_keepers_fit(setup, fault)) {
+        return false;
+    }
     memset(h, 0, sizeof *h);
     h->counted = counted;
     h->fault = fault;
@@ -56,18 +64,25 @@ static bool holder_start(void *self, size_t bytes,
 
 static struct frame *frame_of(const struct holder *h, uint32_t page)
 {
-    return &h->frames[page / h->holders % h->frame_count];
+    return &h->frames[node_keeper_place(page, h->holders) % h->frame_count];
 }
 
-static void take_request(struct holder *h, const uint8_t *data, size_t size)
+static void take_request(struct holder *h, const struct cube_message *message)
 {
-    for (size_t at = 0; at + 4 <= size; at += 4) {
+    if (message->size % sizeof h->page[0] != 0) {
+        node_fault_set(h->fault, "request in # bytes, expected # a page",
+                       message->size, sizeof h->page[0]);
+        return;
+    }
+    for (size_t at = 0; at < message->size; at += sizeof h->page[0]) {
         if (h->queued == NODE_PAGES_IN_FLIGHT_MAX) {
             node_fault_set(h->fault, "more than # pages requested at a time",
                            NODE_PAGES_IN_FLIGHT_MAX, 0);
             return;
         }
-        memcpy(&h->queue[h->queued++], data + at, 4);
+        memcpy(&h->page[h->queued], message->data + at, sizeof h->page[0]);
+        h->source[h->queued] = message->source;
+        h->queued++;
     }
 }
 
@@ -98,17 +113,50 @@ static void holder_message(void *self, const struct cube_message *message,
     (void)now_us;
     h->bytes_in += message->size;
     if (message->type == NODE_PAGE_REQUEST) {
-        take_request(h, message->data, message->size);
+        take_request(h, message);
     } else if (message->type == NODE_PAGE) {
         take_page(h, message->data, message->size);
     } else if (message->type == NODE_JOB) {
         node_fault_set(h->fault, "a job for a node that holds pages", 0, 0);
+    } else if (message->type != NODE_CREDIT) { /* it has no results */
+        node_fault_set(h->fault,
+                       "message of type # for a node that holds pages",
+                       message->type, 0);
     }
 }
 
+static bool holds(const struct frame *frame, uint32_t page)
+{
+    return frame->page == page && frame->size > 0;
+}
+
+/* To each who waits for a page that is there, as links have room. */
+static unsigned send_pages(struct holder *h)
+{
+    unsigned sent = 0;
+    for (uint32_t i = 0; i < h->queued;) {
+        struct frame *frame = frame_of(h, h->page[i]);
+        size_t size = sizeof frame->page + frame->size;
+        if (!holds(frame, h->page[i]) ||
+            node_counted_write(h->counted, h->source[i], NODE_PAGE, frame,
+                               size) != 0) {
+            i++;
+            continue;
+        }
+        h->hits += !frame->fresh;
+        frame->fresh = false;
+        h->queued--;
+        h->page[i] = h->page[h->queued];
+        h->source[i] = h->source[h->queued];
+        h->bytes_out += size;
+        sent++;
+    }
+    return sent;
+}
+
 /* Takes a frame for a page and notes it as wanted.  A page that has just come
- * goes to node 0 first: otherwise two pages of one frame could displace each
- * other for ever. */
+ * goes to who waits for it first: otherwise two pages of one frame could
+ * displace each other for ever. */
 static bool claim(struct holder *h, struct frame *frame, uint32_t page)
 {
     if (frame->loading || frame->fresh) {
@@ -122,46 +170,33 @@ static bool claim(struct holder *h, struct frame *frame, uint32_t page)
     return true;
 }
 
+/* Asks for pages that are not there.  What a frame held is given up only when
+ * the request is sure to leave. */
+static unsigned ask_host(struct holder *h)
+{
+    uint32_t wanted[NODE_PAGES_A_REQUEST], count = 0;
+    if (cube_room(h->counted->cube, CUBE_HOST) == 0) {
+        return 0;
+    }
+    for (uint32_t i = 0; i < h->queued && count < NODE_PAGES_A_REQUEST; i++) {
+        struct frame *frame = frame_of(h, h->page[i]);
+        if (!holds(frame, h->page[i]) && claim(h, frame, h->page[i])) {
+            wanted[count++] = h->page[i];
+        }
+    }
+    if (count == 0) {
+        return 0;
+    }
+    INCODE_ASSERT(node_counted_write(h->counted, CUBE_HOST, NODE_PAGE_REQUEST,
+                                     wanted, count * sizeof wanted[0]) == 0);
+    h->bytes_out += count * sizeof wanted[0];
+    return 1;
+}
+
 static unsigned holder_send(void *self)
 {
-    struct holder *h = self;
-    uint32_t wanted[NODE_PAGES_A_REQUEST];
-    uint32_t wanted_count = 0, i = 0;
-    unsigned sent = 0;
-    bool may_ask = cube_room(h->counted->cube, CUBE_HOST) > 0;
-    while (i < h->queued) {
-        uint32_t page = h->queue[i];
-        struct frame *frame = frame_of(h, page);
-        size_t size = sizeof page + frame->size;
-        if (frame->page == page && frame->size > 0 &&
-            cube_write(h->counted->cube, 0, NODE_PAGE, frame, size) == 0) {
-            h->hits += !frame->fresh;
-            frame->fresh = false;
-            h->queue[i] = h->queue[--h->queued];
-            h->bytes_out += size;
-            sent++;
-            continue;
-        }
-        if (may_ask && wanted_count < NODE_PAGES_A_REQUEST &&
-            (frame->page != page || frame->size == 0) &&
-            claim(h, frame, page)) {
-            wanted[wanted_count++] = page;
-        }
-        i++;
-    }
-    if (wanted_count > 0) {
-        /* Pages for node 0 may have taken the room on the same link. */
-        if (node_counted_write(h->counted, CUBE_HOST, NODE_PAGE_REQUEST, wanted,
-                               wanted_count * sizeof wanted[0]) != 0) {
-            for (i = 0; i < wanted_count; i++) {
-                frame_of(h, wanted[i])->loading = false;
-            }
-            return sent;
-        }
-        h->bytes_out += wanted_count * sizeof wanted[0];
-        sent++;
-    }
-    return sent;
+    unsigned sent = send_pages(self);
+    return sent + ask_host(self);
 }
 
 static unsigned holder_work(void *self)

@@ -59,7 +59,8 @@ struct node_role {
      * are due; 0: there is none. */
     uint32_t (*done)(const void *self);
 
-    /* The statistics of that job have left. */
+    /* The statistics of that job have left: once for each, after `done` was not
+     * 0, and never after a fault. */
     void (*end)(void *self, uint64_t now_us);
 
     /* Slots of its queues in use; 0 when no job is open. */

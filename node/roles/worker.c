@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
+#include "node/keepers.h"
 #include "node/outbox.h"
 #include "node/result.h"
 
@@ -226,6 +227,9 @@ static bool worker_start(void *self, size_t bytes,
                        0);
         return false;
     }
+    if (!node_keepers_fit(setup, fault)) {
+        return false;
+    }
     memset(w, 0, sizeof *w);
     w->counted = counted;
     w->fault = fault;
@@ -328,6 +332,16 @@ static void take_unspill(struct worker *w, const uint8_t *data, size_t size)
     }
 }
 
+static void take_credit(struct worker *w, const uint8_t *data, size_t size)
+{
+    if (size != sizeof w->credit) {
+        node_fault_set(w->fault, "credit in # bytes, expected #",
+                       (uint32_t)size, sizeof w->credit);
+        return;
+    }
+    memcpy(&w->credit, data, sizeof w->credit);
+}
+
 static void worker_message(void *self, const struct cube_message *message,
                            uint64_t now_us)
 {
@@ -341,9 +355,11 @@ static void worker_message(void *self, const struct cube_message *message,
         take_page(w, message->data, message->size);
     } else if (message->type == NODE_UNSPILL) {
         take_unspill(w, message->data, message->size);
-    } else if (message->type == NODE_CREDIT &&
-               message->size == sizeof w->credit) {
-        memcpy(&w->credit, message->data, sizeof w->credit);
+    } else if (message->type == NODE_CREDIT) {
+        take_credit(w, message->data, message->size);
+    } else {
+        node_fault_set(w->fault, "message of type # for a worker",
+                       message->type, 0);
     }
 }
 
@@ -372,27 +388,19 @@ static unsigned worker_work(void *self)
     return worked;
 }
 
-/* Who has the page. */
-static uint16_t keeper(const struct worker *w, uint32_t page)
-{
-    if (w->holders == 0) {
-        return CUBE_HOST;
-    }
-    return (uint16_t)(1 + page % w->holders);
-}
-
 /* Sends for wanted pages, one message for each node that has some. */
 static void send_wanted(struct worker *w)
 {
     while (w->wanted_count > 0) {
         uint32_t batch[NODE_PAGES_A_REQUEST];
         uint32_t count = 0, left = 0;
-        uint16_t to = keeper(w, w->wanted[0]);
+        uint16_t to = node_keeper(w->wanted[0], w->holders);
         if (cube_room(w->counted->cube, to) == 0) {
             return;
         }
         for (uint32_t i = 0; i < w->wanted_count; i++) {
-            if (count < NODE_PAGES_A_REQUEST && keeper(w, w->wanted[i]) == to) {
+            if (count < NODE_PAGES_A_REQUEST &&
+                node_keeper(w->wanted[i], w->holders) == to) {
                 batch[count++] = w->wanted[i];
             } else {
                 w->wanted[left++] = w->wanted[i];
@@ -440,7 +448,7 @@ static unsigned worker_send(void *self)
     while (send_first(w, &w->spills)) {
         sent++;
     }
-    while (w->sent != w->credit && send_first(w, &w->results)) {
+    while ((int32_t)(w->credit - w->sent) > 0 && send_first(w, &w->results)) {
         w->sent++;
         sent++;
     }
@@ -463,6 +471,7 @@ static uint32_t worker_done(const void *self)
 static void worker_end(void *self, uint64_t now_us)
 {
     struct worker *w = self;
+    INCODE_ASSERT(worker_done(w) != 0);
     w->wall_us += now_us - w->start_us;
     w->working = false;
     w->drained = false;
