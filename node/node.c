@@ -157,10 +157,12 @@ static bool read_setup(struct node *n, const struct cube_message *message,
                        setup->nodes, nodes);
         return false;
     }
-    if (setup->holders >= nodes) {
-        node_fault_set(&n->fault, "invalid setup: # holders of # nodes",
-                       setup->holders, nodes);
-        return false;
+    for (unsigned i = 0; i < sizeof setup->reserved; i++) {
+        if (setup->reserved[i] != 0) {
+            node_fault_set(&n->fault, "invalid setup: reserved byte # is #", i,
+                           setup->reserved[i]);
+            return false;
+        }
     }
     return true;
 }
@@ -177,8 +179,8 @@ static void take_setup(struct node *n, const struct cube_message *message)
     }
     const struct node_role *role = node_role_named(setup.role);
     if (role == NULL) {
-        node_fault_set(&n->fault, "role # is not known to its program",
-                       setup.role, 0);
+        node_fault_set(&n->fault, "unknown role #, known are 1..#", setup.role,
+                       NODE_ROLES);
         return;
     }
     if (role->start(n->role_arena, n->role_bytes, &setup, &n->counted,
@@ -192,12 +194,15 @@ static void take_setup(struct node *n, const struct cube_message *message)
 static void take_ping(struct node *n, const struct cube_message *message)
 {
     struct node_ping_message ping;
-    if (message->size == sizeof ping) {
-        memcpy(&ping, message->data, sizeof ping);
-        n->pong.pinged = ping.sent;
-        n->pong.received = n->counted.received;
-        n->owes_pong = true;
+    if (message->size != sizeof ping) {
+        node_fault_set(&n->fault, "ping in # bytes, expected #", message->size,
+                       sizeof ping);
+        return;
     }
+    memcpy(&ping, message->data, sizeof ping);
+    n->pong.pinged = ping.sent;
+    n->pong.received = n->counted.received;
+    n->owes_pong = true;
 }
 
 static void take_message(struct node *n, const struct cube_message *message)
@@ -387,6 +392,7 @@ enum node_event node_step(struct node *node)
         node->owes_ready = !send_ready(node);
     } else if (sound) {
         moved += serve_role(node);
+        moved += node_fault_is_set(&node->fault); /* to be told at once */
     }
     if (may_stop(node)) {
         return NODE_STOPPED;

@@ -21,6 +21,7 @@ enum {
     MEMORY = 1 << 20,
     FIXED = 65536,
     ECHO_ROLE = 9,
+    ECHO_FAILS = 13, /* a job's epoch: a fault in its third step */
     ECHO_ASKS = 77,
     ECHO_ANSWERS,
     ECHO_TABLE = 640
@@ -36,6 +37,8 @@ struct echo {
     uint32_t epoch, worked;
     uint64_t heard, ended_us;
 };
+
+static bool echo_is_worn;
 
 static size_t echo_arena_min(size_t memory,
                              const struct node_setup_message *setup)
@@ -79,6 +82,13 @@ static void echo_message(void *self, const struct cube_message *message,
 static unsigned echo_work(void *self)
 {
     struct echo *e = self;
+    if (e->epoch == ECHO_FAILS) {
+        if (++e->worked == 3) {
+            node_fault_set(e->fault, "worn out", 0, 0);
+            echo_is_worn = true;
+        }
+        return 0;
+    }
     return e->epoch != 0 && e->worked < 3 ? ++e->worked : 0;
 }
 
@@ -96,7 +106,7 @@ static unsigned echo_send(void *self)
 static uint32_t echo_done(const void *self)
 {
     const struct echo *e = self;
-    return e->worked == 3 ? e->epoch : 0;
+    return e->worked == 3 && e->epoch != ECHO_FAILS ? e->epoch : 0;
 }
 
 static void echo_end(void *self, uint64_t now_us)
@@ -416,8 +426,7 @@ static void an_unknown_role(void **unused)
     struct node_pong_message pong;
     (void)unused;
     (void)begin(ECHO_ROLE);
-    refuses(NODE_SETUP, &setup, sizeof setup,
-            "role 7 is not known to its program");
+    refuses(NODE_SETUP, &setup, sizeof setup, "unknown role 7, known are 1..2");
     say(ECHO_ASKS, "none", 4); /* to the role before */
     say(NODE_PING, &ping, sizeof ping);
     memcpy(&pong, hear(NODE_PONG), sizeof pong);
@@ -463,6 +472,15 @@ static void invalid_setups(void **unused)
     setup.holders = 0;
     refuses(NODE_SETUP, &setup, sizeof setup,
             "invalid setup: a holder among 0 holders");
+    setup.holders = 3;
+    refuses(NODE_SETUP, &setup, sizeof setup,
+            "invalid setup: 3 holders of 2 nodes");
+    setup = setup_of(ECHO_ROLE);
+    setup.reserved[1] = 9;
+    refuses(NODE_SETUP, &setup, sizeof setup,
+            "invalid setup: reserved byte 1 is 9");
+    (void)begin(ECHO_ROLE);
+    refuses(NODE_PING, &setup, 3, "ping in 3 bytes, expected 4");
 }
 
 static void what_a_worker_refuses(void **unused)
@@ -507,6 +525,10 @@ static void what_a_worker_refuses(void **unused)
     header.count = 2;
     refuses(NODE_UNSPILL, &header, sizeof header,
             "2 spilled faces in 20 bytes");
+    (void)begin(NODE_WORKER);
+    refuses(NODE_CREDIT, &header, 3, "credit in 3 bytes, expected 4");
+    (void)begin(NODE_WORKER);
+    refuses(ECHO_ASKS, NULL, 0, "message of type 77 for a worker");
 }
 
 static void what_a_holder_refuses(void **unused)
@@ -529,6 +551,32 @@ static void what_a_holder_refuses(void **unused)
     memset(pages, 0, sizeof pages);
     refuses(NODE_PAGE_REQUEST, pages, sizeof pages,
             "more than 256 pages requested at a time");
+    (void)begin(NODE_HOLDER);
+    refuses(NODE_PAGE_REQUEST, pages, 5,
+            "request in 5 bytes, expected 4 a page");
+    (void)begin(NODE_HOLDER);
+    refuses(NODE_UNSPILL, &page, 20,
+            "message of type 5 for a node that holds pages");
+}
+
+/* Nothing moves when a role finds it, and the board would sleep. */
+static void a_fault_is_told_at_once(void **unused)
+{
+    struct node_job_message job = {.epoch = ECHO_FAILS};
+    enum node_event event = NODE_BUSY;
+    (void)unused;
+    echo_is_worn = false;
+    (void)begin(ECHO_ROLE);
+    say(NODE_JOB, &job, sizeof job);
+    for (unsigned i = 0; !echo_is_worn; i++) {
+        assert_true(i < 100000);
+        world.now_us += 50;
+        (void)node_step(world.nodes[0]);
+        event = node_step(world.node);
+        (void)cube_poll(world.host, world.now_us);
+    }
+    assert_int_equal(event, NODE_BUSY);
+    assert_string_equal(hear(NODE_FAULT), "worn out");
 }
 
 /* A text that is too long is cut, and the first fault stays. */
@@ -566,6 +614,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(what_a_worker_refuses, set_up,
                                         tear_down),
         cmocka_unit_test_setup_teardown(what_a_holder_refuses, set_up,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(a_fault_is_told_at_once, set_up,
                                         tear_down),
         cmocka_unit_test(fault_texts),
     };
