@@ -12,7 +12,8 @@ static const char help[] =
     "\n"
     "  --node N           its number; without, a neighbour tells it\n"
     "  --dimension N      of the cube: 2^N nodes, 0 to 10\n"
-    "  --memory BYTES     data memory in all, stack included (4194304)\n"
+    "  --memory BYTES     data memory in all, stack included (4194304);\n"
+    "                     below 4 GiB\n"
     "  --stack BYTES      of it (65536)\n"
     "  --window N         frames a link and direction, 1 to 64; by memory\n"
     "  --serial-baud BAUD the cube has serial wires, the slowest so fast\n"
@@ -98,8 +99,8 @@ static const char *read_one(const char *name, const char *text,
         uint64_t *value, most;
     } known[] = {{"--node", &options->node, (1u << CUBE_DIMENSION_MAX) - 1},
                  {"--dimension", &options->dimension, CUBE_DIMENSION_MAX},
-                 {"--memory", &options->memory, UINT64_C(1) << 40},
-                 {"--stack", &options->stack, UINT64_C(1) << 40},
+                 {"--memory", &options->memory, UINT32_MAX},
+                 {"--stack", &options->stack, UINT32_MAX},
                  {"--window", &options->window, LINK_WINDOW_MAX},
                  {"--epoch", &options->epoch, UINT32_MAX},
                  {"--serial-baud", &options->serial_baud, UINT32_MAX},

@@ -47,6 +47,19 @@ static _Noreturn void give_up(unsigned node, const char *why)
     _exit(4);
 }
 
+/* what: in the host's order, a number that breaks its bound ("at most"). */
+static _Noreturn void refuse_order(unsigned node, const char *what,
+                                   unsigned long long is, const char *bound,
+                                   unsigned long long limit)
+{
+    char why[160];
+    (void)snprintf(why, sizeof why,
+                   "the host's order: %s %llu, expected %s %llu; are all "
+                   "machines of one version?",
+                   what, is, bound, limit);
+    give_up(node, why);
+}
+
 /* Open MPI ends all ranks when it has lost one. */
 static void stay_a_moment(int signal)
 {
@@ -111,10 +124,13 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
     unsigned self = (unsigned)b->place.rank - 1;
     size_t fixed = process_static_bytes() + STACK_BYTES;
     memset(board, 0, sizeof *board);
-    if (order->dimension > CUBE_DIMENSION_MAX ||
-        order->memory < fixed + PROCESS_PAGE) {
-        give_up(self, "the host's order is not sound; are all machines of one "
-                      "version?");
+    if (order->dimension > CUBE_DIMENSION_MAX) {
+        refuse_order(self, "dimension", order->dimension, "at most",
+                     CUBE_DIMENSION_MAX);
+    }
+    if (order->memory < fixed + PROCESS_PAGE) {
+        refuse_order(self, "bytes of memory", order->memory, "at least",
+                     fixed + PROCESS_PAGE);
     }
     board->fixed_bytes = fixed;
     board->arena_bytes =
