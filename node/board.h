@@ -66,8 +66,8 @@ struct node_board {
     /* The node's end: a fresh start, or where there is a system, an exit with
      * this status. */
     void (*reset)(void *context, int status);
-    void *arena; /* aligned to 64 bytes */
-    size_t arena_bytes;
+    void *arena;        /* aligned to NODE_ALIGNMENT bytes: arena.h */
+    size_t arena_bytes; /* with fixed_bytes, below 4 GiB */
     size_t fixed_bytes; /* data memory outside the arena, stack included */
 };
 

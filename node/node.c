@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "arena.h"
 #include "incode/predicates/check.h"
 #include "node/roles/roles.h"
 #include "totals.h"
@@ -88,8 +89,16 @@ struct node *node_start(const struct node_board *board, const char **why)
     struct cube_config config =
         configure(&board->identity, board->arena_bytes + board->fixed_bytes);
     memcpy(config.pipes, board->pipes, sizeof config.pipes);
+    INCODE_ASSERT((uintptr_t)board->arena % NODE_ALIGNMENT == 0);
     *why = incode_arithmetic_fault();
+    if (*why == NULL) {
+        *why = cube_config_fault(&config);
+    }
     if (*why != NULL) {
+        return NULL;
+    }
+    if ((uint64_t)board->arena_bytes + board->fixed_bytes > UINT32_MAX) {
+        *why = "a node's memory is below 4 GiB"; /* struct node_map says it */
         return NULL;
     }
     size_t cube = node_aligned(cube_arena_bytes(&config));
@@ -105,10 +114,7 @@ struct node *node_start(const struct node_board *board, const char **why)
     node->role_arena = memory + own + cube;
     node->role_bytes = board->arena_bytes - own - cube;
     node->cube = cube_init(memory + own, cube, &config);
-    if (node->cube == NULL) {
-        *why = "the cube's description is not sound";
-        return NULL;
-    }
+    INCODE_ASSERT(node->cube != NULL);
     node->counted.cube = node->cube;
     return node;
 }

@@ -25,7 +25,8 @@ enum node_event {
 
 struct node; /* opaque: lives at the start of the arena */
 
-/* NULL where the arena does not suffice or the arithmetic is unsound: *why. */
+/* NULL where the arena does not suffice, the identity breaks a limit of the
+ * cube or the arithmetic is unsound: *why. */
 struct node *node_start(const struct node_board *board, const char **why);
 
 /* Bytes of arena that a node of this identity needs for this setup, its role

@@ -19,6 +19,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "node/arena.h"
 #include "node/counted.h"
 #include "node/fault.h"
 #include "node/message.h"
@@ -37,9 +38,9 @@ struct node_role {
      * `memory` bytes in all. */
     size_t (*arena_min)(size_t memory, const struct node_setup_message *setup);
 
-    /* Begins anew, in an arena aligned to 64 bytes with anything in it. counted
-     * and fault stay: the one sends its messages, the other takes what keeps
-     * it from going on, now or later.  False: it has told so. */
+    /* Begins anew, in an arena aligned to NODE_ALIGNMENT with anything in it.
+     * counted and fault stay: the one sends its messages, the other takes what
+     * keeps it from going on, now or later.  False: it has told so. */
     bool (*start)(void *self, size_t bytes,
                   const struct node_setup_message *setup,
                   struct node_counted *counted, struct node_fault *fault);
@@ -77,11 +78,5 @@ struct node_role {
 
 /* The role of that number (enum node_role_number), or NULL: no such role. */
 const struct node_role *node_role_named(uint32_t number);
-
-/* Bytes, rounded up so that what follows is aligned for anything. */
-static inline size_t node_aligned(size_t bytes)
-{
-    return (bytes + 63) / 64 * 64;
-}
 
 #endif

@@ -501,6 +501,8 @@ static void worker_map(const void *self, struct node_map *map)
                                {t->afl, t->afl_faces},
                                {t->bricks, t->brick_entries},
                                {t->frames, t->frame_count}};
+    static_assert(sizeof bytes / sizeof bytes[0] <= NODE_TABLES_MAX,
+                  "tables of a worker");
     for (unsigned i = 0; i < sizeof bytes / sizeof bytes[0]; i++) {
         map->tables[i].bytes = (uint32_t)bytes[i][0];
         map->tables[i].count = (uint32_t)bytes[i][1];

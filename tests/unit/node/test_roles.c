@@ -579,6 +579,24 @@ static void a_fault_is_told_at_once(void **unused)
     assert_string_equal(hear(NODE_FAULT), "worn out");
 }
 
+/* Where a node cannot start, its board learns which limit is broken. */
+static void boards_that_are_refused(void **unused)
+{
+    struct node_board board = world.board[SELF];
+    const char *why = NULL;
+    (void)unused;
+    board.identity.dimension = CUBE_DIMENSION_MAX + 1;
+    assert_null(node_start(&board, &why));
+    assert_string_equal(why, "dimension is above 10");
+    board = world.board[SELF];
+    board.arena_bytes = 64;
+    assert_null(node_start(&board, &why));
+    assert_string_equal(why, "the memory does not hold the links' windows");
+    board.arena_bytes = UINT32_MAX;
+    assert_null(node_start(&board, &why));
+    assert_string_equal(why, "a node's memory is below 4 GiB");
+}
+
 /* A text that is too long is cut, and the first fault stays. */
 static void fault_texts(void **unused)
 {
@@ -616,6 +634,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(what_a_holder_refuses, set_up,
                                         tear_down),
         cmocka_unit_test_setup_teardown(a_fault_is_told_at_once, set_up,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(boards_that_are_refused, set_up,
                                         tear_down),
         cmocka_unit_test(fault_texts),
     };
