@@ -1,5 +1,6 @@
 #include "maker.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "incode/predicates/check.h"
@@ -9,6 +10,8 @@
 static size_t copies_bytes(uint32_t copies)
 {
     const struct incode_neighbours *list = NULL;
+    static_assert(sizeof *list->point % alignof(struct incode_frame) == 0,
+                  "frames behind the copies stay aligned");
     return copies * sizeof *list->point;
 }
 

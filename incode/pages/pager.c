@@ -26,7 +26,8 @@ size_t incode_pager_bytes(uint32_t frames)
 void incode_pager_init(struct incode_pager *pager, void *memory,
                        uint32_t frames, uint32_t bricks)
 {
-    INCODE_ASSERT(frames >= 1 && frames < INCODE_NO_FRAME);
+    INCODE_ASSERT(frames >= 1 && frames < INCODE_NO_FRAME &&
+                  (uintptr_t)memory % alignof(struct incode_frame) == 0);
     memset(pager, 0, sizeof *pager);
     pager->frames = memory;
     pager->used = (uint64_t *)(void *)(pager->frames + frames);
