@@ -91,6 +91,44 @@ static uint32_t lookahead_of(const struct incode_maker *m)
     return bricks < 1 ? 1 : bricks > LOOKAHEAD_MAX ? LOOKAHEAD_MAX : bricks;
 }
 
+static const char *grid_fault(const uint32_t cells[3])
+{
+    uint64_t product = 1;
+    for (int d = 0; d < 3; d++) {
+        if (cells[d] < 1 || cells[d] > INCODE_CELLS_MAX)
+            return "invalid setup: cells of the grid out of their limits";
+        product *= cells[d]; /* below 2^32 times 2^30 */
+        if (product >= INCODE_NONE)
+            return "invalid setup: too many cells of the grid";
+    }
+    return NULL;
+}
+
+const char *incode_setup_fault(const struct incode_setup *setup)
+{
+    if (setup->bricks == 0)
+        return "there are no points";
+    if (setup->bricks > INCODE_NONE / INCODE_BRICK_POINTS)
+        return "invalid setup: too many bricks";
+    if (setup->index != INCODE_NAIVE && setup->index != INCODE_GRID &&
+        setup->index != INCODE_KD)
+        return "invalid setup: unknown index";
+    if (setup->face_rule != INCODE_FACE_OWN &&
+        setup->face_rule != INCODE_FACE_PAPER)
+        return "invalid setup: unknown face rule";
+    if (setup->reserved != 0 || setup->reserved2 != 0)
+        return "invalid setup: what is reserved is not 0";
+    for (int d = 0; d < 3; d++)
+        if (!__builtin_isfinite(setup->lo[d]) ||
+            !__builtin_isfinite(setup->hi[d]) || setup->lo[d] > setup->hi[d])
+            return "invalid setup: the box of all points is empty or infinite";
+    if (setup->index == INCODE_GRID)
+        return grid_fault(setup->cells);
+    if (setup->cells[0] != 0 || setup->cells[1] != 0 || setup->cells[2] != 0)
+        return "invalid setup: cells without a grid";
+    return NULL;
+}
+
 struct incode_triangulator *
 incode_triangulator_init(void *arena, size_t bytes,
                          const struct incode_setup *setup,
@@ -98,12 +136,12 @@ incode_triangulator_init(void *arena, size_t bytes,
 {
     struct shares shares;
     struct incode_map map;
+    INCODE_ASSERT((uintptr_t)arena % 64 == 0);
+    *why = incode_setup_fault(setup);
+    if (*why != NULL)
+        return NULL;
     if (!divide(&shares, &map, bytes)) {
         *why = "the node's memory is too small for this index";
-        return NULL;
-    }
-    if (setup->bricks == 0) {
-        *why = "there are no points";
         return NULL;
     }
     struct incode_triangulator *t = arena;

@@ -25,7 +25,10 @@
 #include "incode/pages/pages.h"
 #include "incode/predicates/predicates.h"
 
-/* What every node of a run is told once. */
+enum { INCODE_CELLS_MAX = 1 << 30 /* of the grid, along one side */ };
+
+/* What every node of a run is told once.  incode_setup_fault tells what is out
+ * of its limits. */
 struct incode_setup {
     /* Bricks of at most INCODE_BRICK_POINTS points, 1 or more; vertex numbers,
      * brick * INCODE_BRICK_POINTS and up, stay below INCODE_NONE. */
@@ -43,10 +46,11 @@ struct incode_setup {
      * they arrive. */
     uint64_t shuffle_seed;
 
-    /* Box of all points, tight and finite, in the points' unit. */
+    /* Box of all points, tight and finite, lo <= hi, in the points' unit. */
     double lo[3], hi[3];
 
-    /* Index `grid`: cells in x, y and z, 1 or more; else 0. */
+    /* Index `grid`: cells in x, y and z, 1 to INCODE_CELLS_MAX, together fewer
+     * than INCODE_NONE; else 0. */
     uint32_t cells[3];
 
     uint32_t reserved2; /* 0 */
@@ -91,8 +95,12 @@ struct incode_triangulator; /* opaque: lives at the start of the arena */
  * not all pages of points fit, `grid` where those around the front do not. */
 size_t incode_arena_min(const struct incode_setup *setup);
 
+/* NULL, or a static string that says which field is out of its limits. */
+const char *incode_setup_fault(const struct incode_setup *setup);
+
 /* Divides the arena (aligned to 64 bytes).  Returns the triangulator inside
- * it, or NULL with *why set to a static string. */
+ * it, or NULL with *why set to a static string: the arena is too small, or what
+ * incode_setup_fault says. */
 struct incode_triangulator *incode_triangulator_init(
     void *arena, size_t bytes, const struct incode_setup *setup,
     const struct incode_outside *outside, const char **why);
