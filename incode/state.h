@@ -15,8 +15,6 @@
 
 struct incode_triangulator {
     struct incode_map map;
-    uint32_t ahead;     /* positions below have been asked for */
-    uint32_t lookahead; /* as far as this before the one at work */
     struct incode_front front;
     struct incode_maker maker;
 };

@@ -11,8 +11,6 @@ static_assert((int)INCODE_TASKS == INCODE_SEARCHES, "a search for each task");
 
 /* ---- memory ---- */
 
-enum { LOOKAHEAD_MAX = 48 /* bricks */ };
-
 static size_t round_up(size_t bytes)
 {
     return (bytes + 63) & ~(size_t)63;
@@ -83,14 +81,6 @@ size_t incode_arena_min(const struct incode_setup *setup)
     return bytes;
 }
 
-static uint32_t lookahead_of(const struct incode_maker *m)
-{
-    uint32_t bricks = m->pager.frame_count / 24;
-    if (m->tree.pages <= m->pager.frame_count)
-        return m->tree.bricks; /* none pushes another out */
-    return bricks < 1 ? 1 : bricks > LOOKAHEAD_MAX ? LOOKAHEAD_MAX : bricks;
-}
-
 static const char *grid_fault(const uint32_t cells[3])
 {
     uint64_t product = 1;
@@ -154,20 +144,17 @@ incode_triangulator_init(void *arena, size_t bytes,
     uint8_t *front = (uint8_t *)arena + round_up(sizeof *t);
     uint8_t *maker = front + round_up(incode_front_bytes(&shares.front));
     t->map = map;
-    t->ahead = 0;
     incode_front_init(&t->front, front, &shares.front, setup->bricks,
                       (enum incode_face_rule)setup->face_rule, &outside->front);
     incode_maker_init(&t->maker, maker, &shares.maker, &points,
                       &outside->pages);
-    t->lookahead = lookahead_of(&t->maker);
     return t;
 }
 
 void incode_triangulator_start(struct incode_triangulator *t,
                                const struct incode_job *job)
 {
-    t->ahead = 0;
-    t->maker.fault = NULL;
+    incode_maker_start(&t->maker);
     incode_front_start(&t->front, job);
 }
 
@@ -202,7 +189,7 @@ static enum incode_outcome advance(struct incode_triangulator *t, unsigned task)
     struct incode_answer a;
     struct incode_star_face face;
     enum incode_outcome r;
-    if (t->maker.search[task].stage != INCODE_SEARCH_NONE) {
+    if (incode_maker_is_searching(&t->maker, task)) {
         r = incode_maker_resume(&t->maker, task, &a);
         if (r != INCODE_OK || !incode_star_find(&t->front, a.f[1], a.f[2]))
             return r == INCODE_MORE ? INCODE_OK : r;
@@ -232,11 +219,11 @@ static enum incode_outcome close_star(struct incode_triangulator *t,
                                       unsigned task)
 {
     struct incode_front *front = &t->front;
-    uint32_t v = front->task[task].v;
+    uint32_t v = incode_front_vertex(front, task);
     if (!incode_star_open(front, v))
         return INCODE_OK;
     enum incode_outcome r = incode_maker_centre(&t->maker, task, v);
-    while (r == INCODE_OK && front->star.faces > 0) {
+    while (r == INCODE_OK && !incode_star_is_closed(front)) {
         if (incode_star_is_enough(front)) {
             r = INCODE_AGAIN;
             break;
@@ -259,12 +246,10 @@ static enum incode_outcome pursue_face(struct incode_triangulator *t,
 {
     struct incode_answer a;
     uint32_t f[3];
-    if (t->maker.search[task].stage == INCODE_SEARCH_NONE &&
-        !incode_front_face(&t->front, t->front.task[task].v, f))
+    if (!incode_maker_is_searching(&t->maker, task) &&
+        !incode_front_face(&t->front, incode_front_vertex(&t->front, task), f))
         return INCODE_OK;
     enum incode_outcome r = incode_maker_face(&t->maker, task, f, &a);
-    if (t->maker.search[task].advanced)
-        t->front.task[task].retries = 1; /* so it needs no room to itself */
     if (r == INCODE_OK)
         incode_front_use(&t->front, a.f, corners_of(&a).p);
     return r;
@@ -274,7 +259,7 @@ static enum incode_outcome build_first(struct incode_triangulator *t,
                                        unsigned task)
 {
     struct incode_answer a;
-    uint32_t v = t->front.task[task].v;
+    uint32_t v = incode_front_vertex(&t->front, task);
     /* Other stars go on while a seed waits for a page. */
     if (incode_front_is_reached(&t->front, v))
         return INCODE_OK;
@@ -290,7 +275,7 @@ static enum incode_step run(struct incode_triangulator *t, unsigned task)
 {
     enum incode_outcome r;
     incode_front_run(&t->front);
-    if (t->front.task[task].seed)
+    if (incode_front_is_seed(&t->front, task))
         r = build_first(t, task);
     else if (t->maker.index == INCODE_KD)
         r = close_star(t, task);
@@ -300,37 +285,21 @@ static enum incode_step run(struct incode_triangulator *t, unsigned task)
         incode_front_done(&t->front, task);
         return INCODE_WORKED;
     }
-    incode_front_suspend(&t->front, task, r == INCODE_WAIT);
-    if (r == INCODE_MORE) {
-        t->maker.search[task].page = INCODE_NONE;
+    incode_front_suspend(&t->front, task, r == INCODE_WAIT,
+                         incode_maker_has_advanced(&t->maker, task));
+    if (r == INCODE_MORE)
         return INCODE_WORKED;
-    }
     /* Without credit for its page the task can only be tried again. */
     return incode_maker_waiting(&t->maker, UINT32_C(1) << task) != 0
                ? INCODE_WORKED
                : INCODE_WAITING;
 }
 
-/* Asks for the pages of bricks that will be worked on next, and of what lies
- * around them. */
-static void look_ahead(struct incode_triangulator *t)
-{
-    const struct incode_front *front = &t->front;
-    uint32_t own = front->job.last - front->job.first;
-    if (t->ahead < front->current)
-        t->ahead = front->current;
-    if (t->ahead >= own || t->ahead >= front->current + t->lookahead)
-        return;
-    uint32_t more = own - t->ahead - 1;
-    if (more >= t->lookahead)
-        more = t->lookahead - 1;
-    t->ahead +=
-        incode_maker_prefetch(&t->maker, front->job.first + t->ahead, more);
-}
-
 static enum incode_turn next(struct incode_triangulator *t, uint32_t *task)
 {
-    look_ahead(t);
+    uint32_t first, last;
+    incode_front_own_left(&t->front, &first, &last);
+    incode_maker_look_ahead(&t->maker, first, last);
     enum incode_turn turn = incode_front_next(&t->front, task);
     if (turn == INCODE_TURN_COUNT) {
         uint32_t count = incode_maker_count(&t->maker, *task);
@@ -345,7 +314,8 @@ static enum incode_turn next(struct incode_triangulator *t, uint32_t *task)
 static enum incode_step step(struct incode_triangulator *t)
 {
     uint32_t task;
-    uint32_t waiting = incode_maker_waiting(&t->maker, t->front.busy);
+    uint32_t waiting =
+        incode_maker_waiting(&t->maker, incode_front_suspended(&t->front));
     enum incode_turn turn = incode_front_turn(&t->front, waiting, &task);
     if (turn == INCODE_TURN_NEXT)
         turn = next(t, &task);
@@ -369,7 +339,7 @@ enum incode_step incode_triangulator_step(struct incode_triangulator *t)
 {
     if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;
-    if (t->front.finished)
+    if (incode_front_is_finished(&t->front))
         return INCODE_FINISHED;
     bool released = incode_pager_release(&t->maker.pager, false);
     enum incode_step r = step(t);

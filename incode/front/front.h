@@ -173,12 +173,48 @@ enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
 void incode_front_run(struct incode_front *front);
 
 /* It is suspended, for an answer that is not there (fault) or of its own
- * accord. */
-void incode_front_suspend(struct incode_front *front, unsigned task,
-                          bool fault);
+ * accord.  advanced: the search of its answer got on, so that it needs no room
+ * to itself. */
+void incode_front_suspend(struct incode_front *front, unsigned task, bool fault,
+                          bool advanced);
 
 /* It is over. */
 void incode_front_done(struct incode_front *front, unsigned task);
+
+/* The vertex that a task works on. */
+static inline uint32_t incode_front_vertex(const struct incode_front *front,
+                                           unsigned task)
+{
+    return front->task[task].v;
+}
+
+/* Whether it wants a first tetrahedron, as none has its vertex. */
+static inline bool incode_front_is_seed(const struct incode_front *front,
+                                        unsigned task)
+{
+    return front->task[task].seed;
+}
+
+/* The tasks that are suspended, one bit each. */
+static inline uint32_t incode_front_suspended(const struct incode_front *front)
+{
+    return front->busy;
+}
+
+/* The job is done, or none was begun. */
+static inline bool incode_front_is_finished(const struct incode_front *front)
+{
+    return front->finished;
+}
+
+/* The own bricks that are not passed yet: [*first, *last), none where *first is
+ * not less. */
+static inline void incode_front_own_left(const struct incode_front *front,
+                                         uint32_t *first, uint32_t *last)
+{
+    *first = front->job.first + front->current;
+    *last = front->job.last;
+}
 
 /* ---- faces (front.c) ---- */
 
@@ -243,10 +279,16 @@ bool incode_front_has_hub(const struct incode_front *front, uint32_t brick);
 /* Takes the open faces of a vertex out of the list; false: it has none. */
 bool incode_star_open(struct incode_front *front, uint32_t v);
 
-/* Whether the star is to be put off: it is nearly full, or has built enough. */
+/* Whether the star is to be put off: it is nearly full, or has built enough; or
+ * none of its faces at hand is left. */
 static inline bool incode_star_is_full(const struct incode_front *front)
 {
     return front->star.faces > INCODE_STAR_FACES - 4;
+}
+
+static inline bool incode_star_is_closed(const struct incode_front *front)
+{
+    return front->star.faces == 0;
 }
 
 static inline bool incode_star_is_enough(const struct incode_front *front)

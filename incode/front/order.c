@@ -48,9 +48,11 @@ static struct incode_touched *count_run(struct incode_front *front,
     return incode_afl_touch(&front->afl, task->v / INCODE_BRICK_POINTS);
 }
 
-void incode_front_suspend(struct incode_front *front, unsigned task, bool fault)
+void incode_front_suspend(struct incode_front *front, unsigned task, bool fault,
+                          bool advanced)
 {
     struct incode_task *t = &front->task[task];
+    t->retries = advanced ? 1 : t->retries;
     front->counts.waited += fault && t->born == 0;
     front->counts.faults += fault;
     count_run(front, t)->waiting |= bit_of(t->v);

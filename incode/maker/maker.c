@@ -5,6 +5,8 @@
 
 #include "incode/predicates/check.h"
 
+enum { LOOKAHEAD_MAX = 48 /* bricks */ };
+
 /* ---- memory ---- */
 
 static size_t copies_bytes(uint32_t copies)
@@ -33,6 +35,14 @@ uint32_t incode_maker_frames(uint32_t copies, size_t bytes)
     return frames;
 }
 
+static uint32_t lookahead_of(const struct incode_maker *m)
+{
+    uint32_t bricks = m->pager.frame_count / 24;
+    if (m->tree.pages <= m->pager.frame_count)
+        return m->tree.bricks; /* none pushes another out */
+    return bricks < 1 ? 1 : bricks > LOOKAHEAD_MAX ? LOOKAHEAD_MAX : bricks;
+}
+
 void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
@@ -59,6 +69,7 @@ void incode_maker_init(struct incode_maker *m, void *memory,
                          ? points->cells[0] * points->cells[1] *
                                points->cells[2]
                          : 0);
+    m->lookahead = lookahead_of(m);
     m->walker = (struct incode_walker){&m->pager, &m->tree, &m->counts.tally,
                                        &m->counts.candidates};
     m->local.pages_max = share->frames / 2;
@@ -67,9 +78,16 @@ void incode_maker_init(struct incode_maker *m, void *memory,
     m->reach = 2;
 }
 
+void incode_maker_start(struct incode_maker *m)
+{
+    m->fault = NULL;
+    m->ahead = 0;
+}
+
 void incode_maker_forget(struct incode_maker *m, unsigned slot)
 {
     m->search[slot].stage = INCODE_SEARCH_NONE;
+    m->search[slot].advanced = false;
 }
 
 /* ---- pages ---- */
@@ -131,4 +149,17 @@ bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
     /* No more than a share of the frames: it would push out what is at work. */
     uint32_t left = m->pager.frame_count / 8;
     return incode_walk(&m->walker, &q, count_brick, &left) != INCODE_WALK_WAIT;
+}
+
+void incode_maker_look_ahead(struct incode_maker *m, uint32_t first,
+                             uint32_t last)
+{
+    if (m->ahead < first)
+        m->ahead = first;
+    if (m->ahead >= last || m->ahead >= first + m->lookahead)
+        return;
+    uint32_t more = last - m->ahead - 1;
+    if (more >= m->lookahead)
+        more = m->lookahead - 1;
+    m->ahead += incode_maker_prefetch(m, m->ahead, more);
 }

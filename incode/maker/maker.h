@@ -71,7 +71,7 @@ struct incode_first {
 /* A search that can be suspended: box after box, then the sphere. */
 struct incode_search {
     enum incode_search_stage stage;
-    uint32_t page; /* that it waits for */
+    uint32_t page; /* that it waits for, or INCODE_NONE */
     struct incode_query query;
     double radius;
     bool final;
@@ -103,7 +103,9 @@ struct incode_maker_counts {
 
 struct incode_maker {
     enum incode_index index;
-    uint32_t sweep; /* index `naive`: the brick last looked at */
+    uint32_t sweep;     /* index `naive`: the brick last looked at */
+    uint32_t ahead;     /* bricks below have been asked for */
+    uint32_t lookahead; /* so many before the one at work, at most */
     double lo[3], hi[3];
     uint32_t cells[3];
     struct incode_tree tree;
@@ -143,6 +145,10 @@ void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_points *points,
                        const struct incode_page_source *source);
 
+/* Begins other work on the same points: no fault, nothing looked ahead at.
+ * Searches that are to be given up are forgotten one by one. */
+void incode_maker_start(struct incode_maker *m);
+
 /* ---- faces ---- */
 
 /* A tetrahedron f of positive orientation beside the face (f[0], f[1], f[2]),
@@ -168,6 +174,20 @@ enum incode_outcome incode_maker_apexes(struct incode_maker *m, unsigned slot,
 
 /* Ends whatever search `slot` was doing. */
 void incode_maker_forget(struct incode_maker *m, unsigned slot);
+
+/* Whether the search of an apex or a first tetrahedron is under way. */
+static inline bool incode_maker_is_searching(const struct incode_maker *m,
+                                             unsigned slot)
+{
+    return m->search[slot].stage != INCODE_SEARCH_NONE;
+}
+
+/* Indexes `naive` and `grid`: whether it got on when it was last asked. */
+static inline bool incode_maker_has_advanced(const struct incode_maker *m,
+                                             unsigned slot)
+{
+    return m->search[slot].advanced;
+}
 
 /* Index `kd`, step by step.  First, brings the points around a vertex to hand:
  * INCODE_OK or INCODE_WAIT. */
@@ -208,6 +228,11 @@ uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots);
  * around the first; true: all that can be has been done for it. */
 bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
                            uint32_t more);
+
+/* Bricks [first, last) come next, in this order: asks for the pages of some of
+ * them, as far ahead as the frames allow, once each. */
+void incode_maker_look_ahead(struct incode_maker *m, uint32_t first,
+                             uint32_t last);
 
 /* Points of a brick, or 0: its page is missing and has been asked for. */
 uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick);

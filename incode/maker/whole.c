@@ -115,6 +115,8 @@ enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
     } while (r == INCODE_MORE && m->index == INCODE_GRID &&
              s->cells.reach <= SHELLS && s->cells.list == s->cells.end);
     s->looked += m->counts.candidates - before;
+    if (r == INCODE_MORE)
+        s->page = INCODE_NONE;
     if (r != INCODE_OK)
         return r;
     incode_count_candidates(m, s->looked);

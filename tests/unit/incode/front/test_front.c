@@ -235,7 +235,7 @@ static void run(struct world *w, unsigned task)
     if (done)
         incode_front_done(&w->front, task);
     else
-        incode_front_suspend(&w->front, task, by_chance(w, 2));
+        incode_front_suspend(&w->front, task, by_chance(w, 2), false);
 }
 
 /* ---- jobs ---- */
