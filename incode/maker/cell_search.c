@@ -37,8 +37,8 @@ static uint32_t passing(const struct incode_query *q,
 static void set_range(struct lane_boxes *boxes, const struct incode_grid *g,
                       int d, struct range range)
 {
-    boxes->lo[d][0] = incode_cells_floor(g, d, range.first);
-    boxes->hi[d][0] = incode_cells_ceiling(g, d, range.last);
+    boxes->lo[d][0] = incode_cells_lowest(g, d, range.first);
+    boxes->hi[d][0] = incode_cells_highest(g, d, range.last);
 }
 
 /* Whether the question still concerns what lies beyond `reach`: six slabs of
@@ -61,9 +61,9 @@ static bool more_beyond(const struct incode_cell_search *c,
             }
             if (side == 0)
                 boxes.hi[d][count] =
-                    incode_cells_ceiling(g, d, range.first - 1);
+                    incode_cells_highest(g, d, range.first - 1);
             else
-                boxes.lo[d][count] = incode_cells_floor(g, d, range.last + 1);
+                boxes.lo[d][count] = incode_cells_lowest(g, d, range.last + 1);
             count++;
         }
     }
@@ -248,8 +248,8 @@ static bool passes(const struct incode_grid *g, const struct incode_query *q,
             boxes.hi[e][k] = e > d ? s->box.hi[e][0] : s->hi[e];
         }
         uint32_t at = i + (k < count ? k : 0);
-        boxes.lo[d][k] = incode_cells_floor(g, d, at);
-        boxes.hi[d][k] = incode_cells_ceiling(g, d, at);
+        boxes.lo[d][k] = incode_cells_lowest(g, d, at);
+        boxes.hi[d][k] = incode_cells_highest(g, d, at);
     }
     tested->first = i;
     tested->end = i + count;
@@ -309,8 +309,8 @@ static enum incode_walk run_shell(struct incode_cell_search *c,
     for (int d = 0; d < 3; d++) {
         s.outer[d] = range_of(c, g, d, c->reach);
         s.inner[d] = range_of(c, g, d, c->done);
-        s.lo[d] = incode_cells_floor(g, d, s.outer[d].first);
-        s.hi[d] = incode_cells_ceiling(g, d, s.outer[d].last);
+        s.lo[d] = incode_cells_lowest(g, d, s.outer[d].first);
+        s.hi[d] = incode_cells_highest(g, d, s.outer[d].last);
     }
     enum incode_walk r = finish_piece(c, g, walker, q, &s.work);
     for (; r == INCODE_WALK_DONE && c->z <= s.outer[2].last; c->z++) {

@@ -5,14 +5,20 @@
 
 enum { NEAR_WANTED = 96, COPY_TRIES = 64 };
 
+static double longest_side(const double lo[3], const double hi[3])
+{
+    double extent = 0;
+    for (int d = 0; d < 3; d++)
+        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
+    return extent;
+}
+
 /* Half-width of the box of local points: the extent of the leaf, times what has
  * lately given the wanted number of points around a vertex. */
 static double first_radius(const struct incode_maker *m, const double lo[3],
                            const double hi[3])
 {
-    double extent = 0;
-    for (int d = 0; d < 3; d++)
-        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
+    double extent = longest_side(lo, hi);
     if (!(extent > 0)) {
         for (int d = 0; d < 3; d++) {
             double e = m->hi[d] * 0x1p-10 - m->lo[d] * 0x1p-10;
@@ -72,11 +78,10 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
                                        const struct incode_frame *f)
 {
     struct incode_neighbours *list = &m->neighbours;
-    double lo[3], hi[3], extent = 0;
+    double lo[3], hi[3];
     bool full = false;
     incode_frame_box(f, lo, hi);
-    for (int d = 0; d < 3; d++)
-        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
+    double extent = longest_side(lo, hi);
     for (int tries = 0; tries < NEIGHBOURS_TRIES; tries++) {
         double radius = extent * m->reach, around_lo[3], around_hi[3];
         bool all = true;

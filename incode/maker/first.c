@@ -22,13 +22,7 @@ static void begin_walk(struct incode_maker *m, struct incode_search *search,
     q->b = q->c = q->best = INCODE_NONE;
     memcpy(q->pv, p, sizeof q->pv);
     q->limit = __builtin_inf();
-    double extent = 0;
-    for (int d = 0; d < 3; d++) {
-        for (int leaf = 0; leaf < INCODE_BRICK_LEAVES; leaf++) {
-            double e = frame->leaf_hi[d][leaf] - frame->leaf_lo[d][leaf];
-            extent = e > extent ? e : extent;
-        }
-    }
+    double extent = incode_frame_extent(frame);
     q->scale = incode_scale_for(extent > 0 ? extent : m->hi[0]);
     if (question == INCODE_QUERY_CIRCLE) {
         q->b = search->first.u;
@@ -37,10 +31,9 @@ static void begin_walk(struct incode_maker *m, struct incode_search *search,
             q->rb[d] = (q->pb[d] - q->pv[d]) * q->scale;
     }
     /* The vertex's own brick first: it gives a good bound. */
-    uint32_t leaves =
-        (frame->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
     (void)incode_visit_points(&m->walker, q, frame, v / INCODE_BRICK_POINTS,
-                              (UINT32_C(1) << leaves) - 1, NULL);
+                              (UINT32_C(1) << incode_frame_leaves(frame)) - 1,
+                              NULL);
 }
 
 static void look(struct incode_maker *m, struct incode_search *search,

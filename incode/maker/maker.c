@@ -130,18 +130,11 @@ bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
         return false;
     }
     struct incode_query q;
-    double extent = 0;
     memset(&q, 0, sizeof q);
     q.question = INCODE_QUERY_BOX;
     q.boxed = q.ahead = true;
     incode_frame_box(f, q.lo, q.hi);
-    uint32_t leaves = (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
-    for (int d = 0; d < 3; d++) {
-        for (uint32_t leaf = 0; leaf < leaves; leaf++) {
-            double e = f->leaf_hi[d][leaf] - f->leaf_lo[d][leaf];
-            extent = e > extent ? e : extent;
-        }
-    }
+    double extent = incode_frame_extent(f);
     for (int d = 0; d < 3; d++) {
         q.lo[d] -= extent * m->spread;
         q.hi[d] += extent * m->spread;

@@ -385,9 +385,7 @@ static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
         boxes.lo[d] = frame->leaf_lo[d];
         boxes.hi[d] = frame->leaf_hi[d];
     }
-    unsigned leaves =
-        (frame->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
-    uint32_t mask = passing(w->q, &boxes, leaves);
+    uint32_t mask = passing(w->q, &boxes, incode_frame_leaves(frame));
     if (mask != 0 && !w->visit(w->walker, w->q, frame, brick, mask, w->context))
         return INCODE_WALK_STOP;
     return INCODE_WALK_DONE;

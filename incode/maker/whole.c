@@ -52,10 +52,9 @@ static enum incode_outcome look_at_all(struct incode_maker *m,
                 (void)incode_pager_get(&m->pager, (brick + k) % m->tree.bricks);
             return INCODE_WAIT;
         }
-        uint32_t leaves =
-            (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
         (void)incode_visit_points(&m->walker, &s->query, f, brick,
-                                  (UINT32_C(1) << leaves) - 1, NULL);
+                                  (UINT32_C(1) << incode_frame_leaves(f)) - 1,
+                                  NULL);
         m->sweep = brick;
         s->sweep = brick + 1 < m->tree.bricks ? brick + 1 : 0;
         s->sweep_left--;

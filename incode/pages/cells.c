@@ -22,7 +22,7 @@ uint32_t incode_cell_of(const double lo[3], const double hi[3],
 
 /* The cell function itself is asked, and it never falls as the
  * coordinate grows, so rounding cannot make the bound wrong, only wide. */
-double incode_cells_floor(const struct incode_grid *g, int d, uint32_t cell)
+double incode_cells_lowest(const struct incode_grid *g, int d, uint32_t cell)
 {
     double lo = g->lo[d], hi = g->hi[d];
     if (cell == 0)
@@ -41,7 +41,7 @@ double incode_cells_floor(const struct incode_grid *g, int d, uint32_t cell)
     return lo;
 }
 
-double incode_cells_ceiling(const struct incode_grid *g, int d, uint32_t cell)
+double incode_cells_highest(const struct incode_grid *g, int d, uint32_t cell)
 {
     double lo = g->lo[d], hi = g->hi[d];
     if (cell + 1 >= g->cells[d])

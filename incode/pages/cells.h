@@ -32,10 +32,10 @@ uint32_t incode_cell_of(const double lo[3], const double hi[3],
 
 /* Along dimension d, a coordinate that no point of the cells from `cell` on
  * lies below. */
-double incode_cells_floor(const struct incode_grid *g, int d, uint32_t cell);
+double incode_cells_lowest(const struct incode_grid *g, int d, uint32_t cell);
 
 /* The same from above, for the cells up to `cell`. */
-double incode_cells_ceiling(const struct incode_grid *g, int d, uint32_t cell);
+double incode_cells_highest(const struct incode_grid *g, int d, uint32_t cell);
 
 /* Word i of the list whose pages begin at `base`; false: page *missing is. */
 bool incode_cells_word(const struct incode_grid *g, uint32_t base, uint32_t i,

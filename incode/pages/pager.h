@@ -8,7 +8,11 @@
  *
  *     struct incode_frame *f = incode_pager_get(&pager, page);
  *     if (f != NULL)
- *         x = f->page.brick.x[slot];   // f stays until the next call
+ *         x = f->page.brick.x[slot];   // f stays until one is not there
+ *
+ * A frame stays as it is until a page is asked for that is not there.  So one
+ * may be held across a walk, which returns at the first such page; not across
+ * one that looks ahead, which passes them over.
  */
 #ifndef INCODE_PAGER_H
 #define INCODE_PAGER_H
@@ -41,11 +45,31 @@ struct incode_slot {
     uint8_t state;
 };
 
+/* How many leaves a brick has, 1 to INCODE_BRICK_LEAVES. */
+static inline unsigned incode_frame_leaves(const struct incode_frame *f)
+{
+    return (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
+}
+
+/* The longest side of a brick's leaves. */
+static inline double incode_frame_extent(const struct incode_frame *f)
+{
+    unsigned leaves = incode_frame_leaves(f);
+    double extent = 0;
+    for (int d = 0; d < 3; d++) {
+        for (unsigned i = 0; i < leaves; i++) {
+            double e = f->leaf_hi[d][i] - f->leaf_lo[d][i];
+            extent = e > extent ? e : extent;
+        }
+    }
+    return extent;
+}
+
 /* The tight box of a brick. */
 static inline void incode_frame_box(const struct incode_frame *f, double lo[3],
                                     double hi[3])
 {
-    unsigned leaves = (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
+    unsigned leaves = incode_frame_leaves(f);
     for (int d = 0; d < 3; d++) {
         lo[d] = f->leaf_lo[d][0];
         hi[d] = f->leaf_hi[d][0];
