@@ -70,10 +70,16 @@ struct incode_outside {
     struct incode_front_outside front; /* what its front gives and takes back */
 };
 
-/* The memory map: bytes of each table, summing to at most the arena. */
+/* The memory map, in bytes but for the three counts.  control, frames, afl and
+ * bricks, with the alignment of tables, are the total, which is at most the
+ * arena. */
 struct incode_map {
-    size_t control, frames, frame_count, afl, afl_faces, bricks, brick_entries,
-        local_points, tasks, total;
+    size_t control; /* the triangulator itself, copies of points too */
+    size_t frames, frame_count;   /* of pages */
+    size_t afl, afl_faces;        /* of the active face list */
+    size_t bricks, brick_entries; /* that the front has touched */
+    size_t local_points, tasks;   /* part of control */
+    size_t total;
 };
 
 struct incode_statistics {
@@ -116,16 +122,25 @@ void incode_triangulator_start(struct incode_triangulator *t,
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes);
 
+/* Spilled toggles of a brick that was asked for, in the order in which they
+ * went; `last`: there are no more.  Returns 0, or -1 where the brick was not
+ * asked for or a face is not its own. */
 int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 const struct incode_face *faces, size_t count,
                                 bool last);
 
+/* Works on: see enum incode_step.  Bounds are stated at the top. */
 enum incode_step incode_triangulator_step(struct incode_triangulator *t);
 
+/* Counts of all jobs since init. */
 void incode_triangulator_statistics(const struct incode_triangulator *t,
                                     struct incode_statistics *s);
+
+/* How the arena is divided; it stays so. */
 const struct incode_map *
 incode_triangulator_map(const struct incode_triangulator *t);
+
+/* NULL, or a static string: why the step is INCODE_BROKEN. */
 const char *incode_triangulator_fault(const struct incode_triangulator *t);
 
 #endif

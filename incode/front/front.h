@@ -4,9 +4,18 @@
  * know.
  *
  * Memory: struct incode_front, about 19 KB, and the share of an arena that
- * incode_front_bytes states, for the active face list.  Work: constant a call,
- * but for a face put into or taken out of a list, which looks at the faces of
- * one vertex; a call never does more than one star's work.
+ * incode_front_bytes states, for the active face list.
+ *
+ * Work: a face put into or taken out of a list costs a look at the faces of one
+ * vertex, and of those that share its hash.  incode_front_start clears the
+ * list: all its hash heads and entries of bricks.  incode_front_next, once the
+ * own bricks are passed or the job ends, and incode_front_room, which
+ * incode_front_turn calls, where it decides what to spill or looks for what is
+ * to go, may look at every entry of a brick; the latter empties the lists of at
+ * most one brick, as far as there is room outside.  incode_front_drain moves
+ * 128 faces at most, incode_front_unspill those that it is given, and a star
+ * has INCODE_STAR_FACES faces and builds INCODE_STAR_BUILT tetrahedra at most.
+ * All else is constant, but for a look at the tasks or hubs, 16 and 32.
  *
  *     incode_front_init(&front, memory, &share, bricks, rule, &outside);
  *     incode_front_start(&front, &job);

@@ -5,6 +5,12 @@
  * INCODE_SEARCHES of them at a time, and resumed when the page is there.  It
  * knows no list of faces and no order of work.
  *
+ * There are two ways to ask, over the same searches.  A tetrahedron builder,
+ * which is sent faces, asks for their apexes by incode_maker_apexes.  Who has
+ * the open faces of a whole star before it, as the triangulator, goes step by
+ * step: incode_maker_centre, _apex and _resume with the index `kd`,
+ * incode_maker_face with the others.
+ *
  * Memory: struct incode_maker, about 68 KB, and the share of an arena that
  * incode_maker_bytes states: copies of neighbour bricks, frames of pages.
  * Work: a call takes one search as far as its next missing page; with the
@@ -35,10 +41,11 @@ enum {
 
 /* The points as a whole. */
 struct incode_points {
-    uint32_t bricks;
+    uint32_t bricks; /* 1 to INCODE_NONE / INCODE_BRICK_POINTS */
     enum incode_index index;
     double lo[3], hi[3];   /* tight box of all points */
-    uint32_t cells[3];     /* index `grid`: cells in x, y, z; else 0 */
+    uint32_t cells[3];     /* index `grid`: cells in x, y, z, 1 to 2^30 each,
+                              together fewer than INCODE_NONE; else 0 */
     uint64_t shuffle_seed; /* 0: pages are ready as they arrive */
 };
 

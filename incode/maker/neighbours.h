@@ -10,7 +10,6 @@
  *     incode_neighbours_make(&list, &walker, brick, lo, hi, &missing);
  *     walked = incode_neighbours_visit(&list, &walker, &q, incode_visit_points,
  *                                      NULL);
- * context);
  */
 #ifndef INCODE_NEIGHBOURS_H
 #define INCODE_NEIGHBOURS_H

@@ -6,6 +6,9 @@
  * children [32 i, 32 i + 32) of level k.  The root is the one page of the
  * highest level, which is at least 1.
  *
+ * Memory: struct incode_tree; a page is 1,536 bytes.  Work: constant, as there
+ * are 8 levels at most.
+ *
  *     struct incode_tree tree;
  *     incode_tree_init(&tree, bricks, 0);
  *     root = tree.base[tree.levels - 1];

@@ -1,8 +1,8 @@
 /* Five cospherical points told apart (Devillers and Teillaud, CGTA 44:160-168,
  * 2011): the lift of each point is raised by an amount of its own, that of the
  * lexicographically larger point infinitely more than that of the smaller.
- * Coordinates never move, so no flat tetrahedron can arise, and nothing but the
- * points decides.
+ * Coordinates never move, so no degenerate tetrahedron can arise, and nothing
+ * but the points decides.
  *
  * The raised determinant is a sum of the amounts, each times a cofactor.  For
  * the query it is -orient3d(p0,p1,p2,p3) < 0: raised, it leaves the sphere.

@@ -352,6 +352,21 @@ static void waiting_and_ahead(void **unused)
     assert_true(incode_maker_prefetch(&b.maker, 20, 5));
     assert_int_equal(incode_maker_count(&b.maker, 20), b.solo.order.fill[20]);
     assert_int_equal(incode_maker_count(&b.maker, 22), b.solo.order.fill[22]);
+    /* Each brick of a range is looked ahead at once, and none past it. */
+    incode_maker_start(&b.maker);
+    for (int i = 0; i < 100 && b.maker.ahead < 33; i++) {
+        incode_maker_look_ahead(&b.maker, 30, 33);
+        while (b.pages > 0)
+            deliver(&b);
+    }
+    assert_int_equal(b.maker.ahead, 33);
+    for (uint32_t brick = 30; brick < 33; brick++)
+        assert_int_equal(incode_maker_count(&b.maker, brick),
+                         b.solo.order.fill[brick]);
+    incode_maker_look_ahead(&b.maker, 30, 33);
+    assert_int_equal(b.pages, 0);
+    incode_maker_look_ahead(&b.maker, 34, 33);
+    assert_int_equal(b.pages, 0);
     host_points_free(&points);
     close_bench(&b);
 }
