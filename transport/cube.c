@@ -1,5 +1,6 @@
 #include <string.h>
 
+#include "bytes.h"
 #include "check.h"
 #include "cube_internal.h"
 
@@ -151,11 +152,6 @@ struct cube *cube_init(void *arena, size_t bytes,
 
 /* --- passing on ---------------------------------------------------------- */
 
-static unsigned field16(const uint8_t *bytes)
-{
-    return bytes[0] | (unsigned)bytes[1] << 8;
-}
-
 /* Whether a message of another generation is to be dropped.  If not, the
  * neighbour knows of a generation that it has told us in a state datagram: that
  * comes. */
@@ -171,7 +167,7 @@ static bool look_at(struct cube *cube, unsigned d)
     while (!a->there && link_read(cube->links[d], &a->message)) {
         const uint8_t *head = a->message.data;
         unsigned stamp =
-            a->message.size >= HEAD ? field16(head + STAMP) : cube->stamp;
+            a->message.size >= HEAD ? bytes_get16(head + STAMP) : cube->stamp;
         if (stamp != cube->stamp || cube->wiring.generation == 0) {
             if (!outdated(cube, stamp)) {
                 return false;
@@ -184,7 +180,7 @@ static bool look_at(struct cube *cube, unsigned d)
         unsigned hops_max =
             cube->routes.tree ? HOPS_MAX : cube->config.dimension + 2u;
         a->ways = whole && head[5] < hops_max
-                      ? ways_of(cube, field16(head + 2), field16(head))
+                      ? ways_of(cube, bytes_get16(head + 2), bytes_get16(head))
                       : 0;
         a->ways &= ~((uint32_t)1 << d); /* never back */
         if (a->ways == 0) {
@@ -368,7 +364,7 @@ bool cube_read_from(struct cube *cube, unsigned d, struct cube_message *message)
         return false;
     }
     const uint8_t *head = a->message.data;
-    message->source = (uint16_t)field16(head + 2);
+    message->source = bytes_get16(head + 2);
     message->type = head[4];
     message->size = (uint16_t)(a->message.size - HEAD);
     message->data = head + HEAD;

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "bytes.h"
 #include "check.h"
 
 /* The machine's word, with the first byte in memory lowest. */
@@ -37,20 +38,6 @@ static inline word zero_marks(word w)
 }
 
 /* --- checks -------------------------------------------------------------- */
-
-static inline uint32_t load32(const uint8_t *p)
-{
-    return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 |
-           (uint32_t)p[3] << 24;
-}
-
-static inline void store32(uint8_t *p, uint32_t value)
-{
-    p[0] = (uint8_t)value;
-    p[1] = (uint8_t)(value >> 8);
-    p[2] = (uint8_t)(value >> 16);
-    p[3] = (uint8_t)(value >> 24);
-}
 
 /* remainders[c][k][n]: what check c makes of four bits n that 4 k zero bits
  * follow.  A check is linear, so a row holds the sums of what its four bits
@@ -116,7 +103,7 @@ static inline uint32_t by_table(unsigned check, uint32_t crc,
 {
     const uint8_t *p = bytes;
     for (; size >= 4; size -= 4, p += 4) {
-        crc = after_word(check, crc ^ load32(p));
+        crc = after_word(check, crc ^ bytes_get32(p));
     }
     for (; size > 0; size--) {
         crc = after_byte(check, crc ^ *p++);
@@ -251,13 +238,12 @@ static void put_words(struct writer *w, const uint8_t *in, size_t size)
 /* By words, as the checks read them. */
 static void pack_header(uint8_t *bytes, const struct frame_header *h)
 {
-    store32(bytes, h->kind | (uint32_t)h->flags << 4 |
-                       (uint32_t)h->credit << 8 | h->session << 16);
-    store32(bytes + 4, h->session >> 16 | (uint32_t)h->sequence << 16);
-    store32(bytes + 8, h->acknowledge | (uint32_t)h->size << 16);
+    bytes_put32(bytes, h->kind | (uint32_t)h->flags << 4 |
+                           (uint32_t)h->credit << 8 | h->session << 16);
+    bytes_put32(bytes + 4, h->session >> 16 | (uint32_t)h->sequence << 16);
+    bytes_put32(bytes + 8, h->acknowledge | (uint32_t)h->size << 16);
     uint16_t check = frame_crc16(bytes, FRAME_HEADER - 2);
-    bytes[12] = (uint8_t)check;
-    bytes[13] = (uint8_t)(check >> 8);
+    bytes_put16(bytes + 12, check);
 }
 
 static void unpack_header(struct frame_header *h, const uint8_t *bytes)
@@ -265,10 +251,10 @@ static void unpack_header(struct frame_header *h, const uint8_t *bytes)
     h->kind = bytes[0] & 15;
     h->flags = bytes[0] >> 4;
     h->credit = bytes[1];
-    h->session = load32(bytes + 2);
-    h->sequence = (uint16_t)(bytes[6] | bytes[7] << 8);
-    h->acknowledge = (uint16_t)(bytes[8] | bytes[9] << 8);
-    h->size = (uint16_t)(bytes[10] | bytes[11] << 8);
+    h->session = bytes_get32(bytes + 2);
+    h->sequence = bytes_get16(bytes + 6);
+    h->acknowledge = bytes_get16(bytes + 8);
+    h->size = bytes_get16(bytes + 10);
 }
 
 size_t frame_encode(uint8_t *out, const struct frame_header *header,
@@ -282,7 +268,7 @@ size_t frame_encode(uint8_t *out, const struct frame_header *header,
     if (header->size > 0) {
         crc = frame_crc32c(crc, payload, header->size);
     }
-    store32(tail, crc);
+    bytes_put32(tail, crc);
     put_words(&w, head, sizeof head);
     if (header->size > 0) {
         put_words(&w, payload, header->size);
@@ -352,7 +338,7 @@ enum frame_result frame_open(struct frame_reader *reader, const uint8_t *in,
     if (take_bytes(reader, head, sizeof head) != 0) {
         return FRAME_BAD_CODE;
     }
-    unsigned check = head[12] | (unsigned)head[13] << 8;
+    unsigned check = bytes_get16(head + 12);
     if (frame_crc16(head, FRAME_HEADER - 2) != check) {
         return FRAME_BAD_HEADER;
     }
@@ -378,5 +364,5 @@ enum frame_result frame_take(struct frame_reader *reader,
         return FRAME_BAD_CODE;
     }
     uint32_t crc = frame_crc32c(reader->crc, payload, header->size);
-    return crc == load32(tail) ? FRAME_GOOD : FRAME_BAD_CRC;
+    return crc == bytes_get32(tail) ? FRAME_GOOD : FRAME_BAD_CRC;
 }

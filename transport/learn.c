@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "bytes.h"
 #include "check.h"
 #include "link_internal.h"
 
@@ -12,11 +13,6 @@ void learner_init(struct learner *learner, const struct link_pipe *pipes,
     memset(learner, 0, sizeof *learner);
     memcpy(learner->pipes, pipes, links * sizeof *pipes);
     learner->links = links;
-}
-
-static unsigned field16(const uint8_t *bytes)
-{
-    return bytes[0] | (unsigned)bytes[1] << 8;
 }
 
 /* Whether such a wire may be in a cube of that dimension. */
@@ -39,8 +35,8 @@ static bool take_hello(struct learner *learner, unsigned d,
     if (hello[0] != LINK_VERSION || hello[7] == 0) {
         return false;
     }
-    learned->teacher = (uint16_t)field16(hello + 2);
-    learned->self = (uint16_t)field16(hello + 4);
+    learned->teacher = bytes_get16(hello + 2);
+    learned->self = bytes_get16(hello + 4);
     learned->dimension = (uint8_t)(hello[7] - 1);
     learned->link = (uint8_t)d;
     learned->host_port = learned->teacher == CUBE_HOST && learned->self != 0;

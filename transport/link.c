@@ -226,8 +226,7 @@ int link_write(struct link *link, const void *head, size_t head_size,
     link->statistics.payload_sent += left;
     bool more = true;
     while (more) {
-        unsigned at = s->head + link_used(link);
-        at = at >= link->config.window ? at - link->config.window : at;
+        unsigned at = link_sent_slot(link, link_used(link));
         struct link_send_slot *slot = &s->slots[at];
         size_t part = left < link->config.frame_payload
                           ? left
@@ -256,7 +255,7 @@ bool link_read(struct link *link, struct link_message *message)
     }
     message->size = r->slots[at].size;
     while (r->slots[at].more) {
-        at = at + 1 == window ? 0 : at + 1;
+        at = link_wrapped(link, at + 1);
         message->size += r->slots[at].size;
         count++;
     }
@@ -284,8 +283,7 @@ void link_release(struct link *link)
         struct link_receive_slot *slot = &r->slots[r->head];
         link->statistics.payload_received += slot->size;
         slot->full = false;
-        r->head =
-            (uint16_t)(r->head + 1 == link->config.window ? 0 : r->head + 1);
+        r->head = (uint16_t)link_wrapped(link, r->head + 1u);
         r->complete--;
         r->ready--;
     }
@@ -299,13 +297,11 @@ unsigned link_forget_unsent(struct link *link)
     /* What is begun must end. */
     while (inside) {
         LINK_ASSERT(offset < link_used(link));
-        unsigned at = s->head + offset++;
-        at = at >= link->config.window ? at - link->config.window : at;
+        unsigned at = link_sent_slot(link, offset++);
         inside = (s->slots[at].flags & LINK_MORE) != 0;
     }
     for (unsigned i = offset; i < link_used(link); i++) {
-        unsigned at = s->head + i;
-        at = at >= link->config.window ? at - link->config.window : at;
+        unsigned at = link_sent_slot(link, i);
         count += (s->slots[at].flags & LINK_MORE) == 0;
     }
     s->end = (uint16_t)(s->first + offset);

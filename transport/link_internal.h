@@ -150,14 +150,24 @@ static inline unsigned link_credit(const struct link *link)
     return (unsigned)link->config.window - link->receive.ready;
 }
 
-/* The slot of frame `offset` after those that came in order. */
+/* Of a slot that is counted on past the last, less than a window. */
+static inline unsigned link_wrapped(const struct link *link, unsigned slot)
+{
+    unsigned window = link->config.window;
+    return slot >= window ? slot - window : slot;
+}
+
+/* The slot of frame `offset` after the first of the send window. */
+static inline unsigned link_sent_slot(const struct link *link, unsigned offset)
+{
+    return link_wrapped(link, link->send.head + offset);
+}
+
+/* The slot of frame `offset` after those that came in order, within credit. */
 static inline unsigned link_slot_of(const struct link *link, unsigned offset)
 {
-    unsigned slot = (unsigned)link->receive.head + link->receive.ready + offset;
-    while (slot >= link->config.window) {
-        slot -= link->config.window;
-    }
-    return slot;
+    return link_wrapped(link, (unsigned)link->receive.head +
+                                  link->receive.ready + offset);
 }
 
 #endif

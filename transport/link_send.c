@@ -11,12 +11,6 @@ static unsigned in_flight(const struct link *link)
     return (uint16_t)(link->send.next - link->send.first);
 }
 
-static unsigned slot_at(const struct link *link, unsigned offset)
-{
-    unsigned slot = link->send.head + offset;
-    return slot >= link->config.window ? slot - link->config.window : slot;
-}
-
 uint32_t link_timeout_us(const struct link *link)
 {
     const struct link_config *c = &link->config;
@@ -87,7 +81,7 @@ static void mark_lost(struct link *link, uint32_t order)
     struct link_sender *s = &link->send;
     unsigned count = in_flight(link);
     for (unsigned i = 0; i < count; i++) {
-        struct link_send_slot *slot = &s->slots[slot_at(link, i)];
+        struct link_send_slot *slot = &s->slots[link_sent_slot(link, i)];
         if (slot->state == LINK_SENT && (int32_t)(slot->order - order) < 0) {
             slot->state = LINK_LOST;
             s->lost++;
@@ -104,7 +98,7 @@ static void free_first(struct link *link, struct news *news)
     } else {
         slot_arrived(link, slot, news);
     }
-    s->head = (uint16_t)slot_at(link, 1);
+    s->head = (uint16_t)link_sent_slot(link, 1);
     s->first++;
 }
 
@@ -114,7 +108,7 @@ static void mark_acknowledged(struct link *link, uint16_t ack, uint64_t sack,
     struct link_sender *s = &link->send;
     LINK_ASSERT(ack == s->first);
     for (unsigned i = 1; sack != 0 && i < in_flight(link); i++, sack >>= 1) {
-        struct link_send_slot *slot = &s->slots[slot_at(link, i)];
+        struct link_send_slot *slot = &s->slots[link_sent_slot(link, i)];
         if ((sack & 1) != 0 && slot->state != LINK_ARRIVED) {
             slot_arrived(link, slot, news);
             s->arrived++;
@@ -159,7 +153,7 @@ void link_send_reset(struct link *link, uint8_t credit)
     struct link_sender *s = &link->send;
     unsigned queued = link_used(link);
     for (unsigned i = 0; i < queued; i++) {
-        bool more = (s->slots[slot_at(link, i)].flags & LINK_MORE) != 0;
+        bool more = (s->slots[link_sent_slot(link, i)].flags & LINK_MORE) != 0;
         link->statistics.messages_dropped += !more;
     }
     s->first = s->next = s->end = (uint16_t)link->config.epoch;
@@ -272,7 +266,7 @@ static void stage_ack(struct link *link, unsigned flags)
 static void stage_slot(struct link *link, unsigned offset)
 {
     struct link_sender *s = &link->send;
-    unsigned at = slot_at(link, offset);
+    unsigned at = link_sent_slot(link, offset);
     struct link_send_slot *slot = &s->slots[at];
     slot->sent_us = (uint32_t)link->now_us;
     slot->order = s->order++;
@@ -285,11 +279,11 @@ static void stage_again(struct link *link)
 {
     struct link_sender *s = &link->send;
     unsigned offset = 0;
-    while (s->slots[slot_at(link, offset)].state != LINK_LOST) {
+    while (s->slots[link_sent_slot(link, offset)].state != LINK_LOST) {
         offset++;
         LINK_ASSERT(offset < in_flight(link));
     }
-    s->slots[slot_at(link, offset)].again = true;
+    s->slots[link_sent_slot(link, offset)].again = true;
     s->lost--;
     link->statistics.retransmitted++;
     stage_slot(link, offset);
@@ -302,8 +296,8 @@ static void stage_next(struct link *link)
     if (offset == 0) {
         s->timer_us = link->now_us;
     }
-    s->slots[slot_at(link, offset)].again = false;
-    s->inside = (s->slots[slot_at(link, offset)].flags & LINK_MORE) != 0;
+    s->slots[link_sent_slot(link, offset)].again = false;
+    s->inside = (s->slots[link_sent_slot(link, offset)].flags & LINK_MORE) != 0;
     stage_slot(link, offset);
     s->next++;
 }
@@ -337,7 +331,7 @@ static void timeout(struct link *link)
     unsigned count = in_flight(link);
     link->statistics.timeouts++;
     for (unsigned i = 0; i < count; i++) {
-        struct link_send_slot *slot = &s->slots[slot_at(link, i)];
+        struct link_send_slot *slot = &s->slots[link_sent_slot(link, i)];
         if (slot->state == LINK_SENT) {
             slot->state = LINK_LOST;
             s->lost++;

@@ -1,26 +1,6 @@
 #include "link_session.h"
 
-static void put16(uint8_t *p, unsigned value)
-{
-    p[0] = (uint8_t)value;
-    p[1] = (uint8_t)(value >> 8);
-}
-
-static void put32(uint8_t *p, uint32_t value)
-{
-    put16(p, value & 0xffff);
-    put16(p + 2, value >> 16);
-}
-
-static uint16_t get16(const uint8_t *p)
-{
-    return (uint16_t)(p[0] | p[1] << 8);
-}
-
-static uint32_t get32(const uint8_t *p)
-{
-    return get16(p) | (uint32_t)get16(p + 2) << 16;
-}
+#include "bytes.h"
 
 static void pack_hello(const struct link *link, uint8_t *hello)
 {
@@ -28,17 +8,17 @@ static void pack_hello(const struct link *link, uint8_t *hello)
     bool candidate = link->candidate.epoch != 0;
     hello[0] = LINK_VERSION;
     hello[1] = c->port;
-    put16(hello + 2, c->node);
-    put16(hello + 4, c->peer_node);
+    bytes_put16(hello + 2, c->node);
+    bytes_put16(hello + 4, c->peer_node);
     hello[6] = c->peer_port;
     hello[7] = c->greeting;
-    put32(hello + 8, c->epoch);
-    put32(hello + 12, link->intruder != 0 ? link->intruder
-                      : candidate         ? link->candidate.epoch
-                                          : link->peer_epoch);
-    put16(hello + 16, c->window);
-    put16(hello + 18, c->frame_payload);
-    put16(hello + 20, c->message_max);
+    bytes_put32(hello + 8, c->epoch);
+    bytes_put32(hello + 12, link->intruder != 0 ? link->intruder
+                            : candidate         ? link->candidate.epoch
+                                                : link->peer_epoch);
+    bytes_put16(hello + 16, c->window);
+    bytes_put16(hello + 18, c->frame_payload);
+    bytes_put16(hello + 20, c->message_max);
     hello[22] = link->intruder != 0;
     hello[23] = 0;
 }
@@ -70,10 +50,10 @@ static uint32_t session(uint32_t from_epoch, unsigned from, uint32_t to_epoch,
                         unsigned to)
 {
     uint8_t bytes[12];
-    put32(bytes, from_epoch);
-    put32(bytes + 4, to_epoch);
-    put16(bytes + 8, from);
-    put16(bytes + 10, to);
+    bytes_put32(bytes, from_epoch);
+    bytes_put32(bytes + 4, to_epoch);
+    bytes_put16(bytes + 8, from);
+    bytes_put16(bytes + 10, to);
     return frame_crc32c(0, bytes, sizeof bytes);
 }
 
@@ -92,20 +72,20 @@ static uint32_t session_to(const struct link *link, uint32_t peer_epoch)
 static enum link_refusal fits(const struct link *link, const uint8_t *hello)
 {
     const struct link_config *c = &link->config;
-    unsigned window = get16(hello + 16);
+    unsigned window = bytes_get16(hello + 16);
     if (hello[0] != LINK_VERSION) {
         return LINK_WRONG_VERSION;
     }
-    if (get16(hello + 2) != c->peer_node || hello[1] != c->peer_port ||
-        get16(hello + 4) != c->node || hello[6] != c->port) {
+    if (bytes_get16(hello + 2) != c->peer_node || hello[1] != c->peer_port ||
+        bytes_get16(hello + 4) != c->node || hello[6] != c->port) {
         return LINK_WRONG_WIRE;
     }
     if (hello[7] != 0 && c->greeting != 0 && hello[7] != c->greeting) {
         return LINK_WRONG_GREETING;
     }
-    if (get16(hello + 18) != c->frame_payload ||
-        get16(hello + 20) != c->message_max || window < link->fragments_max ||
-        window > LINK_WINDOW_MAX) {
+    if (bytes_get16(hello + 18) != c->frame_payload ||
+        bytes_get16(hello + 20) != c->message_max ||
+        window < link->fragments_max || window > LINK_WINDOW_MAX) {
         return LINK_WRONG_SIZES;
     }
     return LINK_FITS;
@@ -124,17 +104,17 @@ static bool still_in_use(const struct link *link, uint32_t epoch, bool to_us)
 static void describe_peer(struct link *link, const uint8_t *hello)
 {
     struct link_peer *peer = &link->peer;
-    bool to_us = get32(hello + 12) == link->config.epoch;
+    bool to_us = bytes_get32(hello + 12) == link->config.epoch;
     bool told = to_us && hello[22] != 0;
-    bool in_use = told || still_in_use(link, get32(hello + 8), to_us);
+    bool in_use = told || still_in_use(link, bytes_get32(hello + 8), to_us);
     peer->version = hello[0];
     peer->port = hello[1];
     peer->greeting = hello[7];
-    peer->node = get16(hello + 2);
-    peer->epoch = get32(hello + 8);
-    peer->window = get16(hello + 16);
-    peer->frame_payload = get16(hello + 18);
-    peer->message_max = get16(hello + 20);
+    peer->node = bytes_get16(hello + 2);
+    peer->epoch = bytes_get32(hello + 8);
+    peer->window = bytes_get16(hello + 16);
+    peer->frame_payload = bytes_get16(hello + 18);
+    peer->message_max = bytes_get16(hello + 20);
     peer->in_use += told;
     if (told) {
         link->told_by = peer->epoch;
@@ -195,7 +175,7 @@ enum link_session link_on_hello(struct link *link,
                                 const struct frame_header *header,
                                 const uint8_t hello[LINK_HELLO_SIZE])
 {
-    uint32_t epoch = get32(hello + 8), mine = get32(hello + 12);
+    uint32_t epoch = bytes_get32(hello + 8), mine = bytes_get32(hello + 12);
     if (epoch == 0 || link->closing) {
         return LINK_FOREIGN;
     }
@@ -217,7 +197,7 @@ enum link_session link_on_hello(struct link *link,
         struct link_candidate *c = &link->candidate;
         c->epoch = epoch;
         c->session_in = session_from(link, epoch);
-        c->window = get16(hello + 16);
+        c->window = bytes_get16(hello + 16);
         c->credit = header->credit <= c->window ? header->credit : 0;
         c->hellos_left = LINK_CANDIDATE_HELLOS;
     }

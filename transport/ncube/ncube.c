@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "transport/bytes.h"
 #include "transport/check.h"
 
 /* The head: type (16 bits, low byte first), two bytes of zero. */
@@ -100,7 +101,7 @@ static bool open_message(const struct cube_message *message,
         return false;
     }
     found->source = message->source;
-    found->type = message->data[0] | message->data[1] << 8;
+    found->type = bytes_get16(message->data);
     found->data = message->data + HEAD;
     found->size = message->size - (size_t)HEAD;
     return true;
@@ -215,8 +216,7 @@ int ncube_send(struct ncube *n, const void *data, size_t size, unsigned dest,
     if (node && dest == c->self) {
         return send_to_self(n, data, size, type);
     }
-    n->out[0] = (uint8_t)type;
-    n->out[1] = (uint8_t)(type >> 8);
+    bytes_put16(n->out, type);
     n->out[2] = n->out[3] = 0;
     if (size > 0) {
         memmove(n->out + HEAD, data, size);
