@@ -1,9 +1,10 @@
 /* A hypercube of nodes wired point to point, and a host attached to node 0,
- * or by a second wire to one more.
+ * to that and a spare node, or to each of the first 2, 4 or 8.
  * Messages of up to CUBE_PAYLOAD_MAX bytes travel hop by hop along the e-cube
  * path (lowest differing dimension first), in order between any two ends;
  * broadcasts run along binomial trees.  Link d of a node leads to node
- * self ^ (1 << d); link `dimension` of node 0 leads to the host.
+ * self ^ (1 << d); link `dimension` of a node that has a host port, as node 0
+ * has always, leads to the host.
  *
  * Generations make every loss survivable: the host begins a new one
  * (cube_renew) when something was lost, and all messages of the old one are
@@ -85,7 +86,8 @@ struct cube_config {
     uint8_t dimension;
 
     /* Frames a link and direction that may be under way.  No default; 1 ..
-     * LINK_WINDOW_MAX, and enough for a message. */
+     * LINK_WINDOW_MAX, and enough for a message; cube_for_serial() makes it 7,
+     * or 14 from 8 on. */
     uint16_t window;
 
     /* This start of this end.  No default; 1 .. 2^32 - 1, never repeated. */
@@ -124,10 +126,12 @@ struct cube_config {
     uint16_t host_window;
 
     /* Bytes of a message in a frame.  The same at both ends of a wire.
-     * Default: a message a frame; limits: see link.h. */
+     * Default: a message a frame; limits: see link.h.  With serial_baud 408,
+     * whatever stands here. */
     uint16_t frame_payload;
 
-    /* Frames encoded ahead of the pipe.  Default and limits: see link.h. */
+    /* Frames encoded ahead of the pipe.  Default and limits: see link.h.  With
+     * serial_baud 2, whatever stands here. */
     uint16_t staging;
 
     /* Of the slowest serial wire of the cube: cube_for_serial() sets it.  The
@@ -173,7 +177,8 @@ int cube_poll(struct cube *cube, uint64_t now_us);
 
 /* Queues a message.  dest: a node, CUBE_HOST or CUBE_ALL (every node but the
  * sender, along the binomial tree rooted at the sender; the host's goes by
- * node 0).  0, or CUBE_AGAIN while the first link has no room. */
+ * the host gateway, or by all host ports where host_ports is given).  0, or
+ * CUBE_AGAIN while the first link has no room. */
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                size_t size);
 #define CUBE_AGAIN (-1)
