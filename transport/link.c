@@ -370,15 +370,36 @@ static void on_frame(struct link *link, struct link_frame *frame)
         enter(link, session);
         link->heard_us = link->kept_us = link->now_us;
     }
-    switch (link_take_frame(link, frame)) {
-    case LINK_GREETED:
-        enter(link, link_on_hello(link, header, frame->payload));
-        break;
-    case LINK_ACKNOWLEDGED:
+    enum link_event event = link_take_frame(link, frame);
+    if (event == LINK_GREETED) {
+        enum link_session session = link_on_hello(link, header, frame->payload);
+        link->receive.ack_now |= session != LINK_FOREIGN;
+        enter(link, session);
+    } else if (event != LINK_NOTHING) {
+        if (event == LINK_TOO_LONG) {
+            link_refuse_sizes(link);
+        } else if (event == LINK_FAREWELL) {
+            link_on_bye(link, header);
+        }
         link_on_acknowledge(link, header, frame->sack);
-        break;
-    case LINK_NOTHING:
-        break;
+    }
+}
+
+/* Bytes that were under way are lost; the session may go on. */
+static void pipe_lost(struct link *link)
+{
+    link->statistics.pipe_closed += link->pipe_up;
+    link->pipe_up = false;
+    link->up = false;
+    link_forget_bytes(link);
+    link_forget_staged(link);
+}
+
+static void pipe_works(struct link *link)
+{
+    if (!link->pipe_up) {
+        link->pipe_up = true;
+        link->hello_now = true;
     }
 }
 
@@ -411,9 +432,10 @@ int link_poll_receive(struct link *link, uint64_t now_us)
     for (int calls = 0; calls < link->config.window && count < most; calls++) {
         enum link_fill fill = link_fill(link);
         if (fill == LINK_FILL_CLOSED) {
-            link_pipe_lost(link);
+            pipe_lost(link);
             break;
         }
+        pipe_works(link);
         count += take_frames(link, most - count);
         if (fill == LINK_FILL_SOME) {
             break;
@@ -439,7 +461,7 @@ static bool flush(struct link *link)
 {
     enum link_flush status = link_flush(link);
     if (status == LINK_FLUSH_CLOSED) {
-        link_pipe_lost(link);
+        pipe_lost(link);
     }
     return status == LINK_FLUSH_DONE;
 }

@@ -1,6 +1,15 @@
 /* The data of a link.  link_session.c (the handshake), link_send.c and
- * link_receive.c (the two windows) know it, and nothing of each other; link.c
- * alone joins them.  Not for others.
+ * link_receive.c (the two windows) call nothing of each other; link.c alone
+ * joins them, by what they return.  Not for others.  All read what they need.
+ * Who writes, beside link.c:
+ *
+ *     session   candidate, peer ..., session_in and out, intruder, told_...,
+ *               kept_us, heard_us, hello_now, hello_us, up, closed, bye_due
+ *     send      send, out, stalled, sent_us, bye_us; datagrams.due, when it
+ *               goes, and bye_due likewise; as every frame reports what came:
+ *               receive.reported, unreported and ack_now
+ *     receive   receive, in, datagrams.in, in_size, asked, heard
+ *     each      its statistics
  *
  * Memory and work: see link.h.
  *

@@ -17,9 +17,17 @@ void link_receive_reset(struct link *link, uint16_t first)
     r->unreported = 0;
 }
 
-/* The frame in link_slot_of(0) joins those that are ready.  A message longer
- * than agreed can never be read: such a peer is refused. */
-static void accept_next(struct link *link)
+void link_forget_bytes(struct link *link)
+{
+    struct link_bytes_in *in = &link->in;
+    in->begin = in->scanned = in->end = 0;
+    in->skipping = false;
+    in->pending = false;
+}
+
+/* The frame in link_slot_of(0) joins those that are ready.  False: a message
+ * longer than agreed, which can never be read. */
+static bool accept_next(struct link *link)
 {
     struct link_receiver *r = &link->receive;
     struct link_receive_slot *slot = &r->slots[link_slot_of(link, 0)];
@@ -27,32 +35,34 @@ static void accept_next(struct link *link)
     size_t size = (size_t)before * link->config.frame_payload + slot->size;
     if (size > link->config.message_max ||
         (slot->more && before + 1u >= link->fragments_max)) {
-        link->peer.refusal = LINK_WRONG_SIZES;
-        link->up = false;
-        return;
+        return false;
     }
     r->next++;
     r->ready++;
     if (!slot->more) {
         r->complete = r->ready;
     }
+    return true;
 }
 
-static void advance(struct link *link)
+/* False: as above. */
+static bool advance(struct link *link)
 {
     struct link_receiver *r = &link->receive;
-    accept_next(link);
-    while (r->early > 0 && link_credit(link) > 0 && link->up &&
+    bool fits = accept_next(link);
+    while (fits && r->early > 0 && link_credit(link) > 0 &&
            r->slots[link_slot_of(link, 0)].full) {
         r->early--;
-        accept_next(link);
+        fits = accept_next(link);
     }
     if (r->ready + r->early > link->statistics.receive_high_water) {
         link->statistics.receive_high_water = (uint32_t)(r->ready + r->early);
     }
+    return fits;
 }
 
-static void stored(struct link *link, unsigned offset)
+/* False: as above. */
+static bool stored(struct link *link, unsigned offset)
 {
     struct link_receiver *r = &link->receive;
     if (r->unreported++ == 0) {
@@ -61,10 +71,10 @@ static void stored(struct link *link, unsigned offset)
     if (offset > 0) {
         r->early++;
         r->ack_now = true;
-        return;
+        return true;
     }
     r->ack_now |= r->early > 0;
-    advance(link);
+    return advance(link);
 }
 
 /* A frame's place is known before its payload is decoded, so it is decoded
@@ -100,17 +110,9 @@ static enum frame_result take_data(struct link *link, struct link_frame *frame,
         slot->size = header->size;
         slot->more = more;
         slot->full = true;
-        stored(link, offset);
-        *event = LINK_ACKNOWLEDGED;
+        *event = stored(link, offset) ? LINK_ACKNOWLEDGED : LINK_TOO_LONG;
     }
     return result;
-}
-
-static void on_bye(struct link *link, const struct frame_header *header)
-{
-    link->bye_due = (header->flags & LINK_ASK) != 0;
-    link->closed = true;
-    link->up = false;
 }
 
 static void on_datagram(struct link *link, const struct link_frame *frame)
@@ -161,7 +163,7 @@ static enum frame_result take_control(struct link *link,
         link->receive.ack_now |= (header->flags & LINK_ASK) != 0;
     }
     if (header->kind == LINK_BYE) {
-        on_bye(link, header);
+        *event = LINK_FAREWELL;
     }
     return FRAME_GOOD;
 }
@@ -247,10 +249,6 @@ enum link_fill link_fill(struct link *link)
         return LINK_FILL_CLOSED;
     }
     LINK_ASSERT((size_t)got <= room);
-    if (!link->pipe_up) {
-        link->pipe_up = true;
-        link->hello_now = true;
-    }
     link->statistics.bytes_received += (unsigned)got;
     in->end += (size_t)got;
     return (size_t)got < room ? LINK_FILL_SOME : LINK_FILL_MORE;

@@ -25,6 +25,8 @@ enum link_event {
     LINK_NOTHING,      /* no frame for them, or a bad one, which is counted */
     LINK_GREETED,      /* a greeting, in payload */
     LINK_ACKNOWLEDGED, /* an acknowledgement in its header, and in sack */
+    LINK_FAREWELL,     /* the same, and the peer leaves */
+    LINK_TOO_LONG      /* the same, of a message longer than agreed */
 };
 
 struct link_frame {
@@ -45,6 +47,9 @@ enum link_event link_take_frame(struct link *link, struct link_frame *frame);
 
 /* Reads from the pipe once. */
 enum link_fill link_fill(struct link *link);
+
+/* The pipe is closed: bytes that are no whole frame yet stay so. */
+void link_forget_bytes(struct link *link);
 
 /* For a new session: whole messages of the old one stay to be read, the rest
  * goes; the first frame is to have that number. */

@@ -370,6 +370,12 @@ void link_run_timer(struct link *link)
 
 /* --- bytes --------------------------------------------------------------- */
 
+void link_forget_staged(struct link *link)
+{
+    link->stalled = false;
+    link->out.begin = link->out.end = 0;
+}
+
 enum link_flush link_flush(struct link *link)
 {
     struct link_bytes_out *out = &link->out;

@@ -1,13 +1,14 @@
 /* The send window of a link: which frame goes next, what acknowledgements say
- * of those that went, and the timer that sends again.  It knows the data of the
- * link, and neither its handshake nor how frames are received.
+ * of those that went, and the timer that sends again.  It calls neither the
+ * handshake nor what receives; of the receive window it reads what each frame
+ * reports, and notes that it was reported.
  *
  * Memory: none but struct link.  Work: a look at each slot of the window.
  *
  *     while (link_staging_room(link) && link_stage_frame(link)) {
  *     }
  *     if (link_flush(link) == LINK_FLUSH_CLOSED) {
- *         link_pipe_lost(link);
+ *         link_forget_staged(link);
  *     }
  */
 #ifndef TRANSPORT_LINK_SEND_H
@@ -51,6 +52,9 @@ bool link_staging_room(const struct link *link);
  * nothing to say. */
 void link_stage_hello(struct link *link, const uint8_t hello[LINK_HELLO_SIZE]);
 bool link_stage_frame(struct link *link);
+
+/* The pipe is closed: what is staged does not go. */
+void link_forget_staged(struct link *link);
 
 /* Gives the pipe what is staged. */
 enum link_flush link_flush(struct link *link);

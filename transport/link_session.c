@@ -205,7 +205,6 @@ enum link_session link_on_hello(struct link *link,
         link->hello_now = true;
         return LINK_FOREIGN;
     }
-    link->receive.ack_now = true;
     return link_accept_session(link, session_from(link, epoch));
 }
 
@@ -237,16 +236,15 @@ void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE])
     }
 }
 
-void link_pipe_lost(struct link *link)
+void link_refuse_sizes(struct link *link)
 {
-    if (link->pipe_up) {
-        link->statistics.pipe_closed++;
-    }
-    link->pipe_up = false;
+    link->peer.refusal = LINK_WRONG_SIZES;
     link->up = false;
-    link->stalled = false;
-    link->in.begin = link->in.scanned = link->in.end = 0;
-    link->in.skipping = false;
-    link->in.pending = false;
-    link->out.begin = link->out.end = 0;
+}
+
+void link_on_bye(struct link *link, const struct frame_header *header)
+{
+    link->bye_due = (header->flags & LINK_ASK) != 0;
+    link->closed = true;
+    link->up = false;
 }

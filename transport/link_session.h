@@ -1,6 +1,6 @@
 /* The handshake of a link: who is at the other end, and whether what comes is
  * of this session, another, or a new one.  It tells link.c what follows for the
- * two windows, and knows neither.
+ * two windows, and touches neither.
  *
  * Memory: none but struct link.  Work: constant, a CRC of 12 bytes at most.
  *
@@ -28,7 +28,8 @@ enum link_session {
  * knows both epochs. */
 enum link_session link_accept_session(struct link *link, uint32_t session);
 
-/* A greeting; LINK_FOREIGN: it settles nothing yet. */
+/* A greeting; LINK_FOREIGN: it settles nothing yet.  Otherwise the peer waits
+ * for an acknowledgement. */
 enum link_session link_on_hello(struct link *link,
                                 const struct frame_header *header,
                                 const uint8_t hello[LINK_HELLO_SIZE]);
@@ -41,7 +42,10 @@ bool link_hello_due(const struct link *link);
 /* The greeting that goes now. */
 void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE]);
 
-/* The pipe is closed: bytes that were under way are lost. */
-void link_pipe_lost(struct link *link);
+/* The peer sent a message longer than agreed. */
+void link_refuse_sizes(struct link *link);
+
+/* A farewell: it is answered where that is asked for. */
+void link_on_bye(struct link *link, const struct frame_header *header);
 
 #endif
