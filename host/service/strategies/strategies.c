@@ -2,10 +2,8 @@
 
 #include <string.h>
 
-static const struct host_strategy *const rows[] = {
-    &host_sequential,
-    &host_spatial,
-};
+#define POINT(name) &host_##name,
+static const struct host_strategy *const rows[] = {HOST_STRATEGIES(POINT)};
 
 enum { ROWS = sizeof rows / sizeof rows[0] };
 

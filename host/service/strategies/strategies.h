@@ -13,8 +13,15 @@
 #include "node/node.h"
 #include "strategy.h"
 
-/* One a file. */
-extern const struct host_strategy host_sequential, host_spatial;
+/* A row a strategy: host_NAME of a file of this room, in the order in which
+ * they are listed. */
+#define HOST_STRATEGIES(ROW)                                                   \
+    ROW(sequential)                                                            \
+    ROW(spatial)
+
+#define HOST_STRATEGY_DECLARE(name)                                            \
+    extern const struct host_strategy host_##name;
+HOST_STRATEGIES(HOST_STRATEGY_DECLARE)
 
 /* Row i of the table; NULL past the last. */
 const struct host_strategy *host_strategy_row(unsigned i);

@@ -1,7 +1,7 @@
 /* A strategy: which node has which role, what each is given first and next,
  * and what a commit and a loss mean.  The service runs them all and knows none;
  * to add one, write a file that defines such a struct, and put it into the
- * table of strategies.c.
+ * table of strategies.h.
  *
  * Memory: state_bytes a run, cleared before it and freed after it.  Work: that
  * of the functions; the service calls `next` and `send` whenever it comes to a
