@@ -72,10 +72,10 @@ static void settle(const struct host_run_options *options, uint64_t points,
     }
 }
 
-/* Sums over the nodes. */
-static void sum_reports(const struct host_service *service,
-                        struct host_run_result *r)
+void host_run_sum(const struct host_service *service,
+                  struct host_run_result *result)
 {
+    struct host_run_result *r = result;
     memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
     r->retransmitted = service->retransmitted;
     r->faces_spilled = service->spill.faces_total;
@@ -116,7 +116,7 @@ static int run_service(const struct host_run_options *options,
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
     int status = host_service_run(service, error);
-    sum_reports(service, result);
+    host_run_sum(service, result);
     result->time_io_s += 1e-6 * (double)service->pages_us;
     return status;
 }

@@ -108,6 +108,12 @@ int host_triangulate_on(const struct host_run_options *options,
                         struct host_run_result *result,
                         struct host_error *error);
 
+/* The nodes' reports, and sums over them, into a result that is clear but for
+ * its number of nodes.  t_min_s and t_max_s are of nodes that have told of a
+ * time at work: neither of holders, nor of nodes lost before they told. */
+void host_run_sum(const struct host_service *service,
+                  struct host_run_result *result);
+
 /* The whole command: reads, triangulates, verifies, writes. */
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error);
