@@ -16,7 +16,7 @@ static int bench_row(const struct host_run_options *options,
     struct host_run_options row = *options;
     struct host_tetrahedra tets = {0};
     row.nodes = nodes;
-    row.strategy = &host_spatial;
+    row.strategy = host_strategy_named("spatial");
     row.quiet = true;
     memset(result, 0, sizeof *result);
     int status = host_triangulate(&row, points, &tets, result, error);

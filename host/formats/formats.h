@@ -28,8 +28,8 @@ const struct host_format *host_format_row(unsigned i);
 const struct host_format *host_format_named(const char *path);
 
 /* The format in which `path` is read or written; NULL: it cannot be.  "-" is
- * the first of the table that has that use: .xyz for points, .ele for
- * tetrahedra.  What ends in .gz is read and not written. */
+ * the first of the table that has that use.  What ends in .gz is read and not
+ * written. */
 const struct host_format *host_format_of(const char *path, enum host_use use);
 
 /* ".ele .vtu .vtk": the extensions that have that use. */

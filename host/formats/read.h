@@ -14,7 +14,8 @@
 #include "host/mesh/tetrahedra.h"
 
 /* Points in the order of the file, all finite and at least one (.gz through
- * zlib; "-" is .xyz from standard input).  0 or error->code; *points is empty
+ * zlib; "-" is standard input, in the first format
+ * of the table that is read).  0 or error->code; *points is empty
  * after an error. */
 int host_points_read(const char *path, struct host_points *points,
                      struct host_error *error);
@@ -23,7 +24,7 @@ int host_points_read(const char *path, struct host_points *points,
 int host_points_parse(const char *path, const void *data, size_t bytes,
                       struct host_points *points, struct host_error *error);
 
-/* Tetrahedra (.gz allowed, "-" is .ele), rows numbered from 0; rows are as in
+/* Tetrahedra (.gz allowed, "-" as above), rows numbered from 0; rows are as in
  * the file, neither sorted nor checked.  `points`, where not NULL, takes the
  * file's points, if it has any (else it stays empty).  Both are empty after an
  * error. */

@@ -53,7 +53,7 @@ const char *host_write_file(const char *path, unsigned k, char *name,
                             size_t size)
 {
     size_t length = strlen(path);
-    if (strcmp(path, "-") == 0 || length + 8 > size) {
+    if (strcmp(path, "-") == 0 || length >= size) {
         return NULL;
     }
     if (k == 0) {
@@ -64,8 +64,8 @@ const char *host_write_file(const char *path, unsigned k, char *name,
     if (extension == NULL || dot == NULL) {
         return NULL;
     }
-    (void)snprintf(name, size, "%.*s%s", (int)(dot - path), path, extension);
-    return name;
+    int n = snprintf(name, size, "%.*s%s", (int)(dot - path), path, extension);
+    return n < 0 || (size_t)n >= size ? NULL : name;
 }
 
 int host_write_probe(const char *path, struct host_error *error)

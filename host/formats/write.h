@@ -19,13 +19,13 @@
 
 enum { HOST_PATH_MAX = 4096 }; /* bytes of a file's name, by the kernel */
 
-/* Writes points, so that reading gives the same doubles; "-" is .xyz on
- * standard output. */
+/* Writes points, so that reading gives the same doubles; "-" is standard
+ * output, in the first format of the table that is written. */
 int host_points_write(const char *path, const struct host_points *points,
                       struct host_error *error);
 
 /* Writes the tetrahedra (sorted, vertices = rows of points), and what belongs
- * beside them; "-" is .ele on standard output. */
+ * beside them; "-" as above. */
 int host_write(const char *path, const struct host_points *points,
                const struct host_tetrahedra *tets, struct host_error *error);
 

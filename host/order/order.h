@@ -1,7 +1,7 @@
 /* The points in the order of the run: duplicates merged, -0.0 turned into 0.0,
  * cut into regions, each region a balanced k-d order of bricks of 64
- * points and leaves of 8 (see incode/pages.h), with the pages that nodes ask
- * for.
+ * points and leaves of 8 (see incode/pages/pages.h), with the pages that nodes
+ * ask for.
  *
  * Memory: 28 bytes a point at the end, 60 at most while it works (input rows
  * not counted).  Work: O(n log n), about 100 ms a million points on two cores.

@@ -21,15 +21,26 @@ static void listed(void **unused)
 {
     (void)unused;
     char text[HOST_FORMAT_LIST_MAX], small[16];
-    assert_string_equal(list_of(HOST_READ_POINTS),
-                        ".xyz .txt .csv .node .ply .off .vtu .vtk .vtp .vts "
-                        ".npy .x .p3d .bin");
-    assert_string_equal(list_of(HOST_WRITE_POINTS),
-                        ".xyz .txt .csv .node .ply .off .vtu .vtk .vtp .npy");
-    assert_string_equal(list_of(HOST_READ_TETRAHEDRA),
-                        ".ele .vtu .vtk .msh .mesh .npy");
-    assert_string_equal(list_of(HOST_WRITE_TETRAHEDRA),
-                        ".ele .vtu .vtk .msh .mesh .npy");
+    static const enum host_use uses[] = {HOST_READ_POINTS, HOST_WRITE_POINTS,
+                                         HOST_READ_TETRAHEDRA,
+                                         HOST_WRITE_TETRAHEDRA};
+    const struct host_format *f;
+    for (unsigned u = 0; u < sizeof uses / sizeof uses[0]; u++) {
+        char all[HOST_FORMAT_LIST_MAX] = "";
+        for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
+            const bool has[] = {f->read_points != NULL, f->write_points != NULL,
+                                f->read_tetrahedra != NULL,
+                                f->write_tetrahedra != NULL};
+            for (unsigned k = 0; has[u] && f->extensions[k] != NULL; k++) {
+                strcat(strcat(all, all[0] == '\0' ? "" : " "),
+                       f->extensions[k]);
+            }
+        }
+        assert_string_equal(list_of(uses[u]), all);
+    }
+    /* What the first of each list is, "-" is. */
+    assert_memory_equal(list_of(HOST_READ_POINTS), ".xyz .txt ", 10);
+    assert_memory_equal(list_of(HOST_WRITE_TETRAHEDRA), ".ele ", 5);
     host_format_help(HOST_WRITE_TETRAHEDRA, text, sizeof text);
     assert_non_null(strstr(
         text, ".ele (TetGen; with .node, .neigh and .face beside it), .vtu "));
