@@ -101,7 +101,7 @@ static int command_run(int argc, char **argv, struct host_error *error)
     if (rank <= 0 && host_arguments_run(argc, argv, &options, error) != 0) {
         return error->code;
     }
-    if (options.link == HOST_WIRE_MPI) {
+    if (options.link->ranks) {
         return rank >= 0 ? host_launch_become(rank, argv, error)
                          : host_launch_mpi(argv, &options, error);
     }

@@ -1,6 +1,6 @@
 /* `incode run` in rank 0 of MPI: the host as it is elsewhere, on a cube of
  * ranks.  The program incode becomes this one where mpirun has started it, and
- * starts mpirun where nobody has (host/launch.h). */
+ * starts mpirun where nobody has (host/run/launch.h). */
 #include <argp.h>
 #include <signal.h>
 #include <stdio.h>
@@ -29,6 +29,7 @@ static int begin(const struct host_run_options *options,
         return error->code;
     }
     *machine = host_ranks_machine(&ranks);
+    result->memory_held = ", besides what Open MPI takes for itself";
     result->socket_send_bytes = MPI_PIPE_SLOTS * MPI_PIPE_BYTES;
     result->socket_receive_bytes = MPI_PIPE_SLOTS * MPI_PIPE_BYTES;
     return 0;

@@ -10,6 +10,9 @@ static int start(const struct host_cluster_options *options,
     }
     started->machine = host_cluster_machine(&cluster);
     started->limited = cluster.limited;
+    started->memory_held = cluster.limited
+                               ? ", held by the kernel"
+                               : " (a sanitizer build: not held by the kernel)";
     (void)tcp_buffers(cluster.port.tcp.fd, &started->send_bytes,
                       &started->receive_bytes);
     return 0;

@@ -1,6 +1,9 @@
 /* What a node may run on, one row a board, by which --board, cube files,
  * statistics and messages name it, and by which its nodes are started.  A new
- * board is a file that defines host_board_NAME, and a row of boards.c.
+ * board is a file that defines host_board_NAME, and a row of boards.c.  A run
+ * on a cube file has its board's name alone, and starts what the file says.
+ * Ranks of MPI, whose program is that of boards/mpi, are a kind of link: they
+ * are processes of the board linux.
  *
  * Memory: the table.  Work: as that of the board's start.
  *
@@ -19,8 +22,11 @@
 
 /* A cube of nodes that a board has started. */
 struct host_started {
-    struct host_machine machine;   /* whose end stops them */
-    bool limited;                  /* each is held to its memory */
+    struct host_machine machine; /* whose end stops them */
+    bool limited;                /* the kernel holds each to its memory */
+    /* How each is held to its memory, behind "bytes of data memory a node";
+     * NULL: nothing to say. */
+    const char *memory_held;
     int send_bytes, receive_bytes; /* buffers of a wire's end; 0: not known */
 };
 

@@ -122,7 +122,7 @@ static int take_wire(struct host_cluster *c, struct host_error *error)
     const struct host_cluster_options *options = &c->options;
     struct host_wires *wires = &c->wires;
     struct serial_port_settings settings = {.dtr = true, .rts = true};
-    if (options->link != HOST_WIRE_SERIAL) {
+    if (!options->link->terminals) {
         host_port_socket(&c->port, wires->host);
         wires->host = -1;
         return 0;

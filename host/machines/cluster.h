@@ -33,8 +33,8 @@ enum {
 struct host_cluster_options {
     unsigned nodes;  /* a power of two, at most HOST_PROCESSES_MAX */
     uint64_t memory; /* bytes of data memory a node, stack included */
-    enum host_wire_kind link;
-    uint64_t unplug_us;  /* for tests: see port.h */
+    const struct host_link *link; /* that has pairs */
+    uint64_t unplug_us;           /* for tests: see port.h */
     unsigned window;     /* frames a link and direction; 0: node's choice */
     const char *program; /* NULL: incode-node beside this executable */
 };

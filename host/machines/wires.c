@@ -13,7 +13,7 @@ static void close_end(int *end)
 }
 
 static int make_between_nodes(struct host_wires *wires,
-                              enum host_wire_kind kind, unsigned nodes,
+                              const struct host_link *link, unsigned nodes,
                               unsigned dimension, struct host_error *error)
 {
     int pair[2];
@@ -23,12 +23,11 @@ static int make_between_nodes(struct host_wires *wires,
             if (other < i) {
                 continue;
             }
-            if (host_links[kind].pair(pair) != 0) {
+            if (link->pair(pair) != 0) {
                 return host_fail(error, HOST_CUBE,
                                  "wire between nodes %u and %u: %s; are %s "
                                  "and %u open files allowed?",
-                                 i, other, strerror(errno),
-                                 host_links[kind].needs,
+                                 i, other, strerror(errno), link->needs,
                                  nodes * (dimension + 1) + 16);
             }
             wires->end[i][d] = pair[0];
@@ -38,27 +37,27 @@ static int make_between_nodes(struct host_wires *wires,
     return 0;
 }
 
-int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
+int host_wires_make(struct host_wires *wires, const struct host_link *link,
                     unsigned nodes, unsigned dimension,
                     struct host_error *error)
 {
     int pair[2];
     memset(wires, -1, sizeof *wires);
     wires->host_path[0] = '\0';
-    if (make_between_nodes(wires, kind, nodes, dimension, error) != 0) {
+    if (make_between_nodes(wires, link, nodes, dimension, error) != 0) {
         host_wires_close(wires);
         return error->code;
     }
-    if (host_links[kind].pair(pair) != 0) {
+    if (link->pair(pair) != 0) {
         int reason = errno;
         host_wires_close(wires);
         return host_fail(error, HOST_CUBE,
                          "wire between host and node 0: %s; are %s allowed?",
-                         strerror(reason), host_links[kind].needs);
+                         strerror(reason), link->needs);
     }
     wires->end[0][dimension] = pair[0];
     wires->host = pair[1];
-    if (kind == HOST_WIRE_SERIAL &&
+    if (link->terminals &&
         ttyname_r(pair[1], wires->host_path, sizeof wires->host_path) != 0) {
         host_wires_close(wires);
         return host_fail(error, HOST_CUBE,

@@ -4,7 +4,7 @@
  * Memory: 4 bytes for each port of HOST_PROCESSES_MAX nodes; in the kernel what
  * a wire of its kind takes.  Work: a few system calls a wire.
  *
- *     if (host_wires_make(&wires, HOST_WIRE_TCP, 8, 3, &error) != 0)
+ *     if (host_wires_make(&wires, host_link_named("tcp"), 8, 3, &error) != 0)
  *         return error.code;
  *     host_port_socket(&port, wires.host);
  *     int fd = wires.end[node][0];
@@ -27,7 +27,7 @@ struct host_wires {
 
 /* Of a kind that has pairs; all ends non-blocking and closed on exec. HOST_CUBE
  * where the machine does not give so many; what was made is closed then. */
-int host_wires_make(struct host_wires *wires, enum host_wire_kind kind,
+int host_wires_make(struct host_wires *wires, const struct host_link *link,
                     unsigned nodes, unsigned dimension,
                     struct host_error *error);
 

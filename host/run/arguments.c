@@ -114,41 +114,52 @@ struct parse {
     uint64_t given; /* bits of keys from KEY_STRATEGY on */
 };
 
-/* Index of `value` in names (a NULL-terminated list), or -1 with the error:
- * what is allowed, and what other versions have. */
-static int choose(struct parse *p, const char *option, const char *value,
-                  const char *const names[], const char *later)
+/* names: a list with a comma before and after each, or NULL. */
+static bool is_among(const char *names, const char *name)
 {
-    char allowed[128] = "";
-    for (int i = 0; names[i] != NULL; i++) {
-        if (strcmp(value, names[i]) == 0) {
-            return i;
-        }
-        strcat(strcat(allowed, i == 0 ? "" : ", "), names[i]);
+    size_t n = strlen(name);
+    const char *at = names == NULL || n == 0 ? NULL : strstr(names, name);
+    while (at != NULL && (at == names || at[-1] != ',' || at[n] != ',')) {
+        at = strstr(at + 1, name);
     }
-    /* `later` is a list with a comma before and after each name. */
-    char wanted[64] = ",";
-    strncat(wanted, value, sizeof wanted - 3);
-    strcat(wanted, ",");
+    return at != NULL;
+}
+
+/* Which of the rows that `name` gives, up to NULL, `value` is, or -1 with the
+ * error: what is allowed, and what other versions have (later). */
+static int choose(struct parse *p, const char *option, const char *value,
+                  const char *(*name)(unsigned i), const char *later)
+{
+    char allowed[sizeof p->error->text] = "";
+    size_t used = 0;
+    for (unsigned i = 0; name(i) != NULL; i++) {
+        if (strcmp(value, name(i)) == 0) {
+            return (int)i;
+        }
+        if (used < sizeof allowed) { /* what the error has room for */
+            used += (size_t)snprintf(allowed + used, sizeof allowed - used,
+                                     "%s%s", i == 0 ? "" : ", ", name(i));
+        }
+    }
     host_fail(p->error, HOST_USAGE, "--%s %s: %s; allowed: %s", option, value,
-              later != NULL && strstr(later, wanted) != NULL
-                  ? "not in this version"
-                  : "no such name",
+              is_among(later, value) ? "not in this version" : "no such name",
               allowed);
     return -1;
 }
 
-enum { ROWS_MAX = 32 };
-
-/* The same with the names that a table gives. */
-static int choose_row(struct parse *p, const char *option, const char *value,
-                      const char *(*name)(unsigned i), const char *later)
+static const char *partition_name(unsigned i)
 {
-    const char *names[ROWS_MAX + 1] = {NULL};
-    for (unsigned i = 0; i < ROWS_MAX && name(i) != NULL; i++) {
-        names[i] = name(i);
-    }
-    return choose(p, option, value, names, later);
+    return host_partitions[i];
+}
+
+static const char *index_name(unsigned i)
+{
+    return host_indexes[i];
+}
+
+static const char *face_rule_name(unsigned i)
+{
+    return host_face_rules[i];
 }
 
 static int number(struct parse *p, const char *option, const char *value,
@@ -208,27 +219,27 @@ static bool parse_names(int key, const char *value, struct parse *p)
     switch (key) {
     case KEY_STRATEGY:
         o->strategy = host_strategy_row(
-            (unsigned)choose_row(p, "strategy", value, host_strategy_name,
-                                 host_strategies_elsewhere));
+            (unsigned)choose(p, "strategy", value, host_strategy_name,
+                             host_strategies_elsewhere));
         return true;
     case KEY_PARTITION:
         o->partition = (enum host_partition)choose(p, "partition", value,
-                                                   host_partitions, NULL);
+                                                   partition_name, NULL);
         return true;
     case KEY_INDEX:
         o->index =
-            (enum incode_index)choose(p, "index", value, host_indexes, NULL);
+            (enum incode_index)choose(p, "index", value, index_name, NULL);
         return true;
     case KEY_FACE_RULE:
         o->face_rule = (enum incode_face_rule)choose(p, "face-rule", value,
-                                                     host_face_rules, NULL);
+                                                     face_rule_name, NULL);
         return true;
     case KEY_LINK:
-        o->link = (enum host_wire_kind)choose_row(p, "link", value,
-                                                  host_link_name, NULL);
+        o->link = host_link_row(
+            (unsigned)choose(p, "link", value, host_link_name, NULL));
         return true;
     case KEY_BOARD:
-        o->board = host_board_row((unsigned)choose_row(
+        o->board = host_board_row((unsigned)choose(
             p, "board", value, host_board_name, host_boards_elsewhere));
         return true;
     default:
@@ -361,7 +372,7 @@ static bool given(const struct parse *p, int key)
 static int check_together(const struct parse *p)
 {
     const struct host_run_options *o = p->options;
-    bool cube = o->cube != NULL, mpi = !cube && o->link == HOST_WIRE_MPI;
+    bool cube = o->cube != NULL, ranks = !cube && o->link->ranks;
     const struct {
         int key;
         bool vain;
@@ -370,9 +381,9 @@ static int check_together(const struct parse *p)
         {KEY_MEMORY, cube, "--memory: the cube file of --cube says it"},
         {KEY_LINK, cube, "--link: the cube file of --cube says it"},
         {KEY_WINDOW, cube, "--window: the cube file of --cube says it"},
-        {KEY_HOST_UNPLUG, cube || o->link != HOST_WIRE_SERIAL,
+        {KEY_HOST_UNPLUG, cube || !o->link->terminals,
          "--host-unplug: goes with --link serial alone"},
-        {KEY_NODE_PROGRAM, mpi, "--node-program: not with --link mpi"},
+        {KEY_NODE_PROGRAM, ranks, "--node-program: not with --link mpi"},
         {KEY_HOST_RATE_TIME, !given(p, KEY_HOST_RATE),
          "--host-rate-time: goes with --host-rate alone"},
         {KEY_SEED, !given(p, KEY_HOST_STALL),
@@ -388,7 +399,7 @@ static int check_together(const struct parse *p)
 
 static const char *link_help(unsigned i)
 {
-    return host_links[i].help;
+    return host_link_row(i)->help;
 }
 
 static const char *board_help(unsigned i)

@@ -59,7 +59,7 @@ int host_run_on_cube(struct host_run_options *options, struct host_error *error)
     options->memory = the_file.memory;
     options->board = the_file.board;
     options->link =
-        the_file.serial_baud != 0 ? HOST_WIRE_SERIAL : HOST_WIRE_TCP;
+        host_link_named(the_file.serial_baud != 0 ? "serial" : "tcp");
     options->begin = begin;
     return 0;
 }

@@ -77,10 +77,7 @@ static void node_lines(FILE *file, const struct host_run_result *r)
     }
     fprintf(file, "Of %llu bytes of data memory a node%s.\n",
             (unsigned long long)r->memory,
-            r->limited ? ", held by the kernel"
-            : r->link == HOST_WIRE_MPI
-                ? ", besides what Open MPI takes for itself"
-                : " (a sanitizer build: not held by the kernel)");
+            r->memory_held == NULL ? "" : r->memory_held);
 }
 
 static void map_line(FILE *file, uint64_t bytes, const char *what,

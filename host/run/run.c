@@ -23,6 +23,7 @@ void host_run_defaults(struct host_run_options *options)
     options->partition = HOST_ADAPTIVE;
     options->index = INCODE_KD;
     options->face_rule = INCODE_FACE_OWN;
+    options->link = host_link_row(0);
     options->board = host_board_row(0);
     options->memory = 4u << 20;
     options->patience_s = 60;
@@ -281,6 +282,7 @@ static int begin_on_board(const struct host_run_options *options,
     }
     *machine = started.machine;
     result->limited = started.limited;
+    result->memory_held = started.memory_held;
     result->socket_send_bytes = started.send_bytes;
     result->socket_receive_bytes = started.receive_bytes;
     return 0;
@@ -426,7 +428,7 @@ static int run_alone(const struct host_run_options *options,
     struct host_run_options one = *options;
     struct host_tetrahedra tets = {0};
     one.nodes = 1;
-    one.strategy = NULL;
+    one.strategy = host_strategy_named("sequential");
     int status = host_triangulate(&one, points, &tets, alone, error);
     host_tetrahedra_free(&tets);
     return status;

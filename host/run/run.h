@@ -34,7 +34,7 @@ struct host_run_options {
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;
-    enum host_wire_kind link;
+    const struct host_link *link;
     const struct host_board *board;
     unsigned nodes; /* 0: what suits this machine */
     uint64_t memory;
@@ -61,7 +61,7 @@ struct host_run_result {
     const struct host_strategy *strategy; /* the one taken */
     enum host_partition partition;
     enum incode_index index;
-    enum host_wire_kind link;
+    const struct host_link *link;
     const struct host_board *board;
     unsigned nodes;
     uint64_t memory;
@@ -77,7 +77,8 @@ struct host_run_result {
     uint64_t vertices, vertices_waited;
     int socket_send_bytes, socket_receive_bytes; /* buffers of a wire's end */
     struct host_node_report node[HOST_NODES_MAX];
-    bool limited; /* the kernel held the nodes to their memory */
+    bool limited;            /* the kernel held the nodes to their memory */
+    const char *memory_held; /* see boards.h; NULL: nothing to say */
     bool verified;
     struct host_verify_report check;
 };

@@ -109,7 +109,7 @@ static json_t *run_object(const struct host_run_result *r)
     put_text(o, "strategy", r->strategy->name);
     put_text(o, "partition", host_partitions[r->partition]);
     put_text(o, "index", host_indexes[r->index]);
-    put_text(o, "link", host_links[r->link].name);
+    put_text(o, "link", r->link->name);
     put_text(o, "board", r->board->name);
     put(o, "nodes", r->nodes);
     put(o, "memory_bytes", r->memory);

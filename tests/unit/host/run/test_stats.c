@@ -70,7 +70,7 @@ static void fill(struct host_run_result *r)
     r->nodes = 4;
     r->strategy = &host_spatial;
     r->index = INCODE_KD;
-    r->link = HOST_WIRE_SERIAL;
+    r->link = host_link_named("serial");
     r->board = host_board_named("linux");
     r->make_tetra_calls = 1000;
     r->candidates = 64000;
