@@ -4,7 +4,6 @@
 #include <float.h>
 #include <math.h>
 #include <setjmp.h>
-#include <stdalign.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -13,8 +12,8 @@
 
 #include <cmocka.h>
 
-#include "host/mesh/gen.h"
 #include "host/check/verify.h"
+#include "host/mesh/gen.h"
 #include "tests/unit/emulated.h"
 #include "tests/unit/reference.h"
 #include "solo.h"
@@ -512,87 +511,6 @@ static void smallest_memory(void **unused)
     host_points_free(&points);
 }
 
-static void too_little_memory(void **unused)
-{
-    (void)unused;
-    struct incode_setup setup = {.bricks = 10, .index = INCODE_KD};
-    struct incode_outside outside = {0};
-    size_t least = incode_arena_min(&setup);
-    assert_in_range(least, 1, 512 << 10);
-    void *arena = aligned_alloc(64, (least + 63) / 64 * 64);
-    assert_non_null(arena);
-    const char *why = NULL;
-    assert_null(
-        incode_triangulator_init(arena, least - 1024, &setup, &outside, &why));
-    assert_non_null(why);
-    assert_non_null(
-        incode_triangulator_init(arena, least, &setup, &outside, &why));
-    setup.bricks = 0;
-    why = NULL;
-    assert_null(incode_triangulator_init(arena, least, &setup, &outside, &why));
-    assert_non_null(why);
-    free(arena);
-}
-
-/* Each field of a setup, at its limits and past them. */
-static void setup_limits(void **unused)
-{
-    (void)unused;
-    const struct incode_setup good = {
-        .bricks = 10, .index = INCODE_KD, .hi = {1, 1, 1}};
-    struct incode_setup grid = good;
-    grid.index = INCODE_GRID;
-    grid.cells[0] = grid.cells[1] = grid.cells[2] = 8;
-    assert_null(incode_setup_fault(&good));
-    assert_null(incode_setup_fault(&grid));
-#define EXPECT(fault, base, field, value)                                      \
-    do {                                                                       \
-        struct incode_setup s = (base);                                        \
-        s.field = (value);                                                     \
-        assert_int_equal(incode_setup_fault(&s) != NULL, fault);               \
-    } while (0)
-    EXPECT(true, good, bricks, 0);
-    EXPECT(false, good, bricks, INCODE_NONE / INCODE_BRICK_POINTS);
-    EXPECT(true, good, bricks, INCODE_NONE / INCODE_BRICK_POINTS + 1);
-    EXPECT(false, good, index, INCODE_NAIVE);
-    EXPECT(true, good, index, INCODE_KD + 1);
-    EXPECT(false, good, face_rule, INCODE_FACE_PAPER);
-    EXPECT(true, good, face_rule, INCODE_FACE_PAPER + 1);
-    EXPECT(true, good, reserved, 1);
-    EXPECT(true, good, reserved2, 1);
-    for (int d = 0; d < 3; d++) {
-        EXPECT(false, good, lo[d], 1);
-        EXPECT(true, good, lo[d], 1.5);
-        EXPECT(true, good, lo[d], -INFINITY);
-        EXPECT(true, good, hi[d], INFINITY);
-        EXPECT(true, good, lo[d], NAN);
-        EXPECT(true, good, hi[d], NAN);
-        EXPECT(true, good, cells[d], 1);
-        EXPECT(true, grid, cells[d], 0);
-        EXPECT(false, grid, cells[d], 1 << 25);
-        EXPECT(false, grid, cells[d], UINT32_MAX / 64);
-        EXPECT(true, grid, cells[d], UINT32_MAX / 64 + 1);
-        struct incode_setup line = grid;
-        line.cells[0] = line.cells[1] = line.cells[2] = 1;
-        EXPECT(false, line, cells[d], INCODE_CELLS_MAX);
-        EXPECT(true, line, cells[d], INCODE_CELLS_MAX + 1u);
-    }
-#undef EXPECT
-    struct incode_setup overflow = grid;
-    overflow.cells[0] = overflow.cells[1] = overflow.cells[2] =
-        INCODE_CELLS_MAX;
-    assert_non_null(incode_setup_fault(&overflow));
-    /* init says so before it writes a byte. */
-    struct incode_outside outside = {0};
-    alignas(64) uint8_t arena[64] = {0};
-    static const uint8_t untouched[64];
-    const char *why = NULL;
-    assert_null(
-        incode_triangulator_init(arena, 8 << 20, &overflow, &outside, &why));
-    assert_string_equal(why, incode_setup_fault(&overflow));
-    assert_memory_equal(arena, untouched, sizeof arena);
-}
-
 static void refusals(void **unused)
 {
     (void)unused;
@@ -639,8 +557,6 @@ int main(void)
         cmocka_unit_test(hub),
         cmocka_unit_test(real_sets),
         cmocka_unit_test(smallest_memory),
-        cmocka_unit_test(too_little_memory),
-        cmocka_unit_test(setup_limits),
         cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
