@@ -3,13 +3,13 @@
  * joins them, by what they return.  Not for others.  All read what they need.
  * Who writes, beside link.c:
  *
- *     session   candidate, peer ..., session_in and out, intruder, told_...,
- *               kept_us, heard_us, hello_now, hello_us, up, closed, bye_due
- *     send      send, out, stalled, sent_us, bye_us; datagrams.due, when it
- *               goes, and bye_due likewise; as every frame reports what came:
- *               receive.reported, unreported and ack_now
- *     receive   receive, in, datagrams.in, in_size, asked, heard
- *     each      its statistics
+ * - session: candidate, peer ..., session_in and out, intruder, told_...,
+ *   kept_us, heard_us, hello_now, hello_us, up, closed, bye_due;
+ * - send: send, out, stalled, sent_us, bye_us; datagrams.due, when it goes, and
+ *   bye_due likewise; as every frame reports what came: receive.reported,
+ *   unreported and ack_now;
+ * - receive: receive, in, datagrams.in, in_size, asked, heard;
+ * - each: its statistics.
  *
  * Memory and work: see link.h.
  *

@@ -60,6 +60,12 @@ static void begin(const struct host_strategy *strategy)
     service.work.context = &service;
 }
 
+static void end(void)
+{
+    free(arena);
+    arena = NULL;
+}
+
 /* A strategy that always has something to send has every other message, until
  * what the node has asked for is sent. */
 static void test_turns(void **unused)
@@ -77,14 +83,14 @@ static void test_turns(void **unused)
     assert_int_equal(reports[NODE].pages, 3);
     assert_int_equal(sent, all - 3);
     /* With room for a few, half of them are pages. */
-    free(arena);
+    end();
     begin(&strategy);
     nodes[NODE].pages_count = HOST_PAGES_QUEUED_MAX;
     sent = 0;
     all = host_sending_serve(&service, &error);
     assert_int_equal(reports[NODE].pages, all / 2);
     assert_int_equal(sent, all - all / 2);
-    free(arena);
+    end();
 }
 
 /* What a node has to know first comes first. */
@@ -104,7 +110,7 @@ static void test_order(void **unused)
     assert_true(nodes[0].report_due);
     assert_int_equal(nodes[0].sent, 0);
     assert_true(host_sending_pages_wait(&service));
-    free(arena);
+    end();
 }
 
 static int set_up(void **unused)
