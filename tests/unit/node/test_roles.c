@@ -310,7 +310,7 @@ static void setups_of_other_versions(void **unused)
     struct node_setup_message setup = setup_of(NODE_WORKER);
     struct {
         struct node_setup_message setup;
-        uint32_t more;
+        uint64_t more;
     } later = {setup, 0};
     (void)unused;
     assert_int_equal(NODE_PROTOCOL, 4);

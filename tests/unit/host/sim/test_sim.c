@@ -17,7 +17,7 @@
 #include "host/sim/sim.h"
 #include "tests/unit/emulated.h"
 
-enum { STRIDE = 5, STRIDE_SANITIZED = 23, STRIDE_EMULATED = 97 };
+enum { STRIDE = 5, STRIDE_SANITIZED = 19, STRIDE_EMULATED = 97 };
 
 static uint64_t stride(void)
 {
