@@ -8,7 +8,7 @@
 . tests/system/lib.sh
 need_data pairs
 naive_max=${NAIVE_MAX:-5000}
-grid_max=${GRID_MAX:-15000}
+grid_max=${GRID_MAX:-10000}
 kd_max=${KD_MAX:-20000}
 
 rows='
