@@ -4,9 +4,9 @@
  * Memory: none.  Work: constant; a compiler makes a load or store of each where
  * the machine has the order.
  *
- *     bytes_put16(hello + 2, node);
- *     node = bytes_get16(hello + 2);
- *     crc ^= bytes_get32(p);
+ *     uint8_t bytes[4];
+ *     bytes_put32(bytes, 0x04030201);   // 1, 2, 3, 4
+ *     if (bytes_get16(bytes + 2) != 0x0403) return 1;
  */
 #ifndef TRANSPORT_BYTES_H
 #define TRANSPORT_BYTES_H

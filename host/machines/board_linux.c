@@ -1,11 +1,18 @@
 /* Nodes as processes of this machine, of the program of boards/linux. */
 #include "boards.h"
 
+extern const struct host_board host_board_linux;
+
 static int start(const struct host_cluster_options *options,
                  struct host_started *started, struct host_error *error)
 {
     static struct host_cluster cluster;
-    if (host_cluster_start(&cluster, options, error) != 0) {
+    static char program[4096];
+    struct host_cluster_options mine = *options;
+    mine.program = program;
+    if (host_cluster_program(options->program, host_board_linux.program,
+                             program, sizeof program, error) != 0 ||
+        host_cluster_start(&cluster, &mine, error) != 0) {
         return error->code;
     }
     started->machine = host_cluster_machine(&cluster);
@@ -21,5 +28,6 @@ static int start(const struct host_cluster_options *options,
 const struct host_board host_board_linux = {
     .name = "linux",
     .help = "processes of this machine",
+    .program = "incode-node",
     .start = start,
 };

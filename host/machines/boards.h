@@ -32,7 +32,8 @@ struct host_started {
 
 struct host_board {
     const char *name;
-    const char *help; /* what it is, in one line */
+    const char *help;    /* what it is, in one line */
+    const char *program; /* its nodes' own, a file beside this one */
     /* Starts nodes of this board here, wired as a cube.  0, HOST_CUBE or
      * HOST_BROKEN.  Once at a time. */
     int (*start)(const struct host_cluster_options *options,

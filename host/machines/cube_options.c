@@ -73,7 +73,7 @@ int host_cube_print(const char *path, struct host_error *error)
     }
     for (unsigned i = 0; i < file.nodes; i++) {
         unsigned count = host_cube_node_options(&file, i, options);
-        printf("incode-node");
+        printf("%s", file.board->program);
         for (unsigned k = 0; k < count; k++) {
             printf(" %s", options[k]);
         }

@@ -14,10 +14,12 @@
 static void become_node(const void *context, unsigned node)
 {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
+    static char name[HOST_NODE_OPTION_BYTES];
     const struct host_remote *r = context;
-    char *argv[HOST_NODE_OPTIONS_MAX + 2] = {(char[]){"incode-node"}};
+    char *argv[HOST_NODE_OPTIONS_MAX + 2] = {name};
     char *no_environment[] = {NULL};
     unsigned count = host_cube_node_options(r->file, node, options);
+    snprintf(name, sizeof name, "%s", r->file->board->program);
     for (unsigned i = 0; i < count; i++) {
         argv[1 + i] = options[i];
     }

@@ -23,8 +23,8 @@ static int begin(const struct host_run_options *options,
     static char program[4096];
     (void)result;
     if ((starts_some(&the_file) &&
-         host_cluster_program(options->node_program, "incode-node", program,
-                              sizeof program, error) != 0) ||
+         host_cluster_program(options->node_program, the_file.board->program,
+                              program, sizeof program, error) != 0) ||
         host_remote_start(&remote, &the_file, program, error) != 0) {
         return error->code;
     }

@@ -103,6 +103,9 @@ mkdir "$tree/boards/toy"
 for file in boards/linux/*.c; do
     printf '#include "%s"\n' "$file" > "$tree/boards/toy/${file##*/}"
 done
+sed 's/(text, "linux")/(text, "toy")/; s,#include "options.h",#include "boards/linux/options.h",
+    s,#include "fault.h",#include "boards/linux/fault.h",' \
+    boards/linux/options.c > "$tree/boards/toy/options.c"
 cat > "$tree/host/machines/board_toy.c" <<'END'
 /* Processes of a program of their own, incode-node-toy. */
 #include "boards.h"
@@ -128,6 +131,7 @@ static int start(const struct host_cluster_options *options,
 const struct host_board host_board_toy = {
     .name = "toy",
     .help = "processes of a toy",
+    .program = "incode-node-toy",
     .start = start,
 };
 END
@@ -231,6 +235,15 @@ check adding/board/statistics 'another board' \
     [ "$(stat_of "$scratch/toy.json" board)" = toy ]
 printf 'dimension = 0; board = "z80"; links = ();' > "$scratch/z80.cube"
 says adding/board/cube-file '"linux" or "toy"' "$new" cube "$scratch/z80.cube"
+take_ports
+printf '%s\n' 'dimension = 0; board = "toy"; start = [0];' \
+    "links = ({ node = 0; to = \"host\"; tcp = \"127.0.0.1:$base\"; });" \
+    > "$scratch/toy.cube"
+says adding/board/cube-line 'incode-node-toy --node 0' \
+    "$new" cube "$scratch/toy.cube"
+succeeds adding/board/on-a-cube \
+    "$new" run "$scratch/a.xyz" -q --cube "$scratch/toy.cube" \
+    -o "$scratch/cube.ele"
 rm "$tree/build/incode-node-toy"
 says adding/board/its-program 'incode-node-toy: No such file' \
     "$new" run "$scratch/a.xyz" --board toy

@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -291,7 +292,10 @@ static void an_unknown_role(void **unused)
     struct node_pong_message pong;
     (void)unused;
     (void)begin(ECHO_ROLE);
-    refuses(NODE_SETUP, &setup, sizeof setup, "unknown role 7, known are 1..2");
+    char text[64];
+    snprintf(text, sizeof text, "unknown role 7, known are 1..%u",
+             (unsigned)NODE_ROLES);
+    refuses(NODE_SETUP, &setup, sizeof setup, text);
     say(ECHO_ASKS, "none", 4); /* to the role before */
     say(NODE_PING, &ping, sizeof ping);
     memcpy(&pong, hear(NODE_PONG), sizeof pong);
