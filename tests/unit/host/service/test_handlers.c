@@ -9,11 +9,11 @@
 
 #include <cmocka.h>
 
-#include "host/mesh/gen.h"
 #include "host/service/handlers.h"
 #include "host/service/strategies/strategies.h"
 #include "node/result.h"
 #include "transport/drivers/sim.h"
+#include "small_order.h"
 
 enum { NODES = 4 };
 
@@ -53,13 +53,7 @@ static void *cube_arena;
 static int set_up(void **unused)
 {
     (void)unused;
-    struct host_points points = {0};
-    struct host_error error = {0};
-    assert_int_equal(host_gen("uniform", 3000, 1, &points, &error), 0);
-    assert_int_equal(host_order_make(&order, "test", points.xyz, points.count,
-                                     HOST_ADAPTIVE, NODES, false, &error),
-                     0);
-    host_points_free(&points);
+    order = small_order(NODES);
     return 0;
 }
 

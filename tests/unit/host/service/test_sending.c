@@ -8,10 +8,10 @@
 
 #include <cmocka.h>
 
-#include "host/mesh/gen.h"
 #include "host/service/sending.h"
 #include "host/service/strategies/strategies.h"
 #include "transport/drivers/sim.h"
+#include "small_order.h"
 
 enum { NODE = 1, NODES = 2, WINDOW = 16, NODE_OWN = 100 };
 
@@ -116,13 +116,7 @@ static void test_order(void **unused)
 static int set_up(void **unused)
 {
     (void)unused;
-    struct host_points points = {0};
-    struct host_error error = {0};
-    assert_int_equal(host_gen("uniform", 3000, 1, &points, &error), 0);
-    assert_int_equal(host_order_make(&order, "test", points.xyz, points.count,
-                                     HOST_ADAPTIVE, NODES, false, &error),
-                     0);
-    host_points_free(&points);
+    order = small_order(NODES);
     return 0;
 }
 

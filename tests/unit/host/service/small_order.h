@@ -1,0 +1,36 @@
+/* An order of 3,000 uniform points in two or more regions, for tests of the
+ * service that need one and no cube.
+ *
+ * Memory: that of the order.  Work: a few milliseconds.
+ *
+ *     struct host_order order = small_order(4);
+ *     host_order_free(&order);
+ */
+#ifndef TESTS_SMALL_ORDER_H
+#define TESTS_SMALL_ORDER_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "host/mesh/gen.h"
+#include "host/order/order.h"
+
+/* regions: a power of two. */
+static inline struct host_order small_order(unsigned regions)
+{
+    struct host_order order;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    assert_int_equal(host_gen("uniform", 3000, 1, &points, &error), 0);
+    assert_int_equal(host_order_make(&order, "test", points.xyz, points.count,
+                                     HOST_ADAPTIVE, regions, false, &error),
+                     0);
+    host_points_free(&points);
+    return order;
+}
+
+#endif
