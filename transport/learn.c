@@ -28,6 +28,14 @@ static bool sensible(const struct learned *l, unsigned expected_link)
            l->teacher == (l->self ^ 1u << expected_link);
 }
 
+/* Whether this node has the links of that one: to its neighbours, and to the
+ * host from node 0 and perhaps another. */
+static bool fits(const struct learner *learner, const struct learned *l)
+{
+    return learner->links == l->dimension + 1u ||
+           (l->self != 0 && learner->links == l->dimension);
+}
+
 static bool take_hello(struct learner *learner, unsigned d,
                        const uint8_t *hello, struct learned *learned)
 {
@@ -47,6 +55,10 @@ static bool take_hello(struct learner *learner, unsigned d,
         learner->misplaced++;
         learner->misplaced_link = (uint8_t)d;
         learner->misplaced_expected = (uint8_t)expected;
+        return false;
+    }
+    if (!fits(learner, learned)) {
+        learner->misfits++;
         return false;
     }
     return true;

@@ -1,6 +1,6 @@
 /* Who a node is that has neither options nor a file: it listens on its links
- * until a neighbour, or the host, greets the node that it expects there.
- * Nothing is sent.
+ * until a neighbour, or the host, greets a node that has such links there.  A
+ * greeting to another is counted, and passed over.  Nothing is sent.
  *
  * Memory: struct learner, LEARN_BYTES a link.  Work: learner_poll reads at most
  * LEARN_BYTES a link.
@@ -31,6 +31,8 @@ struct learner {
     /* Greetings that came in by another link than they should: the last. */
     uint32_t misplaced;
     uint8_t misplaced_link, misplaced_expected;
+    /* Greetings to a node with another number of links. */
+    uint32_t misfits;
     struct {
         uint8_t bytes[LEARN_BYTES];
         uint8_t size;

@@ -126,23 +126,41 @@ static void start_alone(struct linux_options *options,
 #endif
 }
 
-/* Waits until a neighbour has said who this node is; true: as it has wires. */
-static bool learn(const struct node_board *board, struct linux_options *options)
+/* Once: a greeting may be a stranger's, and the next one right. */
+static void tell_of_greeting(const struct learner *learner, bool *told)
+{
+    const char *what = learner->misfits > 0
+                           ? "a neighbour takes this node for one with "
+                             "another number of wires"
+                       : learner->misplaced > 0
+                           ? "a neighbour's wire is in another link than it "
+                             "should"
+                           : NULL;
+    if (what != NULL && !*told) {
+        fault_print(&(struct linux_fault){
+            .where = "--wire",
+            .what = what,
+            .next = "it waits for another; see incode cube FILE"});
+        *told = true;
+    }
+}
+
+/* Waits until a neighbour has said who this node is. */
+static void learn(const struct node_board *board, struct linux_options *options)
 {
     static struct learner learner;
     struct linux_board *links = board->context;
     struct learned learned;
+    bool told = false;
     learner_init(&learner, board->pipes, links->links_count);
     while (!learner_poll(&learner, &learned)) {
+        tell_of_greeting(&learner, &told);
         idle(links, 50000);
     }
     options->node = learned.self;
     options->dimension = learned.dimension;
     options->host_port =
         learned.self != 0 && links->links_count > learned.dimension;
-    unsigned count = learned.dimension +
-                     (options->node == 0 || options->host_port != 0 ? 1u : 0u);
-    return count == links->links_count;
 }
 
 static struct node_identity identity_of(const struct linux_options *options)
@@ -232,13 +250,8 @@ static int prepare(char **argv, struct linux_options *options,
         linux_wire_inherit(&linux_board->wire[i], options->links[i]);
     }
     fill_in(board, linux_board);
-    if (options->node == LINUX_UNNAMED && !learn(board, options)) {
-        return complain(
-            (struct linux_fault){.where = "--wire",
-                                 .what = "a neighbour takes this node for one "
-                                         "with another number of wires",
-                                 .next = "see incode cube FILE"},
-            2);
+    if (options->node == LINUX_UNNAMED) {
+        learn(board, options);
     }
     board->identity = identity_of(options);
     return 0;

@@ -349,7 +349,8 @@ check 'links/node 0 lost in mid-run' 'no generation was begun for it' \
     test "$(stat_of "$scratch/stats.json" generations)" -gt 1
 end_nodes
 
-# Nodes that nobody has told who they are, the host's neighbour last.
+# Nodes that nobody has told who they are, the host's neighbour last.  The first
+# hears a node of another cube before: it says so, and goes on listening.
 cat > "$scratch/nameless.cube" <<-END
 	dimension = 1;
 	key = "cube.key";
@@ -357,12 +358,26 @@ cat > "$scratch/nameless.cube" <<-END
 	          { node = 1; to = 0; tcp = "127.0.0.1:$((base + 91))"; } );
 END
 nameless=
-while read -r options; do
-    # shellcheck disable=SC2086
-    "$BUILD/"$options 2> "$scratch/said" &
-    nameless="$! $nameless"
-done < <("$INCODE" cube "$scratch/nameless.cube" | grep '^incode-node ' |
-    sed 's/--node [0-9]* //; s/--dimension [0-9]* //' | tac)
+start_nameless() { # NODE
+    # shellcheck disable=SC2046
+    "$BUILD/"$("$INCODE" cube "$scratch/nameless.cube" | grep -e "--node $1 " |
+        sed 's/--node [0-9]* //; s/--dimension [0-9]* //') \
+        2> "$scratch/said.$1" &
+    nameless="$nameless $!"
+}
+start_nameless 1
+"$BUILD/incode-node" --node 0 --dimension 2 --key "$scratch/cube.key" \
+    --wire "0=call:127.0.0.1:$((base + 91))" \
+    --wire "1=listen:127.0.0.1:$((base + 92))" \
+    --wire "2=listen:127.0.0.1:$((base + 93))" 2> /dev/null &
+wrong=$!
+await test -s "$scratch/said.1"
+kill $wrong
+wait $wrong 2> /dev/null
+start_nameless 0
+same 'nodes that learn who they are' --cube "$scratch/nameless.cube"
+check 'links/a wrong greeting is told, once' "$(last "$scratch/said.1")" \
+    test "$(grep -c 'a neighbour takes this node for' "$scratch/said.1")" = 1
 same 'nodes that learn who they are' --cube "$scratch/nameless.cube"
 # shellcheck disable=SC2086
 kill $nameless

@@ -90,6 +90,38 @@ static void a_wire_in_another_socket_teaches_nothing(void **unused)
     destroy(m);
 }
 
+/* A node of a cube of 8 hears a node of a cube of 2 on the same link first: it
+ * passes that over, and hears its own neighbours. */
+static void a_greeting_to_another_is_passed_over(void **unused)
+{
+    struct cube_config c = {.window = 2};
+    struct learner learner;
+    struct learned learned;
+    struct link_pipe pipes[3];
+    (void)unused;
+    struct machine *small = build(1, &c, &perfect, 1);
+    struct machine *m = build(3, &c, &perfect, 1);
+    memcpy(pipes, m->places[5].config.pipes, sizeof pipes);
+    struct link_pipe own = pipes[0];
+    pipes[0] = small->places[1].config.pipes[0];
+    learner_init(&learner, pipes, 3);
+    m->places[5].gone = small->places[1].gone = true;
+    for (unsigned i = 0; learner.misfits < 3; i++) {
+        assert_true(i < 1000);
+        poll_all(small, 500);
+        assert_false(learner_poll(&learner, &learned));
+    }
+    learner.pipes[0] = own;
+    for (unsigned i = 0; !learner_poll(&learner, &learned); i++) {
+        assert_true(i < 1000);
+        poll_all(m, 500);
+    }
+    assert_int_equal(learned.self, 5);
+    assert_int_equal(learned.dimension, 3);
+    destroy(small);
+    destroy(m);
+}
+
 static void noise_teaches_nothing(void **unused)
 {
     struct learner learner;
@@ -121,6 +153,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_cube_learns_from_its_host),
         cmocka_unit_test(a_wire_in_another_socket_teaches_nothing),
+        cmocka_unit_test(a_greeting_to_another_is_passed_over),
         cmocka_unit_test(noise_teaches_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
