@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "check.h"
+#include "secure_wipe.h"
 
 static const uint8_t magic[8] = {'i', 'n', 'c', 'o', 'd', 'e', 's', 2};
 
@@ -67,7 +68,7 @@ static void derive(struct secure_shake *shake)
                        shake->caller ? &caller : &listener, 1);
     shake->suite->hash(shake->keys.in, root,
                        shake->caller ? &listener : &caller, 1);
-    memset(root, 0, sizeof root);
+    secure_wipe(root, sizeof root);
 }
 
 /* The peer's nonce is here: ours is the proof, an empty record. */
@@ -163,7 +164,7 @@ void secure_records_start(struct secure_records *records,
 static int fail(struct secure_records *r)
 {
     r->failed = true;
-    memset(&r->keys, 0, sizeof r->keys);
+    secure_wipe(&r->keys, sizeof r->keys);
     return LINK_PIPE_CLOSED;
 }
 
