@@ -26,12 +26,9 @@
 #define TRANSPORT_SECURE_H
 
 #include "link.h"
+#include "secure_suite.h"
 
 enum {
-    SECURE_KEY_BYTES = 32,
-    SECURE_NONCE_BYTES = 24,
-    SECURE_TAG_BYTES = 16,
-    SECURE_HEAD_BYTES = 8,    /* size, its complement, number */
     SECURE_RECORD_MAX = 2048, /* bytes of the link in a record */
     SECURE_GREETING_BYTES = 32,
     SECURE_PROOF_BYTES = SECURE_HEAD_BYTES + SECURE_TAG_BYTES,
@@ -39,21 +36,6 @@ enum {
     SECURE_WIRE_MAX = SECURE_HEAD_BYTES + SECURE_RECORD_MAX + SECURE_TAG_BYTES,
     SECURE_AHEAD_MAX = 65536, /* records that may be lost in a row */
     SECURE_LOST_MAX = 262144
-};
-
-/* `size` bytes in, size + SECURE_TAG_BYTES out, or the other way round; in and
- * out may be the same.  The nonce is 4 zero bytes and the counter, little-
- * endian; ad: the record's head. */
-struct secure_suite {
-    void (*hash)(uint8_t out[SECURE_KEY_BYTES],
-                 const uint8_t key[SECURE_KEY_BYTES], const uint8_t *in,
-                 size_t size);
-    void (*seal)(uint8_t *out, const uint8_t *in, size_t size,
-                 const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
-                 const uint8_t key[SECURE_KEY_BYTES]);
-    bool (*open)(uint8_t *out, const uint8_t *in, size_t size,
-                 const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
-                 const uint8_t key[SECURE_KEY_BYTES]);
 };
 
 struct secure_keys {

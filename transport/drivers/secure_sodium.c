@@ -2,6 +2,7 @@
 
 #include <sodium.h>
 #include <string.h>
+#include <sys/random.h>
 
 static void hash(uint8_t out[SECURE_KEY_BYTES],
                  const uint8_t key[SECURE_KEY_BYTES], const uint8_t *in,
@@ -9,6 +10,17 @@ static void hash(uint8_t out[SECURE_KEY_BYTES],
 {
     (void)crypto_generichash_blake2b(out, SECURE_KEY_BYTES, in, size, key,
                                      SECURE_KEY_BYTES);
+}
+
+/* libsodium tells a point of a small order by its status, and may leave `out`
+ * as it was. */
+static void x25519(uint8_t out[SECURE_KEY_BYTES],
+                   const uint8_t secret[SECURE_KEY_BYTES],
+                   const uint8_t point[SECURE_KEY_BYTES])
+{
+    if (crypto_scalarmult_curve25519(out, secret, point) != 0) {
+        memset(out, 0, SECURE_KEY_BYTES);
+    }
 }
 
 static void make_nonce(uint8_t nonce[12], uint64_t counter)
@@ -40,4 +52,11 @@ static bool open(uint8_t *out, const uint8_t *in, size_t size,
                SECURE_HEAD_BYTES, nonce, key) == 0;
 }
 
-const struct secure_suite secure_sodium = {hash, seal, open};
+const struct secure_suite secure_sodium = {
+    .hash = hash, .x25519 = x25519, .seal = seal, .open = open};
+
+bool secure_system_random(void *context, uint8_t *bytes, size_t size)
+{
+    (void)context;
+    return getrandom(bytes, size, 0) == (ssize_t)size;
+}

@@ -1,4 +1,5 @@
-/* The primitives of secure.h from libsodium.
+/* The primitives of secure_suite.h from libsodium, and the system's random
+ * bytes.
  *
  * Memory: none.  Work: libsodium's; no allocation, no start-up call.
  *
@@ -10,5 +11,8 @@
 #include "transport/secure.h"
 
 extern const struct secure_suite secure_sodium;
+
+/* As secure_source wants it; context: NULL. */
+bool secure_system_random(void *context, uint8_t *bytes, size_t size);
 
 #endif
