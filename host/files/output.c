@@ -2,7 +2,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
@@ -14,17 +13,21 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { BUFFER_BYTES = 1 << 20, LINKS_MAX = 40 };
+#include "target.h"
 
-/* A file beside the one that it will be.  What is there already has a second
- * name while names change. */
+enum { BUFFER_BYTES = 1 << 20 };
+
+/* A file beside the one that it will be.  While names change, it has a second
+ * one, `made`, by which others know whose it is; what was there already has
+ * `kept`. */
 struct host_part {
     struct host_part *next;
     char *path;   /* as the user gave it */
     char *target; /* what it is in the end, links followed */
-    char *name, *kept;
-    bool named;      /* it has its name */
-    bool was, keeps; /* something was there; that has its second name */
+    char *name, *made, *kept;
+    struct stat file;
+    bool marked, named; /* it has its second name; it has its own */
+    bool was, keeps;    /* something was there; that has its second name */
 };
 
 /* Those whose outputs are not done: what a signal has to remove. */
@@ -101,61 +104,25 @@ static char *name_beside(const char *target, const char *what, pid_t writer)
                                                                         : name;
 }
 
-/* Where the link `path` leads, from where it is. */
-static char *next_of(const char *path)
-{
-    char to[PATH_MAX], *next = NULL;
-    ssize_t n = readlink(path, to, sizeof to - 1);
-    if (n < 0) {
-        return NULL;
-    }
-    to[n] = '\0';
-    const char *slash = strrchr(path, '/');
-    int from = slash == NULL || to[0] == '/' ? 0 : (int)(slash + 1 - path);
-    return asprintf(&next, "%.*s%s", from, path, to) < 0 ? NULL : next;
-}
-
-char *host_output_target(const char *path)
-{
-    char *at = strdup(path);
-    for (int links = 0; at != NULL && links < LINKS_MAX; links++) {
-        char *end = realpath(at, NULL);
-        char *next = end == NULL && errno == ENOENT ? next_of(at) : NULL;
-        if (end == NULL && next == NULL &&
-            (errno == ENOENT || errno == EINVAL)) {
-            return at; /* it is not there yet */
-        }
-        free(at);
-        if (next == NULL) {
-            return end;
-        }
-        at = next;
-    }
-    free(at);
-    errno = ELOOP;
-    return NULL;
-}
-
-void host_output_clean(const char *path, pid_t writer, uint64_t since_ns)
+void host_output_clean(const char *path, pid_t writer)
 {
     struct stat status;
-    char *target = host_output_target(path);
+    char *target = host_target(path);
     char *name = target == NULL ? NULL : name_beside(target, "part", writer);
     char *kept = target == NULL ? NULL : name_beside(target, "kept", writer);
-    if (name != NULL && kept != NULL) {
+    char *made = target == NULL ? NULL : name_beside(target, "made", writer);
+    if (name != NULL && kept != NULL && made != NULL) {
         (void)unlink(name);
-        bool back = rename(kept, target) == 0;
-        (void)unlink(kept); /* where both are names of one file */
-        /* A change of name counts as one of the file. */
-        if (!back && stat(target, &status) == 0 && S_ISREG(status.st_mode) &&
-            (uint64_t)status.st_ctim.tv_sec * 1000000000 +
-                    (uint64_t)status.st_ctim.tv_nsec >=
-                since_ns) {
+        if (lstat(made, &status) == 0 && host_is_file(&status, target) &&
+            rename(kept, target) != 0) {
             (void)unlink(target);
         }
+        (void)unlink(kept);
+        (void)unlink(made);
     }
     free(name);
     free(kept);
+    free(made);
     free(target);
 }
 
@@ -167,6 +134,7 @@ static void free_part(struct host_part *part)
         free(part->path);
         free(part->target);
         free(part->name);
+        free(part->made);
         free(part->kept);
         free(part);
     }
@@ -183,8 +151,10 @@ static struct host_part *make_part(const char *path, char *target)
     part->path = strdup(path);
     part->target = target;
     part->name = name_beside(target, "part", getpid());
+    part->made = name_beside(target, "made", getpid());
     part->kept = name_beside(target, "kept", getpid());
-    if (part->path == NULL || part->name == NULL || part->kept == NULL) {
+    if (part->path == NULL || part->name == NULL || part->made == NULL ||
+        part->kept == NULL) {
         free_part(part);
         return NULL;
     }
@@ -213,6 +183,9 @@ static int open_part(struct host_part *part)
         file = open(part->name, flags, 0666);
     }
     int reason = errno;
+    if (file >= 0) {
+        (void)fstat(file, &part->file);
+    }
     if (file >= 0 && parts == NULL) {
         parts = part;
     } else if (file >= 0) {
@@ -279,7 +252,7 @@ static int open_file(struct host_output *out, struct host_error *error)
     if (there && access(out->path, W_OK) != 0) {
         return cannot_make(out->path, errno, error);
     }
-    char *target = host_output_target(out->path);
+    char *target = host_target(out->path);
     if (target == NULL) {
         return cannot_make(out->path, errno, error);
     }
@@ -426,30 +399,46 @@ int host_output_close(struct host_output *out, size_t n,
     return error->code;
 }
 
+/* A second name, which one that was left there does not hinder. */
+static bool name_also(const char *name, const char *other)
+{
+    return link(name, other) == 0 ||
+           (errno == EEXIST && unlink(other) == 0 && link(name, other) == 0);
+}
+
 /* Gives the part its name, and what is there a second one, so that it can have
  * its own back. */
 static bool name_part(struct host_part *part)
 {
-    part->keeps = link(part->target, part->kept) == 0 ||
-                  (errno == EEXIST && unlink(part->kept) == 0 &&
-                   link(part->target, part->kept) == 0);
+    part->keeps = name_also(part->target, part->kept);
     part->was = part->keeps || errno != ENOENT;
+    part->marked = name_also(part->name, part->made);
     part->named = rename(part->name, part->target) == 0;
     return part->named;
 }
 
-/* The path of an output whose former file could not be kept; NULL: none. */
+static void forget_names(const struct host_part *part)
+{
+    if (part->marked) {
+        (void)unlink(part->made);
+    }
+    if (part->keeps) {
+        (void)unlink(part->kept);
+    }
+}
+
+/* The path of an output whose former file could not be kept; NULL: none.  A
+ * file that somebody else has put there meanwhile stays. */
 static const char *take_names_back(void)
 {
     const char *lost = NULL;
     for (struct host_part *part = parts; part != NULL; part = part->next) {
-        if (part->named &&
+        if (part->named && host_is_file(&part->file, part->target) &&
             !(part->keeps && rename(part->kept, part->target) == 0)) {
             (void)unlink(part->target);
             lost = part->was && lost == NULL ? part->path : lost;
-        } else if (part->keeps && !part->named) {
-            (void)unlink(part->kept);
         }
+        forget_names(part);
     }
     return lost;
 }
@@ -475,9 +464,7 @@ static int name_all(struct host_error *error)
     while (parts != NULL) {
         part = parts;
         parts = part->next;
-        if (part->keeps) {
-            (void)unlink(part->kept);
-        }
+        forget_names(part);
         free_part(part);
     }
     return 0;

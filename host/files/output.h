@@ -39,13 +39,10 @@ struct host_output {
  * (a pipe without a reader, a file beyond the limit).  Once, at the start. */
 void host_output_guard(void);
 
-/* What `path` is in the end, links followed, also those that lead to where
- * nothing is yet.  To be freed; NULL with errno where that cannot be said. */
-char *host_output_target(const char *path);
-
 /* Removes what a process that was ended has left of this output: its part, and
- * the whole where it is no older than since_ns of the clock. */
-void host_output_clean(const char *path, pid_t writer, uint64_t since_ns);
+ * the whole where it had its name already; what was there before has it back.
+ * A file that is not that process's stays as it is. */
+void host_output_clean(const char *path, pid_t writer);
 
 /* "-" is standard output; what is there and is no plain file (a device, a
  * pipe) is written in place.  HOST_INPUT where no file can be made, or

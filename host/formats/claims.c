@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "host/files/output.h"
+#include "host/files/target.h"
 #include "write.h"
 
 struct host_claim {
@@ -96,7 +96,7 @@ static int claim(struct host_claims *claims, struct host_claim new,
     *c = new;
     claims->count++;
     c->name = strdup(name);
-    c->target = host_output_target(name);
+    c->target = c->input ? strdup(name) : host_target(name);
     if (c->target == NULL && errno != ENOMEM) {
         c->target = strdup(name);
     }

@@ -13,7 +13,6 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "host/base/clock.h"
@@ -535,13 +534,6 @@ static int explain(const struct launch *l, unsigned nodes, int status,
                      words[0] == '\0' ? "" : ": ", words);
 }
 
-static uint64_t real_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME_COARSE, &now); /* as files have it */
-    return (uint64_t)now.tv_sec * 1000000000 + (uint64_t)now.tv_nsec;
-}
-
 int host_launch_mpi(char **argv, const struct host_run_options *options,
                     struct host_error *error)
 {
@@ -549,7 +541,6 @@ int host_launch_mpi(char **argv, const struct host_run_options *options,
     struct launch *l = &launch;
     struct sigaction action = {.sa_handler = catch}, before[2];
     unsigned nodes = host_run_nodes(options);
-    uint64_t since_ns = real_ns();
     bool input = options->input != NULL && strcmp(options->input, "-") == 0;
     if (listen_for_host(l, error) != 0) {
         return error->code;
@@ -562,7 +553,7 @@ int host_launch_mpi(char **argv, const struct host_run_options *options,
     int status = watch(l, input);
     bool whole = l->reported && l->report.lost == 0 && !l->report.ended;
     if (!whole && l->host_pid != 0) {
-        host_run_clean(options, l->host_pid, since_ns);
+        host_run_clean(options, l->host_pid);
     }
     if (caught != 0 && !(whole && l->report.status == 0)) {
         (void)sigaction(SIGINT, &before[0], NULL);

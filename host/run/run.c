@@ -327,8 +327,7 @@ static int report(const struct host_run_options *options,
     return file == stdout ? host_output_printed(error) : 0;
 }
 
-void host_run_clean(const struct host_run_options *options, pid_t writer,
-                    uint64_t since_ns)
+void host_run_clean(const struct host_run_options *options, pid_t writer)
 {
     char name[HOST_PATH_MAX];
     const char *file;
@@ -337,11 +336,11 @@ void host_run_clean(const struct host_run_options *options, pid_t writer,
              (file = host_write_file(options->output[i], k, name,
                                      sizeof name)) != NULL;
              k++) {
-            host_output_clean(file, writer, since_ns);
+            host_output_clean(file, writer);
         }
     }
     if (options->stats != NULL) {
-        host_output_clean(options->stats, writer, since_ns);
+        host_output_clean(options->stats, writer);
     }
 }
 

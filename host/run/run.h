@@ -88,10 +88,9 @@ void host_run_defaults(struct host_run_options *options);
 /* How many nodes the cube gets. */
 unsigned host_run_nodes(const struct host_run_options *options);
 
-/* Removes what process `writer`, which was ended in a run that began at
- * `since_ns` of the clock, has left of the outputs. */
-void host_run_clean(const struct host_run_options *options, pid_t writer,
-                    uint64_t since_ns);
+/* Removes what process `writer`, which was ended in its run, has left of the
+ * outputs. */
+void host_run_clean(const struct host_run_options *options, pid_t writer);
 
 /* Triangulates points: tets become rows of points, in no order. */
 int host_triangulate(const struct host_run_options *options,

@@ -215,6 +215,30 @@ else
     skip "$name" 'another user cannot reach the program here'
 fi
 
+# A link that the system does not follow is not followed, whether something is
+# where it leads or not: here on a mount that follows none.
+unfollowed() { # COMMAND...
+    # shellcheck disable=SC2016
+    unshare ${user:+"$user"} -m bash -c 'cd "$0" &&
+        mount -t tmpfs -o nosymfollow none . && cd "$0" && echo kept > there &&
+        ln -s there a.npy && ln -s absent b.npy && ! cat a.npy || exit 99
+        "$@" 2>&7
+        status=$?
+        [ "$(cat there)" = kept ] && [ ! -e absent ] && exit $status' \
+        "$left" "$@" 7>&2 2> /dev/null
+}
+name='errors/an output through a link that the system does not follow'
+mkdir -p "$left"
+if unfollowed true; then
+    for link in a b; do
+        refuses "$name, $link" 3 "$link.npy: cannot be written .*symbolic" \
+            unfollowed "$(realpath "$INCODE")" run "$good" -q --nodes 2 \
+            -o $link.npy
+    done
+else
+    skip "$name" 'no right to mount here, or no such mount'
+fi
+
 # A disk of 64 KiB; what is left on it is listed before it goes.
 full_disk() {
     unshare ${1:+"$1"} -m bash -c "

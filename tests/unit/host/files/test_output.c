@@ -24,10 +24,19 @@
 
 enum { OUTPUTS = 4 };
 
+static void put(const char *name, const char *text)
+{
+    FILE *file = fopen(name, "w");
+    assert_non_null(file);
+    assert_true(fputs(text, file) >= 0);
+    assert_int_equal(fclose(file), 0);
+}
+
 /* What the host calls in the place of the C library's. */
 static bool no_links;
 static int
     raise_at; /* the change of a name that a signal comes with; 0: none */
+static const char *taken_over; /* a name that another file has soon after */
 
 int link(const char *from, const char *to)
 {
@@ -42,6 +51,11 @@ int rename(const char *from, const char *to)
 {
     if (raise_at > 0 && --raise_at == 0) {
         (void)raise(SIGTERM);
+    }
+    if (taken_over != NULL && strcmp(to, taken_over) != 0) {
+        (void)unlink(taken_over);
+        put(taken_over, "of somebody else");
+        taken_over = NULL;
     }
     return (int)syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0);
 }
@@ -73,14 +87,6 @@ static unsigned files(void)
     }
     (void)closedir(all);
     return count;
-}
-
-static void put(const char *name, const char *text)
-{
-    FILE *file = fopen(name, "w");
-    assert_non_null(file);
-    assert_true(fputs(text, file) >= 0);
-    assert_int_equal(fclose(file), 0);
 }
 
 /* Takes the file away, whose text this is. */
@@ -313,27 +319,77 @@ static void links_to_what_is_not_yet_are_followed(void **unused)
 }
 
 /* Of a lost process, from outside. */
+static const pid_t lost = 4194305; /* no process has it */
+
+/* What it left of `name` once that had the name, beside what `former` was. */
+static void leave_whole(const char *name, const char *former)
+{
+    put(name, "new");
+    assert_int_equal(link(name, beside(name, "made", lost)), 0);
+    if (former != NULL) {
+        put(beside(name, "kept", lost), former);
+    }
+}
+
 static void cleaning_takes_no_more_than_was_made(void **unused)
 {
     (void)unused;
-    const pid_t writer = 4194305; /* no process has it */
     assert_int_equal(mkdir("sub", 0777), 0);
     assert_int_equal(symlink("sub/file", "link"), 0);
     assert_int_equal(mkfifo("pipe", 0666), 0);
-    put("sub/file", "new");
-    put(beside("sub/file", "part", writer), "part");
-    host_output_clean("link", writer, 0);
-    host_output_clean("pipe", writer, 0);
+    leave_whole("sub/file", NULL);
+    put(beside("sub/file", "part", lost), "part");
+    host_output_clean("link", lost);
+    host_output_clean("pipe", lost);
     assert_int_equal(rmdir("sub"), 0); /* it is empty */
     assert_int_equal(unlink("link"), 0);
     assert_int_equal(unlink("pipe"), 0);
-    /* ended while names changed, and before */
-    put("file", "new");
-    put(beside("file", "kept", writer), "former");
-    host_output_clean("file", writer, 0);
+    /* ended while names changed: after, and before this one had its own */
+    leave_whole("file", "former");
+    host_output_clean("file", lost);
     assert_int_equal(files(), 1);
-    host_output_clean("file", writer, UINT64_MAX);
+    put(beside("file", "part", lost), "part");
+    assert_int_equal(link(beside("file", "part", lost), "other"), 0);
+    assert_int_equal(rename("other", beside("file", "made", lost)), 0);
+    assert_int_equal(link("file", beside("file", "kept", lost)), 0);
+    host_output_clean("file", lost);
+    assert_int_equal(files(), 1);
     take("file", "former");
+}
+
+/* Changed, or put there anew, while a run went on that failed. */
+static void cleaning_leaves_the_files_of_others(void **unused)
+{
+    (void)unused;
+    put("file", "former");
+    assert_int_equal(chmod("file", 0600), 0);
+    put(beside("file", "part", lost), "part");
+    host_output_clean("file", lost);
+    assert_int_equal(files(), 1);
+    take("file", "former");
+    leave_whole("file", "former");
+    assert_int_equal(unlink("file"), 0);
+    put("file", "of somebody else");
+    host_output_clean("file", lost);
+    assert_int_equal(files(), 1);
+    take("file", "of somebody else");
+}
+
+/* Nor does the process itself take more back than it has put there. */
+static void a_name_taken_over_is_left(void **unused)
+{
+    (void)unused;
+    struct host_output out[OUTPUTS];
+    struct host_error error = {0};
+    open_all(out, &error);
+    assert_int_equal(host_output_close(out, OUTPUTS, &error), 0);
+    taken_over = names[0];
+    assert_int_equal(mkdir(names[2], 0777), 0);
+    assert_int_equal(host_output_commit(&error), HOST_INPUT);
+    assert_null(taken_over);
+    assert_int_equal(rmdir(names[2]), 0);
+    assert_int_equal(files(), 1);
+    take(names[0], "of somebody else");
 }
 
 static void a_limit_is_an_error(void **unused)
@@ -371,6 +427,8 @@ int main(void)
         cmocka_unit_test(what_a_killed_process_left_is_no_hindrance),
         cmocka_unit_test(links_to_what_is_not_yet_are_followed),
         cmocka_unit_test(cleaning_takes_no_more_than_was_made),
+        cmocka_unit_test(cleaning_leaves_the_files_of_others),
+        cmocka_unit_test(a_name_taken_over_is_left),
         cmocka_unit_test(a_limit_is_an_error),
     };
     return cmocka_run_group_tests(tests, enter, leave);
