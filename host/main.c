@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "host/base/parse.h"
+#include "host/base/text.h"
 #include "host/bench/bench_links.h"
 #include "host/bench/bench_paper.h"
 #include "host/check/verify.h"
@@ -169,11 +170,12 @@ static int command_verify(int argc, char **argv, struct host_error *error)
         }
     }
     if (status == 0) {
-        printf("%s: %llu tetrahedra, %llu hull facets: the Delaunay "
-               "triangulation of %llu distinct points of %s\n",
-               s.argument[1], (unsigned long long)report.tetrahedra,
-               (unsigned long long)report.hull_facets,
-               (unsigned long long)report.distinct, s.argument[0]);
+        host_say(stdout,
+                 "%s: %llu tetrahedra, %llu hull facets: the Delaunay "
+                 "triangulation of %llu distinct points of %s\n",
+                 s.argument[1], (unsigned long long)report.tetrahedra,
+                 (unsigned long long)report.hull_facets,
+                 (unsigned long long)report.distinct, s.argument[0]);
     }
     host_points_free(&points);
     host_tetrahedra_free(&tets);

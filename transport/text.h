@@ -6,6 +6,7 @@
  *     struct cube_text text = cube_text_in(room, sizeof room);
  *     cube_text_put(&text, "node ");
  *     cube_text_number(&text, 5);
+ *     cube_text_printable(&text, "of \x1b[2J");
  */
 #ifndef TRANSPORT_TEXT_H
 #define TRANSPORT_TEXT_H
@@ -24,5 +25,15 @@ struct cube_text cube_text_in(char *data, size_t bytes_max);
 /* Appends as much as there is room for. */
 void cube_text_put(struct cube_text *text, const char *words);
 void cube_text_number(struct cube_text *text, uint32_t number);
+
+/* The same, of words that come from elsewhere: a name, a file, a peer.  What a
+ * terminal would obey instead of showing - controls, marks that turn the
+ * direction of writing, whatever is not UTF-8 - becomes \xNN, byte by byte; the
+ * rest stays, so that what is printable already is left alone.  Ends before
+ * the first character that does not fit whole. */
+void cube_text_printable(struct cube_text *text, const char *words);
+
+/* Bytes of the first of `words` that is shown as it is; 0: it is not. */
+size_t cube_text_shown(const char *words);
 
 #endif

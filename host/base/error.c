@@ -3,21 +3,21 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+#include "text.h"
+
 int host_fail(struct host_error *error, int code, const char *format, ...)
 {
     if (error->code != 0) {
         return error->code;
     }
+    char raw[sizeof error->text];
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(error->text, sizeof error->text, format, arguments);
+    (void)vsnprintf(raw, sizeof raw, format, arguments);
     va_end(arguments);
     error->code = code;
-    for (char *c = error->text; *c != '\0'; c++) {
-        if ((unsigned char)*c < 0x20 || *c == 0x7f) {
-            *c = '?'; /* one line, whatever a file name or token holds */
-        }
-    }
+    /* One line, whatever a name, a token or a node's fault holds. */
+    host_text_printable(error->text, sizeof error->text, raw);
     return code;
 }
 

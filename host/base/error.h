@@ -23,7 +23,7 @@ enum host_code {
 
 struct host_error {
     int code;       /* enum host_code */
-    char text[640]; /* "WHERE: WHAT; WHAT TO DO NEXT", no newline */
+    char text[640]; /* "WHERE: WHAT; WHAT TO DO NEXT", one printable line */
 };
 
 /* Fills *error (the first one stands; later ones are dropped) and returns its

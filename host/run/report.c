@@ -3,6 +3,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "host/base/text.h"
 #include "host/order/names.h"
 #include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
@@ -126,9 +127,10 @@ void host_report_run(FILE *file, const struct host_run_options *options,
                      const struct host_run_result *alone)
 {
     const struct host_run_result *r = result;
-    fprintf(file, "%s: %llu %spoints, %llu tetrahedra, %s\n", options->input,
-            (unsigned long long)r->points, r->duplicates > 0 ? "distinct " : "",
-            (unsigned long long)r->tetrahedra, r->digest.text);
+    host_say(file, "%s: %llu %spoints, %llu tetrahedra, %s\n", options->input,
+             (unsigned long long)r->points,
+             r->duplicates > 0 ? "distinct " : "",
+             (unsigned long long)r->tetrahedra, r->digest.text);
     if (r->duplicates > 0) {
         fprintf(file,
                 "%llu of %llu points are duplicates; each stands for its "

@@ -58,6 +58,22 @@ wrong 'no gzip' 'notgzip.xyz.gz' "$in/notgzip.xyz.gz"
 wrong 'unknown input format' 'points.dat' "$in/points.dat"
 wrong 'empty standard input' 'standard input|stdin|-' - < /dev/null
 
+# What a terminal would obey is printed as \xNN: in names, in what files hold.
+plainly() { # NAME COMMAND...: nothing but printable lines, \x1b among them
+    "${@:2}" > "$scratch/said" 2>&1 < /dev/null
+    check "errors/printable: $1" "$(head -c 300 "$scratch/said" | od -c)" \
+        eval 'LC_ALL=C grep -qF "\x1b" "$scratch/said" &&
+            ! LC_ALL=C grep -q "[^ -~]" "$scratch/said"'
+}
+escape=$(printf '\033[31mred')
+cp "$good" "$in/$escape.xyz"
+printf '0 0 0\n1 0 %s\n' "$escape" > "$in/token.xyz"
+plainly 'a token of a file' run "$in/token.xyz" -q
+plainly 'a file that is not there' run "$in/absent$escape.xyz" -q
+plainly 'the report' run "$in/$escape.xyz" --nodes 2
+plainly 'a command' incode "$escape"
+plainly 'an argument of a node' "$BUILD/incode-node" --wire "0=$escape"
+
 # --- nothing is written over what is read, nor twice --------------------------
 
 # spares NAME PATTERN FILE COMMAND...: refused, and FILE is what it was.

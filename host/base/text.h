@@ -1,0 +1,33 @@
+/* Texts that come from elsewhere - names of files, nodes and devices, what a
+ * file or a peer says - on their way to a terminal and to a shell.
+ *
+ * Memory: the caller's; HOST_SAY_BYTES of stack to say something.  Work: one
+ * pass.
+ *
+ *     char line[80];
+ *     host_text_printable(line, sizeof line, "node \x1b[2J");
+ *     if (host_text_quote(line, sizeof line, "a b; c") != 0) return -1;
+ *     host_say(stderr, "incode: %s: %u bytes\n", "a\nb", n);
+ */
+#ifndef HOST_TEXT_H
+#define HOST_TEXT_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+enum { HOST_SAY_BYTES = 4096 };
+
+/* What a terminal would obey becomes \xNN (cube_text_printable); as much of it
+ * as fits into `size` bytes, at least 1, the final 0 included. */
+void host_text_printable(char *out, size_t size, const char *text);
+
+/* One word for a POSIX shell, quoted where it has to be, which stands for
+ * `text` byte by byte and is printable but for line feeds.  0, or -1 where it
+ * does not fit: out is empty then, as half a word would be another. */
+int host_text_quote(char *out, size_t size, const char *text);
+
+/* Prints a line, made printable; a line feed at the end of `format` stays. */
+void host_say(FILE *stream, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+
+#endif
