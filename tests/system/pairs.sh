@@ -9,7 +9,7 @@
 need_data pairs
 naive_max=${NAIVE_MAX:-5000}
 grid_max=${GRID_MAX:-10000}
-kd_max=${KD_MAX:-20000}
+kd_max=${KD_MAX:-10000}
 
 rows='
 sequential grid 1 1M 1

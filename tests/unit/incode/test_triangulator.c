@@ -48,7 +48,8 @@ static void reference_digest(const struct host_points *points,
     host_tetrahedra_free(&tets);
 }
 
-/* Every index, region count, partition and rule, the rest drawn from a seed. */
+/* Every index, region count, partition and rule, the rest drawn from a seed.
+ * Under the sanitizers one of the four pairs of partition and rule. */
 static void expect_all(const struct host_points *points, const char *digest,
                        const char *name, bool few)
 {
@@ -56,7 +57,8 @@ static void expect_all(const struct host_points *points, const char *digest,
     uint64_t seed = 1;
     for (unsigned i = 0; i < 3; i++) {
         for (unsigned j = 0; j < (few ? 2 : 4); j++) {
-            for (unsigned k = 0; k < 4; k++) {
+            for (unsigned k = SANITIZED ? (i + j) % 4 : 0; k < 4;
+                 k += SANITIZED ? 4 : 1) {
                 seed = seed * UINT64_C(6364136223846793005) + 1442695040888963;
                 struct solo s = {
                     .index = (uint8_t)i,
@@ -216,7 +218,7 @@ static void mixed_scales(void **unused)
 {
     (void)unused;
     uint64_t seed = 11;
-    for (int round = 0; round < (SANITIZED ? 6 : 60); round++) {
+    for (int round = 0; round < (SANITIZED ? 6 : 30); round++) {
         struct host_points points = {0};
         struct host_error error = {0};
         struct host_digest digest;
