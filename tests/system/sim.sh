@@ -6,7 +6,7 @@
 # SIM_SEEDS=only: nothing else is tried.
 SECONDS_MAX=3600
 . tests/system/lib.sh
-seconds=${SIM_SECONDS:-40}
+seconds=${SIM_SECONDS:-25}
 first=${SIM_FIRST:-1}
 said=$scratch/said
 

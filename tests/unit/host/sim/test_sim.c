@@ -17,7 +17,7 @@
 #include "host/sim/sim.h"
 #include "tests/unit/emulated.h"
 
-enum { STRIDE = 11, STRIDE_SANITIZED = 29, STRIDE_EMULATED = 97 };
+enum { STRIDE = 11, STRIDE_SANITIZED = 61, STRIDE_EMULATED = 97 };
 
 static uint64_t stride(void)
 {

@@ -12,6 +12,7 @@
 
 #include "host/mesh/gen.h"
 #include "incode/maker/maker.h"
+#include "tests/unit/emulated.h"
 #include "tests/unit/incode/oracle.h"
 #include "tests/unit/incode/solo.h"
 #include "tests/unit/reference.h"
@@ -240,7 +241,8 @@ static void real_sets(void **unused)
         }
         for (uint64_t k = 0; k < 2; k++)
             answer_set(&points, cases[i].index, k * (i + 1),
-                       k == 0 ? 1000 : INCODE_FRAMES_MIN, cases[i].every);
+                       k == 0 ? 1000 : INCODE_FRAMES_MIN,
+                       (SANITIZED ? 5 : 1) * cases[i].every);
         host_points_free(&points);
     }
 }
