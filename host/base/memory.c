@@ -1,6 +1,8 @@
 #include "memory.h"
 
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 
@@ -77,21 +79,141 @@ void host_unmap(void *array, size_t bytes)
     }
 }
 
+/* The number behind `name` on a line of a file that begins with it, or of the
+ * first line where it is ""; `without` where there is none. */
+static uint64_t number_in(const char *path, const char *name, uint64_t without)
+{
+    char line[256], *end;
+    uint64_t value = without;
+    size_t n = strlen(name);
+    FILE *file = fopen(path, "re");
+    while (file != NULL && value == without &&
+           fgets(line, sizeof line, file) != NULL) {
+        if (strncmp(line, name, n) == 0) {
+            unsigned long long number = strtoull(line + n, &end, 10);
+            value = end == line + n ? without : number;
+        }
+    }
+    if (file != NULL) {
+        (void)fclose(file);
+    }
+    return value;
+}
+
+static uint64_t status_bytes(const char *name)
+{
+    uint64_t kib = number_in("/proc/self/status", name, 0);
+    return kib * 1024;
+}
+
 uint64_t host_memory_peak(void)
 {
-    char line[128];
-    unsigned long long kib = 0;
+    uint64_t bytes = status_bytes("VmHWM:");
     struct rusage usage;
-    FILE *status = fopen("/proc/self/status", "re");
-    while (status != NULL && kib == 0 &&
-           fgets(line, sizeof line, status) != NULL) {
-        (void)sscanf(line, "VmHWM: %llu kB", &kib);
+    if (bytes == 0 && getrusage(RUSAGE_SELF, &usage) == 0) {
+        bytes = (uint64_t)usage.ru_maxrss * 1024; /* survives exec */
     }
-    if (status != NULL) {
-        (void)fclose(status);
+    return bytes;
+}
+
+/* --- what is left --------------------------------------------------------- */
+
+static uint64_t least(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* What a limit leaves, of which some is in use that can be had back. */
+static uint64_t left_of(uint64_t limit, uint64_t used, uint64_t reclaimable)
+{
+    used -= least(used, reclaimable);
+    return limit - least(limit, used);
+}
+
+/* The files of a group, as one version of the controller names them. */
+struct controller {
+    const char *folder, *limit, *used, *reclaimable;
+};
+
+static uint64_t left_in_group(const char *directory, const struct controller *c)
+{
+    char name[4096 + 64];
+    (void)snprintf(name, sizeof name, "%s/%s", directory, c->limit);
+    uint64_t limit = number_in(name, "", UINT64_MAX); /* may be "max" */
+    if (limit == UINT64_MAX) {
+        return limit;
     }
-    if (kib == 0 && getrusage(RUSAGE_SELF, &usage) == 0) {
-        kib = (unsigned long long)usage.ru_maxrss; /* survives exec */
+    (void)snprintf(name, sizeof name, "%s/%s", directory, c->used);
+    uint64_t used = number_in(name, "", 0);
+    (void)snprintf(name, sizeof name, "%s/memory.stat", directory);
+    return left_of(limit, used, number_in(name, c->reclaimable, 0));
+}
+
+/* In the group `path` and all above it.  A container may see none but the
+ * uppermost, which is its own. */
+static uint64_t left_above(const char *mount, const char *path,
+                           const struct controller *c)
+{
+    char directory[4096];
+    uint64_t left = UINT64_MAX;
+    size_t root = strlen(mount) + strlen(c->folder);
+    int n =
+        snprintf(directory, sizeof directory, "%s%s%s", mount, c->folder, path);
+    if (n < 0 || (size_t)n >= sizeof directory) {
+        return left;
     }
-    return kib * 1024;
+    for (char *end = directory + n; end != NULL;) {
+        *end = '\0';
+        left = least(left, left_in_group(directory, c));
+        end = strrchr(directory + root, '/');
+    }
+    return left;
+}
+
+uint64_t host_memory_in_groups(const char *list, const char *mount)
+{
+    static const struct controller first = {"/memory", "memory.limit_in_bytes",
+                                            "memory.usage_in_bytes",
+                                            "total_inactive_file "},
+                                   second = {"", "memory.max", "memory.current",
+                                             "inactive_file "};
+    char line[4096];
+    uint64_t left = UINT64_MAX;
+    FILE *file = fopen(list, "re");
+    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+        char *names = strchr(line, ':');
+        char *path = names == NULL ? NULL : strchr(names + 1, ':');
+        if (path == NULL) {
+            continue;
+        }
+        *path++ = '\0';
+        path[strcspn(path, "\n")] = '\0';
+        if (names[1] == '\0') {
+            left = least(left, left_above(mount, path, &second));
+        } else if (strcmp(names + 1, "memory") == 0) {
+            left = least(left, left_above(mount, path, &first));
+        }
+    }
+    if (file != NULL) {
+        (void)fclose(file);
+    }
+    return left;
+}
+
+static uint64_t left_by_limit(int resource, const char *used)
+{
+    struct rlimit limit;
+    return getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY
+               ? UINT64_MAX
+               : left_of(limit.rlim_cur, status_bytes(used), 0);
+}
+
+uint64_t host_memory_available(void)
+{
+    uint64_t kib = number_in("/proc/meminfo", "MemAvailable:", UINT64_MAX);
+    uint64_t left = kib == UINT64_MAX ? kib : kib * 1024;
+    left = least(left,
+                 host_memory_in_groups("/proc/self/cgroup", "/sys/fs/cgroup"));
+    left = least(left, left_by_limit(RLIMIT_AS, "VmSize:"));
+    return least(left, left_by_limit(RLIMIT_DATA, "VmData:"));
 }

@@ -1,5 +1,5 @@
 /* Large arrays straight from the kernel: zeroed, on huge pages where there are
- * any, grown without a copy, given back at once.
+ * any, grown without a copy, given back at once; and how much is left.
  *
  * Memory: what is touched, rounded up to 4 KiB.  Work: the kernel's.
  *
@@ -25,5 +25,17 @@ void host_unmap(void *array, size_t bytes);
 /* The most bytes of memory that this program ever had: its own, not those of
  * the process that became it. */
 uint64_t host_memory_peak(void);
+
+/* Bytes that this program can still take without swapping: the least of what
+ * the kernel holds available on this machine, what the control groups of this
+ * process leave, and what its limits (ulimit -v, -d) leave.  What does not say
+ * anything, limits nothing. */
+uint64_t host_memory_available(void);
+
+/* What the memory controllers of both versions leave to the groups in `list`
+ * (as /proc/self/cgroup has them) and to those above them, which are mounted at
+ * `mount`; the cache of files that nobody uses counts as free.  UINT64_MAX: no
+ * limit. */
+uint64_t host_memory_in_groups(const char *list, const char *mount);
 
 #endif

@@ -22,20 +22,66 @@ int host_source_fail(const struct host_source *source, struct host_error *error,
     return host_fail(error, HOST_INPUT, "%s: %s", source->path, what);
 }
 
-static bool reserve(struct host_source *source, size_t more)
+/* To how many bytes it may grow, now that it is to have so many: looked up
+ * once, and not for what never matters. */
+static size_t most_bytes(struct host_source *source, size_t bytes)
+{
+    const size_t always = (size_t)16 << 20;
+    if (bytes <= always) {
+        return always;
+    }
+    if (source->most == 0) {
+        uint64_t half = host_memory_available() / 2 + source->capacity / 2;
+        source->most = (size_t)(half > always ? half : always);
+    }
+    return source->most;
+}
+
+static int too_large(const struct host_source *source, size_t bytes,
+                     struct host_error *error)
+{
+    const double mb = 1e6;
+    if (source->packed > 0) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %.1f MB that become more than %.1f MB unpacked, "
+                         "half of the memory available; unpack it to see what "
+                         "it holds, free some memory or take a machine with "
+                         "more",
+                         source->path, (double)source->packed / mb,
+                         (double)source->most / mb);
+    }
+    return host_fail(error, HOST_INPUT,
+                     "%s: %.1f MB or more, which is above half of the memory "
+                     "available (%.1f MB); free some memory or take a machine "
+                     "with more",
+                     source->path, (double)bytes / mb,
+                     (double)source->most / mb);
+}
+
+/* Room for `more` bytes, or for as many as it may have, if for any. */
+static int reserve(struct host_source *source, size_t more,
+                   struct host_error *error)
 {
     if (source->capacity - source->bytes >= more) {
-        return true;
+        return 0;
     }
-    size_t capacity = source->capacity * 2 + more;
+    size_t wanted = 2 * source->capacity + more;
+    size_t most = most_bytes(source, wanted);
+    if (source->bytes >= most) {
+        return too_large(source, source->bytes, error);
+    }
+    size_t capacity = wanted < most ? wanted : most;
+    if (capacity == source->capacity) {
+        return 0;
+    }
     void *owned = host_remap(source->owned, source->capacity, capacity);
     if (owned == NULL) {
-        return false;
+        return host_fail_memory(error, source->path);
     }
     source->owned = owned;
     source->data = owned;
     source->capacity = capacity;
-    return true;
+    return 0;
 }
 
 static int read_all(struct host_source *source, int file,
@@ -50,11 +96,14 @@ static int read_all(struct host_source *source, int file,
         }
         if (S_ISREG(status.st_mode) && status.st_size > 0) {
             hint = (size_t)status.st_size + 1;
+            if (hint > most_bytes(source, hint)) {
+                return too_large(source, hint - 1, error);
+            }
         }
     }
     for (;;) {
-        if (!reserve(source, hint)) {
-            return host_fail_memory(error, source->path);
+        if (reserve(source, hint, error) != 0) {
+            return error->code;
         }
         ssize_t n = read(file, (char *)source->owned + source->bytes,
                          source->capacity - source->bytes);
@@ -86,8 +135,8 @@ static int inflate_members(struct host_source *out, z_stream *z,
                            struct host_error *error)
 {
     for (;;) {
-        if (!reserve(out, (size_t)1 << 16)) {
-            return host_fail_memory(error, out->path);
+        if (reserve(out, (size_t)1 << 16, error) != 0) {
+            return error->code;
         }
         size_t room = out->capacity - out->bytes;
         room = room > (size_t)1 << 30 ? (size_t)1 << 30 : room;
@@ -117,7 +166,7 @@ static int inflate_members(struct host_source *out, z_stream *z,
 /* Replaces packed bytes by what they hold. */
 static int unpack(struct host_source *source, struct host_error *error)
 {
-    struct host_source out = {.path = source->path};
+    struct host_source out = {.path = source->path, .packed = source->bytes};
     z_stream z;
     memset(&z, 0, sizeof z);
     if (source->bytes > UINT32_MAX) {

@@ -1,7 +1,8 @@
 /* A file as bytes in memory.
  *
- * Memory: the bytes (of a .gz, those packed and those unpacked).  Work: one
- * pass.
+ * Memory: the bytes (of a .gz, those packed and those unpacked): at most half
+ * of what is available when reading or unpacking begins, for the points need
+ * the rest; or 16 MiB, if that is more.  Work: one pass.
  *
  *     struct host_source source;
  *     if (host_source_open(&source, "a.xyz.gz", &error) != 0)
@@ -23,13 +24,15 @@ struct host_source {
     size_t bytes;
     void *owned; /* what close gives back, `capacity` bytes */
     size_t capacity;
+    size_t most;   /* that it may grow to; 0: not looked up yet */
+    size_t packed; /* that it comes from; 0: it was not packed */
 };
 
 /* Whether a name ends in .gz, in letters of either case. */
 bool host_is_packed(const char *path);
 
 /* Reads it whole ("-": standard input), unpacks .gz.  A missing, unreadable,
- * empty or damaged file: HOST_INPUT. */
+ * empty or damaged file, or one too large for the memory: HOST_INPUT. */
 int host_source_open(struct host_source *source, const char *path,
                      struct host_error *error);
 

@@ -1,0 +1,132 @@
+/* A file, packed or not, that is larger than the memory allows is refused where
+ * that is known, and says how large it is. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include "host/base/memory.h"
+#include "host/files/source.h"
+
+/* A directory of its own, which is the current one. */
+static char directory[] = "/tmp/incode-source-XXXXXX";
+static struct rlimit before;
+
+static int enter(void **unused)
+{
+    (void)unused;
+    return mkdtemp(directory) != NULL && chdir(directory) == 0 &&
+                   getrlimit(RLIMIT_AS, &before) == 0
+               ? 0
+               : -1;
+}
+
+static int leave(void **unused)
+{
+    (void)unused;
+    return chdir("/") == 0 && rmdir(directory) == 0 ? 0 : -1;
+}
+
+/* Lets this process map so many bytes more. */
+static void leave_memory(uint64_t bytes)
+{
+    char line[128];
+    unsigned long long kib = 0;
+    struct rlimit limit = before;
+    FILE *status = fopen("/proc/self/status", "r");
+    assert_non_null(status);
+    while (kib == 0 && fgets(line, sizeof line, status) != NULL) {
+        (void)sscanf(line, "VmSize: %llu kB", &kib);
+    }
+    (void)fclose(status);
+    limit.rlim_cur = (kib << 10) + bytes;
+    assert_int_equal(setrlimit(RLIMIT_AS, &limit), 0);
+}
+
+/* n MiB of lines, packed. */
+static void pack(const char *name, int n)
+{
+    static char lines[1 << 20];
+    for (size_t i = 0; i < sizeof lines; i++) {
+        lines[i] = "1 2 3 4\n"[i % 8];
+    }
+    gzFile file = gzopen(name, "wb1");
+    assert_non_null(file);
+    for (int i = 0; i < n; i++) {
+        assert_int_equal(gzwrite(file, lines, sizeof lines), sizeof lines);
+    }
+    assert_int_equal(gzclose(file), Z_OK);
+}
+
+static void what_unpacks_beyond_the_memory(void **unused)
+{
+    (void)unused;
+    struct host_source source;
+    struct host_error error = {0};
+    pack("large.xyz.gz", 70);
+    leave_memory((uint64_t)128 << 20);
+    assert_int_equal(host_source_open(&source, "large.xyz.gz", &error),
+                     HOST_INPUT);
+    assert_null(source.data);
+    assert_int_equal(setrlimit(RLIMIT_AS, &before), 0);
+    unsigned tenths;
+    assert_int_equal(sscanf(strstr(error.text, "become more than"),
+                            "become more than %u.", &tenths),
+                     1);
+    assert_in_range(tenths, 50, 69);
+    assert_non_null(strstr(error.text, "large.xyz.gz: 0."));
+    assert_non_null(strstr(error.text, "; unpack it"));
+    error = (struct host_error){0};
+    assert_int_equal(host_source_open(&source, "large.xyz.gz", &error), 0);
+    assert_int_equal(source.bytes, 70 << 20);
+    host_source_close(&source);
+    assert_int_equal(unlink("large.xyz.gz"), 0);
+}
+
+/* What is little is read however little is left: it may be more than half. */
+static void what_is_little(void **unused)
+{
+    (void)unused;
+    struct host_source source;
+    struct host_error error = {0};
+    pack("little.xyz.gz", 12);
+    leave_memory((uint64_t)36 << 20);
+    assert_int_equal(host_source_open(&source, "little.xyz.gz", &error), 0);
+    assert_int_equal(source.bytes, 12 << 20);
+    assert_int_equal(setrlimit(RLIMIT_AS, &before), 0);
+    host_source_close(&source);
+    assert_int_equal(unlink("little.xyz.gz"), 0);
+}
+
+static void a_plain_file_beyond_the_memory(void **unused)
+{
+    (void)unused;
+    struct host_source source;
+    struct host_error error = {0};
+    int file = open("huge.las", O_WRONLY | O_CREAT, 0666);
+    assert_true(file >= 0);
+    assert_int_equal(ftruncate(file, (off_t)1 << 42), 0); /* all of it a hole */
+    (void)close(file);
+    assert_int_equal(host_source_open(&source, "huge.las", &error), HOST_INPUT);
+    assert_non_null(strstr(error.text, "huge.las: 4398046.5 MB or more"));
+    assert_int_equal(unlink("huge.las"), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_unpacks_beyond_the_memory),
+        cmocka_unit_test(what_is_little),
+        cmocka_unit_test(a_plain_file_beyond_the_memory),
+    };
+    return cmocka_run_group_tests(tests, enter, leave);
+}
