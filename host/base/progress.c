@@ -1,65 +1,192 @@
 #include "progress.h"
 
+#include <errno.h>
+#include <signal.h>
+#include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "clock.h"
+#include "text.h"
 
-enum { EVERY_US = 100000, BAR_MAX = 40, TEXT = 52 };
+enum {
+    EVERY_US = 100000,
+    BAR_MAX = 40,
+    BAR_MIN = 6,
+    WIDTH = 80,
+    TEXT = 256,
+    TEXT_MAX = 2048
+};
 
-void host_progress_start(struct host_progress *progress, bool wanted)
+static struct {
+    bool wanted;
+    const char *what, *unit;
+    uint64_t start_us, next_us; /* of the phase; when a line is due */
+    uint64_t added;
+    char text[TEXT]; /* as it stands */
+    volatile sig_atomic_t shown;
+} line;
+
+/* All at once, so that no other process writes in between. */
+static void put(const char *text, size_t bytes)
 {
-    progress->wanted = wanted && isatty(STDERR_FILENO) != 0;
-    progress->shown = false;
-    progress->start_us = host_now_us();
-    progress->next_us = progress->start_us + 2 * EVERY_US;
+    for (size_t done = 0; done < bytes;) {
+        ssize_t n = write(STDERR_FILENO, text + done, bytes - done);
+        if (n < 0 && errno != EINTR) {
+            return; /* nobody is there to be told */
+        }
+        done += n > 0 ? (size_t)n : 0;
+    }
 }
 
-/* Cells of the bar that the terminal's width leaves. */
-static unsigned bar_cells(void)
+/* Columns to write in: the last one stays free, where some terminals wrap. */
+static unsigned columns(void)
 {
     struct winsize size;
-    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col < TEXT) {
-        return 10;
-    }
-    unsigned cells = size.ws_col - TEXT;
-    return cells > BAR_MAX ? BAR_MAX : cells;
+    bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col;
+    unsigned all = known ? size.ws_col : WIDTH;
+    return all < TEXT / 2 ? all - 1 : TEXT / 2;
 }
 
-void host_progress_show(struct host_progress *progress, uint64_t done,
-                        uint64_t total, uint64_t tetrahedra)
+static void draw(void)
+{
+    char text[TEXT + 16];
+    int n =
+        snprintf(text, sizeof text, "\r%.*s\033[K", (int)columns(), line.text);
+    line.shown = 1;
+    put(text, (size_t)n);
+}
+
+void host_progress_begin(bool wanted)
+{
+    line.wanted = wanted && isatty(STDERR_FILENO) != 0;
+}
+
+void host_progress_phase(const char *what, const char *unit)
+{
+    line.what = what;
+    line.unit = unit;
+    line.added = 0;
+    line.start_us = host_now_us();
+    line.next_us = line.start_us + EVERY_US;
+    snprintf(line.text, sizeof line.text, "%s", what);
+    if (line.wanted) {
+        draw();
+    }
+}
+
+/* Ends of the line, each shorter than the one before. */
+enum { TAILS = 4 };
+struct tails {
+    char text[TAILS][TEXT / 2];
+};
+
+static struct tails tails_of(double part, double amount, double seconds)
+{
+    struct tails t = {0};
+    char left[48] = "", rate[48] = "", count[48] = "";
+    if (part > 0.0) {
+        double s = seconds / part - seconds + 0.999;
+        unsigned all = s < 3.6e6 ? (unsigned)s : 3600000;
+        snprintf(left, sizeof left, " %u:%02u:%02u left", all / 3600,
+                 all / 60 % 60, all % 60);
+    }
+    if (line.unit != NULL) {
+        snprintf(rate, sizeof rate, " %.3g %s/s", 1e-6 * amount / seconds,
+                 line.unit);
+        snprintf(count, sizeof count, " %.1f %s", 1e-6 * amount, line.unit);
+    }
+    snprintf(t.text[0], sizeof t.text[0], "%s%s%s", count, rate, left);
+    snprintf(t.text[1], sizeof t.text[1], "%s%s", rate, left);
+    snprintf(t.text[2], sizeof t.text[2], "%s", part > 0.0 ? left : count);
+    return t;
+}
+
+/* As much as fits: the phase and the percentage before all, then the time that
+ * is left, a bar, the rate and the amount. */
+static void compose(double part, bool has_total, struct tails tails)
 {
     static const char hashes[] = "########################################";
-    uint64_t now = host_now_us();
-    if (!progress->wanted || now < progress->next_us || total == 0) {
-        return;
+    char head[TEXT / 4];
+    unsigned width = columns(), tail = 0;
+    int n = snprintf(head, sizeof head, "%.32s", line.what);
+    if (has_total) {
+        n += snprintf(head + n, sizeof head - (size_t)n, " %3d %%",
+                      (int)(100.0 * part));
     }
-    progress->next_us = now + EVERY_US;
-    double seconds = 1e-6 * (double)(now - progress->start_us);
-    double part = (double)done / (double)total;
-    unsigned cells = bar_cells();
-    int full = (int)(part * (double)cells);
-    unsigned left =
-        part > 0.0 ? (unsigned)(seconds / part - seconds + 0.999) : 0;
-    fprintf(stderr, "\r%3d %% [%.*s%*s] %7.3f Mtet/s ", (int)(100.0 * part),
-            full, hashes, (int)cells - full, "",
-            1e-6 * (double)tetrahedra / seconds);
-    if (part > 0.0) {
-        fprintf(stderr, "%u:%02u:%02u left ", left / 3600, left / 60 % 60,
-                left % 60);
+    unsigned used = (unsigned)n, bar = has_total ? BAR_MIN + 3 : 0;
+    while (tail + 2 < TAILS && used + bar + strlen(tails.text[tail]) > width) {
+        tail++;
+    }
+    while (tail + 1 < TAILS && used + strlen(tails.text[tail]) > width) {
+        tail++;
+    }
+    used += (unsigned)strlen(tails.text[tail]);
+    if (has_total && used + bar <= width) {
+        unsigned room = width - used - 3;
+        unsigned cells = room < BAR_MAX ? room : BAR_MAX;
+        int full = (int)(part * cells);
+        snprintf(line.text, sizeof line.text, "%s [%.*s%*s]%s", head, full,
+                 hashes, (int)cells - full, "", tails.text[tail]);
     } else {
-        fprintf(stderr, "             ");
+        snprintf(line.text, sizeof line.text, "%s%s", head, tails.text[tail]);
     }
-    fflush(stderr);
-    progress->shown = true;
 }
 
-void host_progress_end(struct host_progress *progress)
+void host_progress_show(uint64_t done, uint64_t total, uint64_t amount)
 {
-    if (progress->shown) {
-        fprintf(stderr, "\r\033[K");
-        fflush(stderr);
-        progress->shown = false;
+    if (!line.wanted || line.what == NULL) {
+        return;
+    }
+    uint64_t now = host_now_us();
+    if (now < line.next_us) {
+        return;
+    }
+    line.next_us = now + EVERY_US;
+    double seconds = 1e-6 * (double)(now - line.start_us);
+    double part = total == 0 ? 0.0 : (double)done / (double)total;
+    part = part < 1.0 ? part : 1.0;
+    compose(part, total > 0, tails_of(part, (double)amount, seconds));
+    draw();
+}
+
+void host_progress_add(uint64_t amount)
+{
+    line.added += amount;
+    host_progress_show(0, 0, line.added);
+}
+
+void host_progress_erase(void)
+{
+    static const char gone[] = "\r\033[K";
+    if (line.shown) {
+        line.shown = 0;
+        put(gone, sizeof gone - 1);
+    }
+}
+
+void host_progress_end(void)
+{
+    host_progress_erase();
+    line.wanted = false;
+}
+
+void host_note(const char *format, ...)
+{
+    char raw[TEXT_MAX], text[TEXT_MAX + 16] = "incode: ";
+    size_t head = strlen(text);
+    bool again = line.shown != 0;
+    va_list list;
+    va_start(list, format);
+    (void)vsnprintf(raw, sizeof raw, format, list);
+    va_end(list);
+    host_text_printable(text + head, sizeof text - head - 1, raw);
+    strcat(text, "\n");
+    host_progress_erase();
+    put(text, strlen(text));
+    if (again) {
+        draw();
     }
 }

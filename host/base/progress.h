@@ -1,12 +1,16 @@
-/* A line on the terminal that shows how far the work is, its rate and the time
- * that is left.  Nothing where standard error is no terminal.
+/* The line on the terminal that shows how far a command is: what it is at, a
+ * bar, its rate and the time that is left, cut to the terminal's width.  There
+ * is one terminal, so there is one line, and whatever else is said on standard
+ * error goes through host_note.  No line where standard error is no terminal.
  *
- * Memory: the struct.  Work: a line at most ten times a second.
+ * Memory: one line of text, 6 KiB of stack for a note.  Work: one at most ten
+ * times a second; else one look at the clock.
  *
- *     struct host_progress progress;
- *     host_progress_start(&progress, true);
- *     host_progress_show(&progress, done, total, tetrahedra);
- *     host_progress_end(&progress);
+ *     host_progress_begin(true);
+ *     host_progress_phase("triangulating", "Mtet");
+ *     host_progress_show(done, total, tetrahedra);
+ *     host_note("node %u: %s", 3, "it does not answer");
+ *     host_progress_end();
  */
 #ifndef HOST_PROGRESS_H
 #define HOST_PROGRESS_H
@@ -14,16 +18,27 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-struct host_progress {
-    bool shown; /* a line stands on the terminal */
-    bool wanted;
-    uint64_t start_us, next_us;
-};
-
 /* wanted: false for quiet. */
-void host_progress_start(struct host_progress *progress, bool wanted);
-void host_progress_show(struct host_progress *progress, uint64_t done,
-                        uint64_t total, uint64_t tetrahedra);
-void host_progress_end(struct host_progress *progress);
+void host_progress_begin(bool wanted);
+
+/* What is done from now on, shown at once.  unit: of a million of what is
+ * counted, as "MB"; NULL where nothing is.  Both have to stay.  Nothing happens
+ * where no line has begun, so that each room may say what it does. */
+void host_progress_phase(const char *what, const char *unit);
+
+/* done of total (0: nobody knows), and the amount that is counted. */
+void host_progress_show(uint64_t done, uint64_t total, uint64_t amount);
+
+/* So much more in this phase, of which nobody knows the total. */
+void host_progress_add(uint64_t amount);
+
+/* Takes the line away: for good; until the next time, also in a handler of
+ * signals. */
+void host_progress_end(void);
+void host_progress_erase(void);
+
+/* Prints "incode: " and the text, made printable, as a line of its own on
+ * standard error, with the bar beneath it again. */
+void host_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 #endif

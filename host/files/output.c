@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/base/progress.h"
 #include "target.h"
 
 enum { BUFFER_BYTES = 1 << 20 };
@@ -36,12 +37,31 @@ static struct host_part *volatile parts;
 static const int endings[] = {SIGINT, SIGTERM, SIGHUP};
 enum { ENDINGS = sizeof endings / sizeof endings[0] };
 
+/* Of outputs: one was asked for; something went to one that is no file. */
+static volatile sig_atomic_t asked, in_place;
+
+/* In a handler of signals: what has happened, and what is left. */
+static void tell(int number)
+{
+    char text[160] = "incode: ";
+    strcat(text, number == SIGINT    ? "interrupted"
+                 : number == SIGTERM ? "terminated"
+                                     : "hung up");
+    strcat(text, in_place != 0 ? "; what was written so far is not whole"
+                 : asked != 0  ? "; no output was written"
+                               : "");
+    strcat(text, "\n");
+    host_progress_erase();
+    (void)!write(STDERR_FILENO, text, strlen(text));
+}
+
 /* With its default action back, the signal ends the program on return. */
 static void on_ending(int number)
 {
     for (struct host_part *part = parts; part != NULL; part = part->next) {
         (void)unlink(part->name);
     }
+    tell(number);
     (void)raise(number);
 }
 
@@ -274,6 +294,7 @@ int host_output_open(struct host_output *out, const char *path,
                      struct host_error *error)
 {
     *out = (struct host_output){.path = path, .file = -1};
+    asked = 1;
     out->buffer = malloc(BUFFER_BYTES);
     if (out->buffer == NULL) {
         host_fail_memory(error, "an output");
@@ -307,9 +328,11 @@ int host_output_probe(const char *path, struct host_error *error)
 static void flush(struct host_output *out)
 {
     for (size_t done = 0; done < out->used && out->failure == 0;) {
+        in_place = in_place != 0 || out->part == NULL;
         ssize_t n = write(out->file, out->buffer + done, out->used - done);
         if (n >= 0) {
             done += (size_t)n;
+            host_progress_add((uint64_t)n);
         } else if (errno != EINTR) {
             out->failure = errno;
         }

@@ -9,6 +9,7 @@
 #include <zlib.h>
 
 #include "host/base/memory.h"
+#include "host/base/progress.h"
 
 bool host_is_packed(const char *path)
 {
@@ -119,6 +120,7 @@ static int read_all(struct host_source *source, int file,
             return 0;
         }
         source->bytes += (size_t)n;
+        host_progress_add((uint64_t)n);
         hint = (size_t)1 << 16;
     }
 }
@@ -205,6 +207,7 @@ int host_source_open(struct host_source *source, const char *path,
 {
     bool standard = strcmp(path, "-") == 0;
     *source = (struct host_source){.path = standard ? "stdin" : path};
+    host_progress_phase("reading", "MB");
     int file = standard ? 0 : open(path, O_RDONLY | O_CLOEXEC);
     if (file < 0) {
         return host_fail(error, HOST_INPUT,

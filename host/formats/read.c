@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "formats.h"
+#include "host/base/progress.h"
 
 static const struct host_format *format_of(const char *path, enum host_use use,
                                            const char *what,
@@ -40,6 +41,7 @@ static int take_points(struct host_source *source,
                        struct host_points *points, struct host_error *error)
 {
     struct host_mesh mesh = {.points = points};
+    host_progress_phase("reading", "Mpoint");
     format->read_points(source, &mesh, error);
     if (error->code == 0 && points->count == 0) {
         host_source_fail(source, error,

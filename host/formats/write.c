@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "formats.h"
+#include "host/base/progress.h"
 
 int host_points_write(const char *path, const struct host_points *points,
                       struct host_error *error)
@@ -18,6 +19,7 @@ int host_points_write(const char *path, const struct host_points *points,
                          "extension; use %s, or -",
                          path, list);
     }
+    host_progress_phase("writing", "MB");
     if (host_output_open(&out, path, error) == 0) {
         format->write_points(&out, points);
         host_output_close(&out, 1, error);
@@ -95,6 +97,7 @@ int host_write(const char *path, const struct host_points *points,
     while (beside(path, others) != NULL) {
         others++;
     }
+    host_progress_phase("writing", "MB");
     /* Itself comes last: where it is, those beside it are. */
     for (; opened <= others; opened++) {
         const char *file =

@@ -7,7 +7,7 @@
 
 #include "cube_reader.h"
 #include "host/base/parse.h"
-#include "host/base/text.h"
+#include "host/base/progress.h"
 #include "transport/drivers/key_file.h"
 
 enum { TEXT_MAX = 4 << 20 };
@@ -43,8 +43,8 @@ static int read_key(struct host_cube_file *file, const config_setting_t *where,
     if (!file->has_key) {
         return host_cube_wrong(file, where, error, message);
     }
-    host_say(stderr, "incode: %s:%u: %s\n", file->path,
-             config_setting_source_line(where), message);
+    host_note("%s:%u: %s", file->path, config_setting_source_line(where),
+              message);
     return 0;
 }
 

@@ -3,6 +3,9 @@
 #include <string.h>
 
 #include "host/base/memory.h"
+#include "host/base/progress.h"
+
+enum { ROWS_SHOWN = 1 << 14 }; /* a clock a point would cost too much */
 
 int host_points_append(struct host_points *points, const double *xyz,
                        uint64_t rows, struct host_error *error)
@@ -24,6 +27,9 @@ int host_points_append(struct host_points *points, const double *xyz,
         points->capacity = capacity;
     }
     memcpy(points->xyz + 3 * points->count, xyz, rows * row);
+    if ((points->count + rows) / ROWS_SHOWN != points->count / ROWS_SHOWN) {
+        host_progress_show(0, 0, points->count + rows);
+    }
     points->count += rows;
     return 0;
 }

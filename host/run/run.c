@@ -7,6 +7,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/memory.h"
+#include "host/base/progress.h"
 #include "host/files/output.h"
 #include "host/formats/claims.h"
 #include "host/formats/read.h"
@@ -218,11 +219,11 @@ int host_triangulate_on(const struct host_run_options *options,
     service.strategy = result->strategy;
     service.window = options->window;
     service.patience_us = options->patience_s * UINT64_C(1000000);
-    service.show_progress = options->progress && !options->quiet;
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);
     start = host_now_us();
     if (status == 0) {
+        host_progress_phase("ordering", NULL);
         status = host_order_make(
             &order, options->input == NULL ? "points" : options->input,
             points->xyz, points->count, options->partition,
@@ -239,6 +240,7 @@ int host_triangulate_on(const struct host_run_options *options,
                               order.bricks, order.cells, error);
     }
     if (status == 0) {
+        host_progress_phase("triangulating", "Mtet");
         status = run_service(options, &order, &service, tets, result, error);
     }
     result->time_triangulation_s = seconds_since(start);
@@ -296,6 +298,7 @@ int host_triangulate(const struct host_run_options *options,
     static const uint32_t no_cells[3] = {0, 0, 0};
     struct host_machine machine;
     uint64_t start = host_now_us();
+    host_progress_phase("starting nodes", NULL);
     settle(options, points->count, result);
     if (check_memory(options, result->strategy, result->nodes, 1, no_cells,
                      error) != 0 ||
@@ -387,10 +390,12 @@ static int verify(const struct host_points *points,
                   struct host_error *error)
 {
     uint64_t start = host_now_us();
+    host_progress_phase("checking", NULL);
     int status = host_verify(points, tets, &result->check, error);
     result->time_verify_s = seconds_since(start);
     result->verified = status == 0;
     if (status == HOST_UNVERIFIED) {
+        host_progress_erase();
         fputs(result->check.text, stderr);
     }
     return status;
@@ -403,6 +408,7 @@ static int finish(const struct host_run_options *options,
                   struct host_error *error)
 {
     uint64_t start = host_now_us();
+    host_progress_phase("sorting", NULL);
     host_tetrahedra_sort(tets);
     host_digest(tets, &result->digest);
     result->time_write_s = seconds_since(start);
@@ -463,11 +469,13 @@ int host_run(const struct host_run_options *options,
     if (check_outputs(options, error) != 0) {
         return error->code;
     }
+    host_progress_begin(options->progress && !options->quiet);
     int status = host_points_read(options->input, &points, error);
     result->time_read_s = seconds_since(start);
     if (status == 0) {
         status = run_on(options, &points, result, &alone, error);
     }
+    host_progress_end();
     host_points_free(&points);
     result->host_peak_bytes = host_memory_peak();
     result->time_total_s = seconds_since(start);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "generations.h"
+#include "host/base/progress.h"
 #include "transport/wiring.h"
 
 enum {
@@ -52,10 +53,9 @@ static void name_wire(struct host_service *s, unsigned node, unsigned link)
     if (link < s->machine->dimension) {
         snprintf(other, sizeof other, "node %u", node ^ 1u << link);
     }
-    fprintf(stderr,
-            "incode: node %u link %u: the wire to %s does not come up; "
-            "the run goes on without it, look after that wire\n",
-            node, link, other);
+    host_note("node %u link %u: the wire to %s does not come up; the run goes "
+              "on without it, look after that wire",
+              node, link, other);
 }
 
 static void tell(struct host_service *s, const struct cube_wiring *w)

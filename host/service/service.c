@@ -6,6 +6,7 @@
 #include "failure_detector.h"
 #include "generations.h"
 #include "handlers.h"
+#include "host/base/progress.h"
 #include "missing_links.h"
 #include "sending.h"
 
@@ -202,11 +203,9 @@ int host_service_run(struct host_service *service, struct host_error *error)
     }
     prepare(s);
     host_sending_begin(s);
-    host_progress_start(&s->progress, s->show_progress);
     bool asked = false;
     while (!s->over && !(asked && all_reported(s))) {
         if (host_service_round(s, error) != 0) {
-            host_progress_end(&s->progress);
             return error->code;
         }
         if (!s->dealt && s->ready == s->work.living) {
@@ -217,10 +216,9 @@ int host_service_run(struct host_service *service, struct host_error *error)
             ask_for_reports(s);
             asked = true;
         }
-        host_progress_show(&s->progress, s->ledger.committed, s->ledger.bricks,
+        host_progress_show(s->ledger.committed, s->ledger.bricks,
                            s->tets->count);
     }
-    host_progress_end(&s->progress);
     host_detector_end(s);
     for (unsigned d = 0; d < cube_links(s->cube); d++) {
         s->retransmitted += cube_link_statistics(s->cube, d)->retransmitted;

@@ -20,7 +20,6 @@
 #ifndef HOST_SERVICE_H
 #define HOST_SERVICE_H
 
-#include "host/base/progress.h"
 #include "host/mesh/tetrahedra.h"
 #include "host/order/order.h"
 #include "host/service/strategies/strategy.h"
@@ -87,7 +86,6 @@ struct host_service {
     struct node_setup_message setup;
     unsigned window;      /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
-    bool show_progress;
     /* Results. */
     struct host_node_report *report; /* [nodes], until the end */
     uint64_t pages_us;               /* time spent on serving pages */
@@ -102,7 +100,6 @@ struct host_service {
     struct host_work work; /* what the strategy sees; who is lost */
     struct host_ledger ledger;
     struct host_spill spill;
-    struct host_progress progress;
     bool started, finished;
     bool dealt;          /* the first jobs of this generation are out */
     bool over;           /* all is here that is needed */

@@ -167,6 +167,48 @@ static void a_signal_leaves_no_parts(void **unused)
     }
 }
 
+/* What a process says that is ended while this is its output; NULL: none. */
+static const char *last_words(int number, const char *path)
+{
+    static char said[256];
+    int ends[2], status = -1;
+    assert_int_equal(pipe(ends), 0);
+    pid_t child = fork();
+    if (child == 0) {
+        struct host_error error = {0};
+        struct host_output out;
+        (void)dup2(ends[1], STDERR_FILENO);
+        host_output_guard();
+        if (path != NULL && host_output_open(&out, path, &error) == 0) {
+            host_output_text(&out, "not whole");
+            (void)host_output_close(&out, 1, &error);
+        }
+        (void)raise(number);
+        _exit(101);
+    }
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFSIGNALED(status) && WTERMSIG(status) == number);
+    (void)close(ends[1]);
+    ssize_t n = read(ends[0], said, sizeof said - 1);
+    said[n > 0 ? n : 0] = '\0';
+    (void)close(ends[0]);
+    return said;
+}
+
+static void a_signal_says_what_is_written(void **unused)
+{
+    (void)unused;
+    assert_string_equal(last_words(SIGINT, names[0]),
+                        "incode: interrupted; no output was written\n");
+    assert_string_equal(last_words(SIGTERM, names[0]),
+                        "incode: terminated; no output was written\n");
+    assert_string_equal(
+        last_words(SIGINT, "/dev/null"),
+        "incode: interrupted; what was written so far is not whole\n");
+    assert_string_equal(last_words(SIGHUP, NULL), "incode: hung up\n");
+    assert_int_equal(files(), 0);
+}
+
 static void an_ignored_signal_stays_ignored(void **unused)
 {
     (void)unused;
@@ -418,6 +460,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_signal_leaves_no_parts),
+        cmocka_unit_test(a_signal_says_what_is_written),
         cmocka_unit_test(an_ignored_signal_stays_ignored),
         cmocka_unit_test(a_signal_amid_the_names_is_too_late),
         cmocka_unit_test(however_many_there_are),

@@ -1,0 +1,223 @@
+/* The line of progress on terminals of several widths: it stays one line, goes
+ * away at the end, and what is noted meanwhile stands by itself. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <pty.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "host/base/progress.h"
+
+enum { ROWS = 8, COLUMNS = 200 };
+
+/* What stands on a terminal, as far as this program writes to one. */
+static struct screen {
+    int master, slave, before; /* before: standard error */
+    unsigned columns, row, column;
+    char text[ROWS][COLUMNS + 1];
+    bool wrapped;
+    unsigned drawn; /* times that a line began anew */
+} screen;
+
+static void open_screen(unsigned short columns)
+{
+    struct winsize size = {.ws_row = ROWS, .ws_col = columns};
+    memset(&screen, 0, sizeof screen);
+    screen.columns = columns;
+    assert_int_equal(openpty(&screen.master, &screen.slave, NULL, NULL, &size),
+                     0);
+    assert_int_equal(fcntl(screen.master, F_SETFL, O_NONBLOCK), 0);
+    screen.before = dup(STDERR_FILENO);
+    assert_true(dup2(screen.slave, STDERR_FILENO) >= 0);
+}
+
+static void close_screen(void)
+{
+    assert_true(dup2(screen.before, STDERR_FILENO) >= 0);
+    (void)close(screen.before);
+    (void)close(screen.slave);
+    (void)close(screen.master);
+}
+
+static void take(char c)
+{
+    char *row = screen.text[screen.row];
+    if (c == '\r') {
+        screen.column = 0;
+        screen.drawn++;
+    } else if (c == '\n') {
+        assert_true(++screen.row < ROWS);
+    } else if (c == '\033') {
+        memset(row + screen.column, 0, COLUMNS - screen.column);
+    } else {
+        /* The last column is left free: some terminals wrap there. */
+        screen.wrapped = screen.wrapped || screen.column + 1 >= screen.columns;
+        assert_true(screen.column < COLUMNS);
+        row[screen.column++] = c;
+    }
+}
+
+/* Takes what has come; "\033[K" is the one sequence that there is. */
+static void look(void)
+{
+    static const char sequence[] = "\033[K";
+    static unsigned in;
+    char bytes[4096];
+    ssize_t n = read(screen.master, bytes, sizeof bytes);
+    for (ssize_t i = 0; i < n; i++) {
+        if (in > 0 || bytes[i] == '\033') {
+            assert_int_equal(bytes[i], sequence[in]);
+            in = (in + 1) % 3;
+            if (in == 1) {
+                take('\033');
+            }
+        } else {
+            take(bytes[i]);
+        }
+    }
+}
+
+/* Shows until a line is drawn, which takes a tenth of a second. */
+static const char *shown(uint64_t done, uint64_t total, uint64_t amount)
+{
+    look();
+    unsigned before = screen.drawn;
+    for (int i = 0; i < 6000 && screen.drawn == before; i++) {
+        struct pollfd file = {screen.master, POLLIN, 0};
+        host_progress_show(done, total, amount);
+        (void)poll(&file, 1, 10);
+        look();
+    }
+    assert_true(screen.drawn > before);
+    return screen.text[screen.row];
+}
+
+static void test_fits(void **unused)
+{
+    static const unsigned short widths[] = {30, 12, 5, 80, 160};
+    (void)unused;
+    for (size_t i = 0; i < sizeof widths / sizeof widths[0]; i++) {
+        open_screen(widths[i]);
+        host_progress_begin(true);
+        host_progress_phase("triangulating", "Mtet");
+        look();
+        assert_true(screen.text[0][0] == 't'); /* at once */
+        const char *text =
+            shown(UINT32_MAX / 2, UINT32_MAX, UINT64_C(123456789012));
+        assert_memory_equal(text, "tria", 4);
+        if (widths[i] >= 30) {
+            assert_non_null(strstr(text, "triangulating  49 %"));
+            assert_non_null(strstr(text, "[###"));
+        }
+        if (widths[i] >= 80) {
+            assert_non_null(strstr(text, " Mtet/s"));
+            assert_non_null(strstr(text, " left"));
+        }
+        assert_int_equal(screen.row, 0);
+        assert_false(screen.wrapped);
+        host_progress_end();
+        look();
+        assert_string_equal(screen.text[0], "");
+        host_progress_phase("writing", "MB");
+        host_progress_show(1, 2, 3);
+        look();
+        assert_string_equal(screen.text[0], "");
+        close_screen();
+    }
+}
+
+static void test_follows_the_width(void **unused)
+{
+    struct winsize narrow = {.ws_row = ROWS, .ws_col = 30};
+    (void)unused;
+    open_screen(100);
+    host_progress_begin(true);
+    host_progress_phase("triangulating", "Mtet");
+    assert_non_null(strstr(shown(1, 2, 5000000), "5.0 Mtet "));
+    assert_int_equal(ioctl(screen.slave, TIOCSWINSZ, &narrow), 0);
+    screen.columns = 30;
+    assert_null(strstr(shown(1, 2, 5000000), "Mtet"));
+    assert_false(screen.wrapped);
+    host_progress_end();
+    close_screen();
+}
+
+/* Of what has no total, the amount is shown. */
+static void test_counts(void **unused)
+{
+    (void)unused;
+    open_screen(30);
+    host_progress_begin(true);
+    host_progress_phase("writing", "MB");
+    host_progress_add(12000000);
+    host_progress_add(34000000);
+    assert_non_null(strstr(shown(0, 0, 46000000), "writing 46.0 MB"));
+    assert_false(screen.wrapped);
+    host_progress_end();
+    close_screen();
+}
+
+static void test_notes(void **unused)
+{
+    (void)unused;
+    open_screen(80);
+    host_note("node %u: %s", 1, "before");
+    host_progress_begin(true);
+    host_progress_phase("triangulating", "Mtet");
+    (void)shown(1, 4, 1);
+    host_note("node %u: %s", 3, "it does \033[2Jnot answer");
+    look();
+    assert_string_equal(screen.text[0], "incode: node 1: before");
+    assert_string_equal(screen.text[1],
+                        "incode: node 3: it does \\x1b[2Jnot answer");
+    assert_memory_equal(screen.text[2], "triangulating  25 %", 19);
+    host_progress_end();
+    look();
+    assert_string_equal(screen.text[2], "");
+    close_screen();
+}
+
+/* No line where it is not wanted, nor where nobody sees it; notes come. */
+static void test_quiet(void **unused)
+{
+    int ends[2];
+    char said[64] = "";
+    (void)unused;
+    open_screen(80);
+    host_progress_begin(false);
+    host_progress_phase("triangulating", "Mtet");
+    host_progress_end();
+    look();
+    assert_int_equal(screen.drawn, 0);
+    assert_int_equal(pipe(ends), 0);
+    assert_true(dup2(ends[1], STDERR_FILENO) >= 0);
+    host_progress_begin(true);
+    host_progress_phase("triangulating", "Mtet");
+    host_note("node %u", 1);
+    host_progress_end();
+    (void)close(ends[1]);
+    close_screen();
+    assert_true(read(ends[0], said, sizeof said - 1) > 0);
+    assert_string_equal(said, "incode: node 1\n");
+    (void)close(ends[0]);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_fits),   cmocka_unit_test(test_follows_the_width),
+        cmocka_unit_test(test_counts), cmocka_unit_test(test_notes),
+        cmocka_unit_test(test_quiet),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
