@@ -57,6 +57,9 @@ static void give_time(void)
     (void)setitimer(ITIMER_VIRTUAL, &time, NULL);
 }
 
+/* A shorter time says nothing of the rate. */
+static const double RATE_S_MIN = 1;
+
 struct totals {
     uint64_t seeds, failed, steps, time_us, restarts;
     uint64_t struck[HOST_SIM_FAULTS], seeds_struck[HOST_SIM_FAULTS];
@@ -118,11 +121,14 @@ static void run_seed(uint64_t seed, unsigned nodes, struct totals *totals,
 static void print_totals(const struct totals *t, double seconds)
 {
     printf("%llu seed%s, %llu failed; %llu restart%s, %.0f s in virtual time, "
-           "%.1f in ours, %.0f seeds an hour\n",
+           "%.1f in ours",
            (unsigned long long)t->seeds, t->seeds == 1 ? "" : "s",
            (unsigned long long)t->failed, (unsigned long long)t->restarts,
-           t->restarts == 1 ? "" : "s", 1e-6 * (double)t->time_us, seconds,
-           seconds > 0 ? 3600 * (double)t->seeds / seconds : 0);
+           t->restarts == 1 ? "" : "s", 1e-6 * (double)t->time_us, seconds);
+    if (seconds >= RATE_S_MIN) {
+        printf(", %.0f seeds an hour", 3600 * (double)t->seeds / seconds);
+    }
+    printf("\n");
     printf("%-12s %12s %8s  while work was open\n", "fault", "strikes",
            "seeds");
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
