@@ -6,6 +6,7 @@
 #include "incode/predicates/check.h"
 #include "node/roles/roles.h"
 #include "totals.h"
+#include "transport/wiring.h"
 
 enum { IDLE_MAX_US = 1000000, FAREWELL_US = 500000 };
 
@@ -19,7 +20,7 @@ struct node {
     void *role_arena;
     size_t role_bytes;
     bool stopping, closing;
-    uint32_t generation; /* of the wiring that this node has followed */
+    struct cube_wiring followed; /* its generation is the one at work */
     struct node_counted counted;
     struct node_pong_message pong; /* the answer that is owed */
     bool owes_pong, owes_ready, owes_report;
@@ -313,12 +314,12 @@ static bool send_finished(struct node *n, uint32_t epoch)
  * this one had is of no use, but for what it knows of its work. */
 static void follow_wiring(struct node *n)
 {
-    uint32_t generation = cube_wiring(n->cube)->generation;
-    if (generation == n->generation) {
+    const struct cube_wiring *wiring = cube_wiring(n->cube);
+    if (wiring_together(wiring, &n->followed)) {
         return;
     }
     end_role(n);
-    n->generation = generation;
+    n->followed = *wiring;
     n->owes_pong = n->owes_ready = n->owes_report = false;
     n->fault.size = 0;
     n->fault_sent = false;

@@ -5,7 +5,7 @@
 #include "cube_internal.h"
 
 /* A message's own header: dest, source (16 bits, low byte first), type, hops,
- * generation (16 bits of it). */
+ * stamp (of the generation). */
 enum { HEAD = CUBE_HEAD, STAMP = 6 };
 
 enum { HOPS_MAX = 255 };         /* off the e-cube paths */
@@ -152,12 +152,14 @@ struct cube *cube_init(void *arena, size_t bytes,
 
 /* --- passing on ---------------------------------------------------------- */
 
-/* Whether a message of another generation is to be dropped.  If not, the
- * neighbour knows of a generation that it has told us in a state datagram: that
- * comes. */
-static bool outdated(const struct cube *cube, unsigned stamp)
+/* Whether a message of another generation is to be dropped: the neighbour sent
+ * it, and was in our generation afterwards.  If not, it is of a generation that
+ * he has told us in a state datagram, or has left for ours, which he tells us:
+ * that comes.  Numbers are not compared, as generations may lie far apart. */
+static bool outdated(const struct cube *cube, unsigned d, uint16_t sequence)
 {
-    return cube->wiring.generation != 0 && (int16_t)(stamp - cube->stamp) < 0;
+    const struct cube_neighbour *n = &cube->neighbours[d];
+    return n->together && (int16_t)(sequence - n->since) < 0;
 }
 
 /* The oldest message of link d, and where it must still go. */
@@ -168,14 +170,18 @@ static bool look_at(struct cube *cube, unsigned d)
         const uint8_t *head = a->message.data;
         unsigned stamp =
             a->message.size >= HEAD ? bytes_get16(head + STAMP) : cube->stamp;
-        if (stamp != cube->stamp || cube->wiring.generation == 0) {
-            if (!outdated(cube, stamp)) {
+        if (cube->wiring.generation == 0) {
+            return false;
+        }
+        if (stamp != cube->stamp) {
+            if (!outdated(cube, d, a->message.sequence)) {
                 return false;
             }
             cube->statistics.outdated++;
             link_release(cube->links[d]);
             continue;
         }
+        cube_is_together(cube, d, a->message.sequence);
         bool whole = a->message.size >= HEAD;
         unsigned hops_max =
             cube->routes.tree ? HOPS_MAX : cube->config.dimension + 2u;

@@ -61,7 +61,7 @@ struct cube_wrong {
 
 /* What all ends of a cube agree on, in time. */
 struct cube_wiring {
-    uint32_t generation; /* 1 at the start; 0: not told yet */
+    uint32_t generation; /* 1 at the start; 0: not told yet; wraps to 1 */
     uint32_t host_epoch; /* of the host that began it */
     uint16_t gateway;    /* the node by which the host speaks */
     uint16_t settled;    /* dead[0 .. settled) were so when it began: routes
@@ -154,6 +154,7 @@ struct cube_statistics {
     uint64_t blocked;       /* polls in which a message found no room ahead */
     uint64_t unreachable;   /* written to where no way leads: dropped */
     uint64_t outdated;      /* dropped: of an older generation */
+    uint64_t outdone;       /* generations of others that the host answered */
 };
 
 /* Settings for a cube with serial wires, of which the slowest has that baud
@@ -213,7 +214,8 @@ const struct cube_wiring *cube_wiring(const struct cube *cube);
 
 /* At the host: begins a generation with next's gateway and dead links, and
  * drops all messages of the old one here and, as it spreads, everywhere.  Its
- * number is next's, or one more than the present where that is higher. */
+ * number is next's where that is after the present one, else the one behind
+ * this. */
 void cube_renew(struct cube *cube, const struct cube_wiring *next);
 
 /* Whether a node can be reached, by what was dead when the generation began. */

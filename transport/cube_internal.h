@@ -35,6 +35,8 @@ struct cube_neighbour {
     uint64_t comings;  /* times that the link came up, as of the last look */
     uint64_t told_us;  /* when it was last told our wiring */
     bool agreed;       /* it has said what we would say */
+    bool together;     /* it is known to have been in our generation when it */
+    uint16_t since;    /* was to send this frame next */
     uint64_t frames;   /* received, as of the last look */
     uint32_t quiet_us; /* time that the link is down or silent */
 };
@@ -51,7 +53,7 @@ struct cube {
     unsigned turn;      /* link that is served first */
     unsigned held;      /* link of the message being read, or CUBE_LINKS_MAX */
     uint32_t kept_back; /* links whose last slot is left to this node once */
-    uint16_t stamp;     /* of messages: the generation's low bits */
+    uint16_t stamp;     /* of messages: wiring_stamp */
     bool again;         /* a message waits only for that turn to pass */
     uint8_t datagram[WIRING_BYTES_MAX]; /* the wiring, as it is told */
     size_t datagram_size;
@@ -69,6 +71,10 @@ struct link_config cube_link_config(const struct cube_config *config,
 
 /* cube.c: the messages of the generation before go. */
 void cube_drop_all(struct cube *cube);
+
+/* gossip.c: the neighbour at link d was in our generation when it was to send
+ * that frame next. */
+void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence);
 
 /* gossip.c */
 void cube_gossip_start(struct cube *cube);

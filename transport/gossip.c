@@ -31,7 +31,10 @@ static void spread(struct cube *cube)
 
 static void begin_generation(struct cube *cube)
 {
-    cube->stamp = (uint16_t)cube->wiring.generation;
+    cube->stamp = wiring_stamp(&cube->wiring);
+    for (unsigned d = 0; d < cube->count; d++) {
+        cube->neighbours[d].together = false;
+    }
     routes_find(&cube->routes, &cube->wiring);
     cube_drop_all(cube);
 }
@@ -43,7 +46,7 @@ void cube_gossip_start(struct cube *cube)
         cube->wiring.host_epoch = cube->config.epoch;
         cube->wiring.gateway = cube->config.gateway;
     }
-    cube->stamp = (uint16_t)cube->wiring.generation;
+    cube->stamp = wiring_stamp(&cube->wiring);
     routes_find(&cube->routes, &cube->wiring);
     spread(cube);
 }
@@ -55,8 +58,8 @@ void cube_renew(struct cube *cube, const struct cube_wiring *next)
         is_host(cube) && next->dead_count <= CUBE_DEAD_MAX &&
         (next->gateway == 0 || next->gateway == cube->config.spare_node));
     cube->wiring = *next;
-    if (next->generation <= present) {
-        cube->wiring.generation = present + 1;
+    if (!wiring_after(next->generation, present)) {
+        cube->wiring.generation = wiring_next(present);
     }
     cube->wiring.host_epoch = cube->config.epoch;
     cube->wiring.wrong_count = 0;
@@ -70,29 +73,36 @@ void cube_renew(struct cube *cube, const struct cube_wiring *next)
 static void outdo(struct cube *cube, const struct cube_wiring *theirs)
 {
     struct cube_wiring next = cube->wiring;
-    next.generation = theirs->generation + 1;
+    next.generation = wiring_next(theirs->generation);
     next.dead_count = next.settled;
+    cube->statistics.outdone++;
     cube_renew(cube, &next);
 }
 
 static void hear(struct cube *cube, const struct cube_wiring *theirs)
 {
-    uint32_t generation = cube->wiring.generation;
-    uint32_t host_epoch = cube->wiring.host_epoch;
-    bool foreign = theirs->host_epoch != cube->config.epoch;
-    if (is_host(cube) && foreign) {
-        if (theirs->generation >= generation) {
+    bool together = wiring_together(&cube->wiring, theirs);
+    if (is_host(cube) && !together) {
+        if (!wiring_after(cube->wiring.generation, theirs->generation)) {
             outdo(cube, theirs);
         }
         return;
     }
     if (wiring_merge(&cube->wiring, theirs, cube->config.dimension)) {
-        if (cube->wiring.generation != generation ||
-            cube->wiring.host_epoch != host_epoch) {
+        if (!together) {
             begin_generation(cube);
         }
         spread(cube);
     }
+}
+
+void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence)
+{
+    struct cube_neighbour *n = &cube->neighbours[d];
+    if (!n->together || (int16_t)(sequence - n->since) > 0) {
+        n->since = sequence;
+    }
+    n->together = true;
 }
 
 static void take_datagram(struct cube *cube, unsigned d,
@@ -106,6 +116,9 @@ static void take_datagram(struct cube *cube, unsigned d,
         return;
     }
     hear(cube, &theirs);
+    if (wiring_together(&theirs, &cube->wiring)) {
+        cube_is_together(cube, d, datagram->sequence);
+    }
     cube->neighbours[d].agreed = wiring_same(&theirs, &cube->wiring);
     if (ask && cube->neighbours[d].agreed) {
         tell(cube, d, now_us, false);
@@ -212,7 +225,7 @@ void cube_gossip(struct cube *cube, uint64_t now_us)
         struct cube_neighbour *n = &cube->neighbours[d];
         if (n->comings != s->sessions + s->resumed) {
             n->comings = s->sessions + s->resumed;
-            n->agreed = false;
+            n->agreed = n->together = false;
             n->told_us = now_us - CUBE_GOSSIP_US;
         }
         if (link_take_datagram(cube->links[d], &datagram, &ask)) {

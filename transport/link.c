@@ -254,6 +254,7 @@ bool link_read(struct link *link, struct link_message *message)
         return false;
     }
     message->size = r->slots[at].size;
+    message->sequence = (uint16_t)(r->next - r->ready);
     while (r->slots[at].more) {
         at = link_wrapped(link, at + 1);
         message->size += r->slots[at].size;
@@ -329,6 +330,7 @@ bool link_take_datagram(struct link *link, struct link_message *datagram,
     n->heard = false;
     datagram->data = n->in;
     datagram->size = n->in_size;
+    datagram->sequence = n->in_sequence;
     *ask = n->asked;
     return true;
 }

@@ -23,7 +23,7 @@
 #include <stdint.h>
 
 enum {
-    LINK_VERSION = 1,            /* of the protocol on the wire */
+    LINK_VERSION = 2,            /* of the protocol on the wire */
     LINK_WINDOW_MAX = 64,        /* frames a direction */
     LINK_FRAME_PAYLOAD_MIN = 32, /* bytes */
     LINK_FRAME_PAYLOAD_MAX = 1616,
@@ -173,6 +173,8 @@ void link_for_serial(struct link_config *config, uint32_t baud);
 struct link_message {
     const uint8_t *data;
     size_t size;
+    uint16_t sequence; /* of its first frame in this session, modulo 2^16; of a
+                          datagram, that of the next new frame behind it */
 };
 
 /* The first field that breaks its limit, and which, as in "epoch is 0"; NULL:

@@ -8,7 +8,7 @@
  * - send: send, out, stalled, sent_us, bye_us; datagrams.due, when it goes, and
  *   bye_due likewise; as every frame reports what came: receive.reported,
  *   unreported and ack_now;
- * - receive: receive, in, datagrams.in, in_size, asked, heard;
+ * - receive: receive, in, datagrams.in ..., asked, heard;
  * - each: its statistics.
  *
  * Memory and work: see link.h.
@@ -104,7 +104,7 @@ struct link_bytes_out {
 
 struct link_datagrams {
     const uint8_t *out; /* the caller's */
-    uint16_t out_size, in_size;
+    uint16_t out_size, in_size, in_sequence;
     bool due, asks, heard, asked;
     uint8_t in[LINK_DATAGRAM_MAX];
 };

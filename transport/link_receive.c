@@ -15,6 +15,7 @@ void link_receive_reset(struct link *link, uint16_t first)
     r->next = first;
     r->reported = (uint16_t)(first + link_credit(link));
     r->unreported = 0;
+    link->datagrams.heard = false; /* its sequence was another session's */
 }
 
 void link_forget_bytes(struct link *link)
@@ -120,6 +121,7 @@ static void on_datagram(struct link *link, const struct link_frame *frame)
     struct link_datagrams *n = &link->datagrams;
     memcpy(n->in, frame->payload, frame->header.size);
     n->in_size = frame->header.size;
+    n->in_sequence = frame->header.sequence;
     n->asked = (frame->header.flags & LINK_ASK) != 0;
     n->heard = link->up;
 }

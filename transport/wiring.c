@@ -3,6 +3,9 @@
 #include <assert.h>
 #include <string.h>
 
+#include "bytes.h"
+#include "frame.h"
+
 static_assert(WIRING_BYTES_MAX <= (int)LINK_DATAGRAM_MAX,
               "the wiring fits a datagram");
 
@@ -71,9 +74,37 @@ bool wiring_same(const struct cube_wiring *a, const struct cube_wiring *b)
     return wiring_pack(b, of_b) == size && memcmp(of_a, of_b, size) == 0;
 }
 
+bool wiring_after(uint32_t b, uint32_t a)
+{
+    const uint32_t half = UINT32_C(1) << 31;
+    uint32_t ahead = b - a;
+    if (a == 0 || b == 0) {
+        return b != 0;
+    }
+    return ahead == half ? b > a : ahead != 0 && ahead < half;
+}
+
+uint32_t wiring_next(uint32_t generation)
+{
+    return generation == UINT32_MAX ? 1 : generation + 1;
+}
+
+bool wiring_together(const struct cube_wiring *a, const struct cube_wiring *b)
+{
+    return a->generation == b->generation && a->host_epoch == b->host_epoch;
+}
+
+uint16_t wiring_stamp(const struct cube_wiring *wiring)
+{
+    uint8_t bytes[8];
+    bytes_put32(bytes, wiring->generation);
+    bytes_put32(bytes + 4, wiring->host_epoch);
+    return frame_crc16(bytes, sizeof bytes);
+}
+
 bool wiring_newer(const struct cube_wiring *b, const struct cube_wiring *a)
 {
-    return b->generation > a->generation ||
+    return wiring_after(b->generation, a->generation) ||
            (b->generation == a->generation && b->host_epoch > a->host_epoch);
 }
 

@@ -27,7 +27,23 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
 
 bool wiring_same(const struct cube_wiring *a, const struct cube_wiring *b);
 
-/* Whether b was begun after a: a higher generation, or the same of a host with
+/* Whether generation b was begun after a: less than half the circle of 2^32
+ * ahead of it (serial numbers, RFC 1982); of two just opposite, the higher
+ * number.  0, not told yet, is before all others.  Not transitive where three
+ * lie all around the circle: who asks must end by itself. */
+bool wiring_after(uint32_t b, uint32_t a);
+
+/* The generation behind that one: never 0. */
+uint32_t wiring_next(uint32_t generation);
+
+/* Whether both are of one generation of one host. */
+bool wiring_together(const struct cube_wiring *a, const struct cube_wiring *b);
+
+/* What messages carry of the generation and its host: CRC-16 of both.  Two
+ * that meet are the same only by a chance of 1 in 65,536. */
+uint16_t wiring_stamp(const struct cube_wiring *wiring);
+
+/* Whether b was begun after a: a later generation, or the same of a host with
  * a higher epoch. */
 bool wiring_newer(const struct cube_wiring *b, const struct cube_wiring *a);
 

@@ -4,7 +4,12 @@
 #include "sending.h"
 #include "transport/wiring.h"
 
-enum { FRUITLESS_MAX = 64 };
+enum {
+    FRUITLESS_MAX = 64,
+    /* Generations of other hosts that are answered: one is normal where a host
+     * was here before, a few come of nodes that were cut off meanwhile. */
+    OUTDONE_MAX = 4
+};
 
 /* Whether the host can speak by that node: by a wire, and on to another. */
 static bool speaks(const struct host_service *s, const struct cube_wiring *w,
@@ -50,12 +55,26 @@ static int check_renewed(const struct host_service *s, struct host_error *error)
     return 0;
 }
 
+/* Nodes that come back to another host's generation, whatever is answered,
+ * would have the run begin for ever. */
+static int check_outdone(const struct host_service *s, struct host_error *error)
+{
+    unsigned gateway = cube_wiring(s->cube)->gateway;
+    return cube_statistics(s->cube)->outdone <= OUTDONE_MAX
+               ? 0
+               : host_fail(error, HOST_CUBE,
+                           "node %u link %u: tells of a generation of another "
+                           "host, and goes back to it when it is told a new "
+                           "one; restart the nodes, and run again",
+                           gateway, host_detector_link(s, gateway));
+}
+
 int host_generation_begin(struct host_service *service, uint64_t now_us,
                           struct host_error *error)
 {
     struct host_service *s = service;
     host_detector_begin(s, now_us);
-    if (check_renewed(s, error) != 0) {
+    if (check_outdone(s, error) != 0 || check_renewed(s, error) != 0) {
         return error->code;
     }
     if (s->started) {
@@ -96,7 +115,6 @@ int host_generation_renew(struct host_service *service, uint64_t now_us,
     if (check_progress(s, error) != 0) {
         return error->code;
     }
-    next.generation++;
     if (s->searching) {
         next.dead_count = next.settled; /* that a wire is absent shows later */
     } else {

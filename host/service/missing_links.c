@@ -68,7 +68,6 @@ static void tell(struct host_service *s, const struct cube_wiring *w)
 static void search(struct host_service *s, uint64_t now_us)
 {
     struct cube_wiring next = *cube_wiring(s->cube);
-    next.generation++;
     next.dead_count = next.settled;
     next.absent_s = ABSENT_S;
     s->searching = true;
@@ -80,7 +79,6 @@ static void search(struct host_service *s, uint64_t now_us)
 static void end_search(struct host_service *s, uint64_t now_us, bool missing)
 {
     struct cube_wiring next = *cube_wiring(s->cube);
-    next.generation++;
     next.absent_s = missing ? s->machine->absent_s : 0;
     if (missing) {
         tell(s, &next);

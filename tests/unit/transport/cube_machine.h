@@ -23,6 +23,7 @@
 
 #include "host/sim/sim_cube.h"
 #include "transport/cube.h"
+#include "transport/wiring.h"
 
 enum { NODES_MAX = 32, ENDS_MAX = NODES_MAX + 1, TYPES = 4 };
 
@@ -324,6 +325,22 @@ static inline void settle(struct machine *m, uint32_t generation)
         assert_true(i < 20000);
         poll_all(m, 100);
     }
+}
+
+/* The host begins that generation, from which more than half the circle may be
+ * left, and all follow. */
+static inline void renew_to(struct machine *m, uint32_t generation)
+{
+    struct cube *host = m->places[m->nodes].cube;
+    struct cube_wiring next = *cube_wiring(host);
+    if (!wiring_after(generation, next.generation)) {
+        next.generation += INT32_MAX;
+        cube_renew(host, &next);
+        settle(m, next.generation);
+    }
+    next.generation = generation;
+    cube_renew(host, &next);
+    settle(m, generation);
 }
 
 /* A new arena and epoch, as after a reset. */

@@ -307,7 +307,7 @@ static void wrong_wires_in_words(void **unused)
         {{CUBE_HOST, 3, 1, 1, LINK_WRONG_WIRE},
          "the host link 1 is wired to node 3, expected node 6"},
         {{2, 3, 0, 0, LINK_WRONG_VERSION},
-         "node 2 link 0: node 3 has another protocol version, expected 1"},
+         "node 2 link 0: node 3 has another protocol version, expected 2"},
         {{2, 3, 0, 0, LINK_WRONG_GREETING},
          "node 2 link 0: node 3 has another cube dimension, expected 10"},
         {{2, 3, 0, 0, LINK_WRONG_SIZES},

@@ -98,6 +98,41 @@ static void what_is_newer_wins_entirely(void **unused)
     }
 }
 
+/* Around the circle: what follows is later, whatever its number. */
+static void generations_go_round(void **unused)
+{
+    static const uint32_t far[] = {
+        1,          2,          0x7fff,     0x8000,     0xffff,    0x10000,
+        0x7fffffff, 0x80000000, 0x80000001, 0xfffffffe, 0xffffffff};
+    enum { FAR = sizeof far / sizeof far[0] };
+    (void)unused;
+    for (unsigned i = 0; i < FAR; i++) {
+        uint32_t a = far[i], next = wiring_next(a);
+        assert_true(next != 0 && wiring_after(next, a));
+        assert_false(wiring_after(a, next) || wiring_after(a, a));
+        assert_true(wiring_after(a, 0) && !wiring_after(0, a));
+        for (unsigned k = 0; k < FAR; k++) {
+            uint32_t b = far[k];
+            assert_true(wiring_after(a, b) + wiring_after(b, a) == (i != k));
+        }
+    }
+    assert_true(wiring_after(5, 0xffffffff) && wiring_after(0x70000000, 5));
+    assert_false(wiring_after(0xffffffff, 5) || wiring_after(0, 0));
+}
+
+/* Of PROTOCOL.md's message. */
+static void a_stamp_stands_for_generation_and_host(void **unused)
+{
+    struct cube_wiring a = {.generation = 1, .host_epoch = 0x0badcafe}, b = a;
+    (void)unused;
+    assert_int_equal(wiring_stamp(&a), 0x3fe7);
+    b.generation = 0x10001;
+    assert_int_not_equal(wiring_stamp(&b), 0x3fe7);
+    b.generation = 1;
+    b.host_epoch++;
+    assert_int_not_equal(wiring_stamp(&b), 0x3fe7);
+}
+
 static void a_node_whose_links_are_dead_is_one_entry(void **unused)
 {
     struct cube_wiring w;
@@ -201,6 +236,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_come_to_the_same),
         cmocka_unit_test(what_is_newer_wins_entirely),
+        cmocka_unit_test(generations_go_round),
+        cmocka_unit_test(a_stamp_stands_for_generation_and_host),
         cmocka_unit_test(a_node_whose_links_are_dead_is_one_entry),
         cmocka_unit_test(a_gateway_lives_while_its_hosts_wire_does),
         cmocka_unit_test(its_bytes),
