@@ -164,6 +164,11 @@ int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
     return incode_pager_deliver(&t->maker.pager, page, data, bytes);
 }
 
+uint32_t incode_triangulator_awaited(const struct incode_triangulator *t)
+{
+    return incode_pager_awaited(&t->maker.pager);
+}
+
 int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 const struct incode_face *faces, size_t count,
                                 bool last)

@@ -122,6 +122,10 @@ void incode_triangulator_start(struct incode_triangulator *t,
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes);
 
+/* A page that has been asked for and has not arrived; INCODE_NONE: there is
+ * none.  A pass over the frames. */
+uint32_t incode_triangulator_awaited(const struct incode_triangulator *t);
+
 /* Spilled toggles of a brick that was asked for, in the order in which they
  * went; `last`: there are no more.  Returns 0, or -1 where the brick was not
  * asked for or a face is not its own. */

@@ -63,6 +63,9 @@ struct node_board {
     /* Sleeps until bytes can be received, or sent where a link had no room,
      * but no longer than wait_us. */
     void (*idle)(void *context, uint64_t wait_us);
+    /* Bit i: whoever is at the other end of link i could not prove that it has
+     * this node's key.  NULL: the wires have no keys. */
+    uint32_t (*refused)(void *context);
     /* The node's end: a fresh start, or where there is a system, an exit with
      * this status. */
     void (*reset)(void *context, int status);

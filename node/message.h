@@ -19,7 +19,7 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 4,              /* both ends must agree */
+    NODE_PROTOCOL = 5,              /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
     NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got */
     NODE_FAULT_TEXT_MAX = 200,      /* bytes */
@@ -68,6 +68,11 @@ struct node_pong_message {
     uint32_t received; /* from the host before that ping */
     uint32_t sent;     /* to the host before this one */
     uint32_t links;    /* bit d: link d has been up since this start */
+    uint32_t refused;  /* bit d: who is at the other end has not its key */
+    uint32_t work;     /* steps and messages of its role since this start: a
+                          change is progress, of whatever size */
+    uint32_t awaited;  /* a page that it has asked for and not got, or
+                          INCODE_NONE: who keeps it holds the node up */
 };
 
 /* Begins a node's role; sent once a generation to each node.  There are no
@@ -169,6 +174,7 @@ struct node_finished_message {
 /* The layouts are the same on every processor. */
 static_assert(sizeof(struct incode_face) == 12, "face layout");
 static_assert(sizeof(struct incode_job) == 56, "job layout");
+static_assert(sizeof(struct node_pong_message) == 32, "pong layout");
 static_assert(sizeof(struct node_job_message) == 64, "job layout");
 static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
 static_assert(sizeof(struct node_setup_message) == 96, "setup layout");

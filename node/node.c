@@ -27,6 +27,7 @@ struct node {
     struct node_finished_message before; /* of roles before this one */
     struct node_fault fault;
     bool fault_sent;
+    uint32_t work; /* steps and messages of roles: what a pong tells of it */
     uint64_t now_us, stop_us;
 };
 
@@ -277,6 +278,11 @@ static bool send_pong(struct node *n)
     n->pong.start = n->board->identity.epoch;
     n->pong.sent = n->counted.sent;
     n->pong.links = links_seen(n);
+    n->pong.refused =
+        n->board->refused == NULL ? 0 : n->board->refused(n->board->context);
+    n->pong.work = n->work;
+    n->pong.awaited =
+        n->role == NULL ? INCODE_NONE : n->role->awaited(n->role_arena);
     return node_counted_write(&n->counted, CUBE_HOST, NODE_PONG, &n->pong,
                               sizeof n->pong) == 0;
 }
@@ -338,6 +344,7 @@ static unsigned serve_role(struct node *n)
 {
     const struct node_role *role = n->role;
     unsigned moved = role->work(n->role_arena) + role->send(n->role_arena);
+    n->work += moved;
     uint32_t epoch = role->done(n->role_arena);
     if (!node_fault_is_set(&n->fault) && epoch != 0 &&
         send_finished(n, epoch)) {

@@ -60,6 +60,12 @@ static void idle(void *context, uint64_t wait_us)
     linux_wires_idle(board->wire, board->links_count, wait_us, board->awake_us);
 }
 
+static uint32_t refused(void *context)
+{
+    const struct linux_board *board = context;
+    return linux_wires_refused(board->wire, board->links_count);
+}
+
 /* A node that a user started begins anew, with an epoch of its own. */
 static void reset(void *context, int status)
 {
@@ -186,6 +192,7 @@ static void fill_in(struct node_board *board, struct linux_board *linux_board)
     board->now_us = now_us;
     board->busy_us = busy_us;
     board->idle = idle;
+    board->refused = refused;
     board->reset = reset;
 }
 

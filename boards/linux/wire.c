@@ -189,6 +189,18 @@ static void tell_of_key(struct linux_wire *wire)
     }
 }
 
+uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count)
+{
+    uint32_t refused = 0;
+    for (unsigned i = 0; i < count; i++) {
+        const struct tcp_wire *net = wires[i].net;
+        bool other =
+            wires[i].kind == LINUX_NET && net->tcp.fd < 0 && net->other_key;
+        refused |= (uint32_t)other << i;
+    }
+    return refused;
+}
+
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
                       uint64_t wait_us, uint64_t awake_us)
 {

@@ -45,6 +45,10 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 
+/* Bit i: nobody is connected by wire i, and who was there last could not prove
+ * that it has the key. */
+uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count);
+
 /* Sleeps until bytes have come, or room for them where there was none, but no
  * longer than wait_us; awake_us: as in wait.h.  At most CUBE_LINKS_MAX wires.
  */

@@ -73,6 +73,12 @@ static void missing(void *context, unsigned node, unsigned link)
     t->machine.missing(t->machine.context, node, link);
 }
 
+static void told(void *context, const char *line)
+{
+    struct host_throttled *t = context;
+    t->machine.told(t->machine.context, line);
+}
+
 static unsigned restarts(void *context)
 {
     struct host_throttled *t = context;
@@ -125,6 +131,7 @@ struct host_machine host_throttle_machine(struct host_throttled *throttled,
     result.idle = idle;
     result.check = check;
     result.missing = machine->missing != NULL ? missing : NULL;
+    result.told = machine->told != NULL ? told : NULL;
     result.restarts = machine->restarts != NULL ? restarts : NULL;
     result.kill = machine->kill != NULL ? kill_node : NULL;
     result.doubt = machine->doubt != NULL ? doubt : NULL;

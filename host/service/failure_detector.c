@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "idle_nodes.h"
 #include "missing_links.h"
 
 enum {
@@ -76,7 +77,8 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
     s->news_us = s->ping_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
-        bool lost = node->given_up || !cube_reaches(s->cube, (uint16_t)i);
+        bool lost = node->given_up || node->aside ||
+                    !cube_reaches(s->cube, (uint16_t)i);
         s->work.lost[i] = lost;
         s->work.living += !lost;
         node->ping_due = !lost && !s->probing;
@@ -84,7 +86,8 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
         node->pinged = false;
         node->ping_again_us = PING_AGAIN_US_MIN;
         node->sent = node->received = node->missed = 0;
-        node->silent_us = 0;
+        node->silent_us = node->still_us = 0;
+        node->awaited = INCODE_NONE;
         s->report[i].up = s->report[i].ready = false;
         if (lost) {
             close_start(s, i);
@@ -156,6 +159,11 @@ int host_detector_pong(struct host_service *service,
         pong.sent != node->received) {
         s->loss = true;
     }
+    if (pong.work != node->work) {
+        host_idle_progress(s, message->source);
+    }
+    node->work = pong.work;
+    node->awaited = pong.awaited;
     host_missing_links_heard(s, message->source, pong.links);
     node->pinged = false;
     node->ping_due = false; /* what would have been asked again, is answered */
@@ -384,6 +392,12 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     if (s->machine->check(s->machine->context, error) != 0) {
         return error->code;
     }
+    if (s->work.living == 0) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u link %u: no node is left to work; look after "
+                         "the nodes, and run again",
+                         s->blamed, host_detector_link(s, s->blamed));
+    }
     if (wiring->wrong_count > 0) {
         return fail_wrong(s, error);
     }
@@ -398,6 +412,7 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     ping_in_turn(s, now_us);
     elapsed = elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX;
     listen(s, now_us, elapsed);
+    host_idle_check(s, elapsed);
     host_missing_links_look(s, elapsed);
     if (check_wire(s, now_us, error) != 0) {
         return error->code;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "failure_detector.h"
+#include "idle_nodes.h"
 #include "missing_links.h"
 #include "node/result.h"
 #include "node/totals.h"
@@ -328,6 +329,12 @@ int host_handle(struct host_service *service,
         return unsound(message, error, "not in this cube");
     }
     struct host_node *node = &service->node[message->source];
+    if (service->work.lost[message->source]) {
+        return 0; /* it has no part in this generation */
+    }
+    if (message->type != NODE_PONG) {
+        host_idle_progress(service, message->source);
+    }
     bool expected = message->type == NODE_PONG || message->type == NODE_FAULT ||
                     (service->started && !node->setup_due);
     int status = 0;

@@ -38,6 +38,9 @@ struct host_machine {
     /* Is told of a wire that is missing from the start; NULL: the user is, on
      * standard error. */
     void (*missing)(void *context, unsigned node, unsigned link);
+    /* Is told what the user should know, a line without "incode: "; NULL: the
+     * user is, on standard error. */
+    void (*told)(void *context, const char *line);
     /* Microseconds since any fixed time, never going back. */
     uint64_t (*now_us)(void *context);
     /* Sleeps until bytes have come, or room for them where there was none, but

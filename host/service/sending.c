@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "failure_detector.h"
+#include "idle_nodes.h"
 
 static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
                          const void *data, size_t size)
@@ -143,6 +144,7 @@ static bool serve_work(struct host_service *s, uint16_t to,
         s->strategy->set_up(&s->work, to, &setup);
         node->setup_due =
             !send_counted(s, to, NODE_SETUP, &setup, sizeof setup);
+        host_idle_progress(s, to);
         return !node->setup_due;
     }
     struct incode_job job;
@@ -152,10 +154,12 @@ static bool serve_work(struct host_service *s, uint16_t to,
     if (node->job_due) {
         node->job_due =
             !send_counted(s, to, NODE_JOB, &node->job, sizeof node->job);
+        host_idle_progress(s, to);
         return !node->job_due;
     }
     if (node->report_due) {
         node->report_due = !send_counted(s, to, NODE_REPORT, NULL, 0);
+        host_idle_progress(s, to);
         return !node->report_due;
     }
     /* Half of the credit back at a time. */

@@ -176,6 +176,7 @@ static void prepare(struct host_service *s)
 /* Statistics of all that nodes have done, from those who have not told. */
 static void ask_for_reports(struct host_service *s)
 {
+    s->reporting = true;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
         node->report_due = !s->work.lost[i] && !node->reported;

@@ -53,6 +53,11 @@ struct host_node {
     bool reported; /* statistics of all that it has done are here */
     /* Whether it is there: failure_detector.h. */
     bool given_up;           /* for the rest of the run */
+    bool aside;              /* has no work for the rest of the run */
+    bool started_anew;       /* as it was not to be trusted with work */
+    uint32_t work;           /* as its last pong counted it, */
+    uint32_t awaited;        /* and the page that it waited for */
+    uint64_t still_us;       /* without progress: idle_nodes.h */
     bool pinged;             /* a ping has not been answered */
     bool ping_last;          /* what it was sent last is a ping */
     uint32_t sent, received; /* counted messages of this generation */
@@ -101,6 +106,7 @@ struct host_service {
     struct host_ledger ledger;
     struct host_spill spill;
     bool started, finished;
+    bool reporting;      /* statistics are asked for: nothing else is left */
     bool dealt;          /* the first jobs of this generation are out */
     bool over;           /* all is here that is needed */
     uint32_t generation; /* of the wiring that is followed */

@@ -176,6 +176,11 @@ static void boot(struct host_world *w, unsigned i)
     n->board.identity.epoch = w->epoch++;
     n->starts++;
     n->state = HOST_WORLD_UP;
+    n->node = NULL;
+    if (n->idles) {
+        n->idler = host_idler_start(&n->board);
+        return;
+    }
     n->node = node_start(&n->board, &why);
     if (n->node == NULL) {
         give_up(w, i, why);
@@ -215,6 +220,12 @@ void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
     wake_at(world, node, n->busy_until_us);
 }
 
+void host_world_idle(struct host_world *world, unsigned node)
+{
+    world->node[node].idles = true;
+    host_world_crash(world, node, 0, false);
+}
+
 void host_world_kill(struct host_world *world, unsigned node)
 {
     host_world_crash(world, node, 0, false);
@@ -243,7 +254,8 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
 /* When an idle node has something to do. */
 static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
 {
-    uint64_t due = w->now_us + node_wait_us(n->node);
+    uint64_t due = w->now_us + (n->idles ? host_idler_wait_us(n->idler)
+                                         : node_wait_us(n->node));
     unsigned i = n->board.identity.self;
     for (unsigned d = 0; d < n->links; d++) {
         const struct sim_end *end = host_sim_cube_port(&w->cube, i, d)->end;
@@ -269,7 +281,9 @@ static void step(struct host_world *w, unsigned i)
     for (unsigned d = 0; d < n->links; d++) {
         host_sim_cube_port(&w->cube, i, d)->end->out->blocked = false;
     }
-    enum node_event event = node_step(n->node);
+    enum node_event event = !n->idles                   ? node_step(n->node)
+                            : host_idler_step(n->idler) ? NODE_BUSY
+                                                        : NODE_IDLE;
     if (event == NODE_STOPPED) {
         n->board.reset(n, 0);
         w->ended++;
@@ -415,6 +429,12 @@ static void machine_missing(void *context, unsigned node, unsigned link)
     w->named[host_sim_cube_wire(&w->cube, node, link)] = true;
 }
 
+/* Seeds say what they have to say at their end. */
+static void machine_told(void *context, const char *line)
+{
+    (void)context, (void)line;
+}
+
 struct host_machine host_world_machine(struct host_world *world)
 {
     struct host_machine machine = {0};
@@ -431,6 +451,7 @@ struct host_machine host_world_machine(struct host_world *world)
     }
     machine.absent_s = world->options.absent_s;
     machine.missing = machine_missing;
+    machine.told = machine_told;
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;

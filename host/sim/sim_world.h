@@ -18,6 +18,7 @@
 #include "host/service/machine.h"
 #include "node/node.h"
 #include "sim_cube.h"
+#include "sim_idler.h"
 
 enum {
     HOST_WORLD_STACK = 64 * 1024, /* of a node's memory, outside its arena */
@@ -58,6 +59,8 @@ struct host_world_node {
     struct host_world *world;
     struct node_board board;
     struct node *node;
+    struct host_idler *idler; /* instead of it, in a node that only idles */
+    bool idles;               /* from its next start on */
     enum host_world_state state;
     bool unplugged; /* its wires were cut while it is off */
     uint64_t wake_us, busy_until_us, busy_us, offset_us;
@@ -105,6 +108,9 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us);
  * sent to it is lost, or its wires are seen to be closed. */
 void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
                       bool unplugged);
+
+/* The same at once, and from then on it answers and does no work. */
+void host_world_idle(struct host_world *world, unsigned node);
 
 /* The node never comes back. */
 void host_world_kill(struct host_world *world, unsigned node);

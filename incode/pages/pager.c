@@ -160,6 +160,15 @@ bool incode_pager_loading(const struct incode_pager *pager, uint32_t page)
     return i != INCODE_NO_FRAME && pager->slots[i].state != INCODE_FRAME_READY;
 }
 
+uint32_t incode_pager_awaited(const struct incode_pager *pager)
+{
+    for (uint16_t i = 0; pager->loading > 0 && i < pager->free; i++) {
+        if (pager->slots[i].state == INCODE_FRAME_LOADING)
+            return pager->slots[i].number;
+    }
+    return INCODE_NONE;
+}
+
 static void leaf_boxes(struct incode_frame *f)
 {
     const double *axis[3] = {f->page.brick.x, f->page.brick.y, f->page.brick.z};

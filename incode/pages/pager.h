@@ -122,6 +122,10 @@ struct incode_frame *incode_pager_get(struct incode_pager *pager,
 /* Whether the page is on its way. */
 bool incode_pager_loading(const struct incode_pager *pager, uint32_t page);
 
+/* A page that is on its way; INCODE_NONE: there is none.  A pass over the
+ * frames. */
+uint32_t incode_pager_awaited(const struct incode_pager *pager);
+
 /* 0, or -1 where the page was not asked for or the size is wrong. */
 int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
                          const void *data, size_t bytes);

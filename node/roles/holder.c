@@ -216,6 +216,13 @@ static void holder_end(void *self, uint64_t now_us)
     (void)self, (void)now_us;
 }
 
+/* It waits for the host alone, which knows of that. */
+static uint32_t holder_awaited(const void *self)
+{
+    (void)self;
+    return INCODE_NONE;
+}
+
 static uint32_t holder_held(const void *self)
 {
     const struct holder *h = self;
@@ -256,6 +263,7 @@ const struct node_role node_holder_role = {
     .send = holder_send,
     .done = holder_done,
     .end = holder_end,
+    .awaited = holder_awaited,
     .held = holder_held,
     .totals = holder_totals,
     .map = holder_map,

@@ -64,6 +64,9 @@ struct node_role {
      * 0, and never after a fault. */
     void (*end)(void *self, uint64_t now_us);
 
+    /* A page that it has asked for and not got; INCODE_NONE: there is none. */
+    uint32_t (*awaited)(const void *self);
+
     /* Slots of its queues in use; 0 when no job is open. */
     uint32_t (*held)(const void *self);
 

@@ -455,6 +455,12 @@ static unsigned worker_send(void *self)
     return sent;
 }
 
+static uint32_t worker_awaited(const void *self)
+{
+    const struct worker *w = self;
+    return incode_triangulator_awaited(w->triangulator);
+}
+
 static uint32_t worker_held(const void *self)
 {
     const struct worker *w = self;
@@ -524,6 +530,7 @@ const struct node_role node_worker_role = {
     .send = worker_send,
     .done = worker_done,
     .end = worker_end,
+    .awaited = worker_awaited,
     .held = worker_held,
     .totals = worker_totals,
     .map = worker_map,

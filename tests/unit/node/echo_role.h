@@ -112,6 +112,13 @@ static void echo_end(void *self, uint64_t now_us)
     e->ended_us = now_us;
 }
 
+/* The epoch of its job, as if it were a page. */
+static uint32_t echo_awaited(const void *self)
+{
+    const struct echo *e = self;
+    return e->epoch == 0 ? INCODE_NONE : e->epoch;
+}
+
 static uint32_t echo_held(const void *self)
 {
     const struct echo *e = self;
@@ -145,6 +152,7 @@ static const struct node_role echo_role = {
     .send = echo_send,
     .done = echo_done,
     .end = echo_end,
+    .awaited = echo_awaited,
     .held = echo_held,
     .totals = echo_totals,
     .map = echo_map,

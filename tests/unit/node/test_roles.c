@@ -283,6 +283,46 @@ static void a_second_setup(void **unused)
     assert_int_equal(report().pages_held, 1);
 }
 
+/* A pong tells that something was done, what is waited for, and who has not the
+ * key. */
+static uint32_t refused_links(void *context)
+{
+    (void)context;
+    return 5;
+}
+
+static struct node_pong_message pong_of(void)
+{
+    struct node_ping_message ping = {0};
+    struct node_pong_message pong;
+    say(NODE_PING, &ping, sizeof ping);
+    memcpy(&pong, hear(NODE_PONG), sizeof pong);
+    assert_int_equal(world.size, sizeof pong);
+    return pong;
+}
+
+static void pongs_tell_of_work(void **unused)
+{
+    struct node_job_message job = {.epoch = ECHO_FAILS};
+    (void)unused;
+    struct node_pong_message none = pong_of();
+    assert_int_equal(none.awaited, INCODE_NONE);
+    assert_int_equal(none.refused, 0);
+    (void)begin(ECHO_ROLE);
+    assert_int_equal(pong_of().work, none.work);
+    say(ECHO_ASKS, "more", 4);
+    (void)hear(ECHO_ANSWERS);
+    struct node_pong_message some = pong_of();
+    assert_int_not_equal(some.work, none.work);
+    assert_int_equal(some.awaited, INCODE_NONE);
+    world.board[SELF].refused = refused_links;
+    assert_int_equal(pong_of().refused, 5);
+    assert_int_equal(pong_of().work, some.work); /* answers are none */
+    say(NODE_JOB, &job, sizeof job);
+    (void)hear(NODE_FAULT);
+    assert_int_equal(pong_of().awaited, ECHO_FAILS);
+}
+
 /* --- faults --------------------------------------------------------------- */
 
 static void an_unknown_role(void **unused)
@@ -317,13 +357,13 @@ static void setups_of_other_versions(void **unused)
         uint64_t more;
     } later = {setup, 0};
     (void)unused;
-    assert_int_equal(NODE_PROTOCOL, 4);
-    setup.protocol = later.setup.protocol = 3;
-    refuses(NODE_SETUP, &setup, sizeof setup, "protocol version 3, expected 4");
-    refuses(NODE_SETUP, &later, sizeof later, "protocol version 3, expected 4");
-    refuses(NODE_SETUP, &later, 4, "protocol version 3, expected 4");
+    assert_int_equal(NODE_PROTOCOL, 5);
+    setup.protocol = later.setup.protocol = 4;
+    refuses(NODE_SETUP, &setup, sizeof setup, "protocol version 4, expected 5");
+    refuses(NODE_SETUP, &later, sizeof later, "protocol version 4, expected 5");
+    refuses(NODE_SETUP, &later, 4, "protocol version 4, expected 5");
     refuses(NODE_SETUP, &later, 3, "setup in 3 bytes, expected 96");
-    later.setup.protocol = 4;
+    later.setup.protocol = 5;
     refuses(NODE_SETUP, &later, 100, "setup in 100 bytes, expected 96");
 }
 
@@ -494,6 +534,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(roles_map_their_arena, set_up,
                                         tear_down),
         cmocka_unit_test_setup_teardown(a_second_setup, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(pongs_tell_of_work, set_up, tear_down),
         cmocka_unit_test_setup_teardown(an_unknown_role, set_up, tear_down),
         cmocka_unit_test_setup_teardown(setups_of_other_versions, set_up,
                                         tear_down),

@@ -31,11 +31,13 @@ enum {
     NODES = 8,
     MEMORY = 1 << 20,
     EVENTS = 8,
+    TOLD = 64,
+    TOLD_BYTES = 400,
     DEAD_US = 2000000,
     SICK_US = 20 /* between two looks at the node that is */
 };
 
-enum what { NOTHING, RESTART, STOP, CUT, MEND };
+enum what { NOTHING, RESTART, STOP, CUT, MEND, IDLE, KILL };
 
 struct event {
     enum what what;
@@ -49,10 +51,17 @@ static struct {
     uint8_t absent_s;
     uint32_t dead_us;
     struct event events[EVENTS];
-    uint64_t stop_us;  /* a STOP lasts so long; 0: for ever */
-    double host_fails; /* when; 0: never */
-    bool sequential;   /* how it runs */
-    bool sick;         /* node 0 starts again whenever it has work */
+    uint64_t stop_us;    /* a STOP lasts so long; 0: for ever */
+    double host_fails;   /* when; 0: never */
+    bool sequential;     /* how it runs */
+    bool sick;           /* node 0 starts again whenever it has work */
+    uint64_t patience_s; /* 0: 8 */
+    /* What the user was told, and when. */
+    struct {
+        char line[TOLD_BYTES];
+        uint64_t us;
+    } told[TOLD];
+    unsigned told_count;
 } world;
 
 static uint64_t spatial_us, sequential_us; /* undisturbed runs */
@@ -101,6 +110,12 @@ static inline void happen(struct event *event)
     case MEND:
         cut(event->node, event->link, event->what == CUT);
         break;
+    case IDLE:
+        host_world_idle(&world.sim, event->node);
+        break;
+    case KILL:
+        host_world_kill(&world.sim, event->node);
+        break;
     case NOTHING:
         break;
     }
@@ -139,7 +154,7 @@ static inline void start_world(void)
         .dead_us = world.dead_us,
         .step_us = 20,
         .host_us = 20,
-        .time_us_max = UINT64_MAX,
+        .time_us_max = UINT64_C(2000000000), /* a run that hangs */
         .steps_max = UINT64_MAX,
         .absent_s = world.absent_s,
         .strike = strike,
@@ -172,6 +187,28 @@ static inline int machine_check(void *context, struct host_error *error)
                : 0;
 }
 
+static inline void machine_told(void *context, const char *line)
+{
+    (void)context;
+    assert_non_null(strstr(line, ": "));
+    assert_non_null(strstr(line, "; "));
+    if (world.told_count < TOLD) {
+        snprintf(world.told[world.told_count].line, TOLD_BYTES, "%s", line);
+        world.told[world.told_count++].us = world.sim.now_us;
+    }
+}
+
+/* When the user was told so first; UINT64_MAX: never. */
+static inline uint64_t told_us(const char *text)
+{
+    for (unsigned i = 0; i < world.told_count; i++) {
+        if (strstr(world.told[i].line, text) != NULL) {
+            return world.told[i].us;
+        }
+    }
+    return UINT64_MAX;
+}
+
 static inline bool machine_ended(void *context)
 {
     (void)context;
@@ -182,6 +219,7 @@ static inline struct host_machine make_machine(void)
 {
     struct host_machine machine = host_world_machine(&world.sim);
     machine.missing = NULL;
+    machine.told = machine_told;
     machine.check = machine_check;
     machine.ended = machine_ended;
     return machine;
@@ -203,7 +241,7 @@ static inline int run(const struct host_strategy *strategy,
     struct host_tetrahedra tets = {0};
     host_run_defaults(&options);
     options.quiet = true;
-    options.patience_s = 8;
+    options.patience_s = world.patience_s == 0 ? 8 : world.patience_s;
     options.memory = MEMORY;
     memset(&result, 0, sizeof result);
     memset(error, 0, sizeof *error);

@@ -246,7 +246,8 @@ static void test_unfinished(void **unused)
 static void answer(uint32_t start, uint32_t pinged, uint32_t received,
                    uint32_t sent)
 {
-    struct node_pong_message pong = {start, pinged, received, sent, 0};
+    struct node_pong_message pong = {
+        .start = start, .pinged = pinged, .received = received, .sent = sent};
     struct host_error error = {0};
     assert_int_equal(send(1, NODE_PONG, &pong, sizeof pong, &error), 0);
 }
@@ -396,10 +397,10 @@ static void test_texts(void **unused)
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 3, expected 4"},
-        {NODE_READY, &ready, 4, "protocol version 3, expected 4"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 4, expected 5"},
+        {NODE_READY, &ready, 4, "protocol version 4, expected 5"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
-        {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 20"},
+        {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 32"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
         {NODE_RESULT, &ready, 2, "results in 2 bytes, expected 8"},
         {NODE_PAGE_REQUEST, &page, 4, "page 1000000 out of range 0.."},
@@ -419,7 +420,7 @@ static void test_texts(void **unused)
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
          "same version"}};
-    assert_int_equal(NODE_PROTOCOL, 4);
+    assert_int_equal(NODE_PROTOCOL, 5);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();

@@ -316,8 +316,10 @@ static void large_numbers(void **unused)
     pager.source.context = &m;
     for (uint32_t k = 0; k < 1000; k++) {
         uint32_t page = UINT32_MAX - 1 - k * UINT32_C(4096);
+        assert_int_equal(incode_pager_awaited(&pager), INCODE_NONE);
         assert_null(incode_pager_get(&pager, page));
         assert_true(incode_pager_loading(&pager, page));
+        assert_int_equal(incode_pager_awaited(&pager), page);
         assert_int_equal(incode_pager_deliver(&pager, page, data, sizeof data),
                          0);
         assert_int_equal(incode_pager_deliver(&pager, page, data, sizeof data),

@@ -1,0 +1,91 @@
+#include "idle_nodes.h"
+
+#include <stdio.h>
+
+#include "node/keepers.h"
+#include "notices.h"
+
+void host_idle_progress(struct host_service *service, unsigned node)
+{
+    service->node[node].still_us = 0;
+}
+
+/* What the node has to work for. */
+static bool owes(const struct host_service *s, unsigned i)
+{
+    const struct host_node *node = &s->node[i];
+    bool ready = !node->setup_due && !s->report[i].ready;
+    bool results = node->working && !node->job_due;
+    bool statistics = s->reporting && !node->report_due && !node->reported;
+    return s->started && !s->work.lost[i] && s->report[i].up &&
+           (ready || results || statistics);
+}
+
+/* What it waits for is the host's to send. */
+static bool is_owed(const struct host_service *s, unsigned i)
+{
+    const struct host_node *node = &s->node[i];
+    uint32_t credits = node->results + s->setup.credits - node->credit;
+    return node->pages_count > 0 || node->unspills_count > 0 ||
+           (s->setup.credits > 0 && credits >= s->setup.credits / 2);
+}
+
+/* Who holds this node up: who keeps the page that it waits for, or itself. */
+static unsigned culprit(const struct host_service *s, unsigned i)
+{
+    struct node_setup_message setup = s->setup;
+    s->strategy->set_up(&s->work, i, &setup);
+    uint32_t page = s->node[i].awaited;
+    uint16_t keeper =
+        page == INCODE_NONE ? CUBE_HOST : node_keeper(page, setup.holders);
+    bool holds = keeper < s->machine->nodes && !s->work.lost[keeper] &&
+                 s->node[keeper].still_us > s->patience_us / 2;
+    return holds ? keeper : i;
+}
+
+bool host_idle_leave(struct host_service *service, unsigned node,
+                     const char *why)
+{
+    struct host_service *s = service;
+    struct host_node *n = &s->node[node];
+    n->still_us = 0;
+    s->blamed = node;
+    if (n->started_anew) {
+        return false;
+    }
+    if (s->machine->kill != NULL &&
+        s->machine->kill(s->machine->context, node)) {
+        n->started_anew = true; /* the machine will say so */
+        host_notice(s, node, "%s; it is ended and started again", why);
+        return true;
+    }
+    n->aside = true;
+    s->loss = true;
+    host_notice(s, node,
+                "%s; its work is given to others, look after that node", why);
+    return true;
+}
+
+void host_idle_check(struct host_service *service, uint64_t elapsed_us)
+{
+    struct host_service *s = service;
+    for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
+        struct host_node *node = &s->node[i];
+        node->still_us = is_owed(s, i) ? 0 : node->still_us + elapsed_us;
+        if (!owes(s, i) || node->still_us <= s->patience_us) {
+            continue;
+        }
+        char why[80];
+        unsigned who = culprit(s, i);
+        snprintf(why, sizeof why, "answers, but has done nothing for %llu s",
+                 (unsigned long long)s->patience_us / 1000000);
+        if (!host_idle_leave(s, who, why)) {
+            s->node[who].aside = true;
+            s->loss = true;
+            host_notice(s, who,
+                        "%s, for the second time; its work is given to "
+                        "others, look after that node",
+                        why);
+        }
+    }
+}
