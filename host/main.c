@@ -1,10 +1,10 @@
 /* The host program.  Nothing here but its commands and their arguments. */
-#include <argp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/base/text.h"
 #include "host/bench/bench_links.h"
@@ -37,41 +37,41 @@ struct simple {
     uint64_t seed;
     unsigned nodes;
     const char *wanted; /* names of the arguments */
+    struct host_error *error;
 };
 
 static error_t parse_simple(int key, char *value, struct argp_state *state)
 {
     struct simple *s = state->input;
-    uint64_t n = 0;
     switch (key) {
     case 'o':
         s->output = value;
         return 0;
     case 's':
         if (host_parse_number(value, 0, UINT64_MAX, &s->seed) != 0) {
-            argp_error(state, "--seed %s: not a number; give 0 or more", value);
+            host_fail(s->error, HOST_USAGE,
+                      "--seed %s: not a number; give 0 or more", value);
         }
         return 0;
     case 'n':
-        if (host_parse_number(value, 1, HOST_PROCESSES_MAX, &n) != 0 ||
-            (n & (n - 1)) != 0) {
-            argp_error(state,
-                       "--nodes %s: not a number of nodes of a cube; "
-                       "allowed: 1, 2, 4, 8, 16, 32, 64",
-                       value);
-        }
-        s->nodes = (unsigned)n;
+        (void)host_parse_nodes(value, HOST_PROCESSES_MAX, "", &s->nodes,
+                               s->error);
         return 0;
     case ARGP_KEY_ARG:
         if (s->count == s->most) {
-            argp_error(state, "%s: one argument too many; see --help", value);
+            host_fail(s->error, HOST_USAGE,
+                      "%s: one argument too many; give %s, and quote names "
+                      "with blanks",
+                      value, s->wanted);
+        } else {
+            s->argument[s->count++] = value;
         }
-        s->argument[s->count++] = value;
         return 0;
     case ARGP_KEY_END:
         if (s->count < s->least) {
-            argp_error(state, "%s: too few arguments; give all of these",
-                       s->wanted);
+            host_fail(s->error, HOST_USAGE,
+                      "%s: too few arguments; give %s, see --help", state->name,
+                      s->wanted);
         }
         return 0;
     default:
@@ -79,16 +79,18 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
     }
 }
 
-static void parse(int argc, char **argv, const struct argp_option *options,
-                  const char *arguments, const char *about, unsigned count,
-                  struct simple *simple)
+/* Not 0: the command ends with error->code. */
+static int parse(int argc, char **argv, const struct argp_option *options,
+                 const char *arguments, const char *about, unsigned count,
+                 struct simple *simple, struct host_error *error)
 {
     const struct argp argp = {options, parse_simple, arguments, about,
                               NULL,    NULL,         NULL};
     simple->least = count;
     simple->most = count;
     simple->wanted = arguments;
-    (void)argp_parse(&argp, argc, argv, 0, NULL, simple);
+    simple->error = error;
+    return host_options_parse(&argp, argc, argv, 0, simple, error);
 }
 
 static int command_run(int argc, char **argv, struct host_error *error)
@@ -127,14 +129,17 @@ static int command_gen(int argc, char **argv, struct host_error *error)
     struct host_points points = {0};
     struct simple s = {.seed = 1, .output = "-"};
     uint64_t n;
-    parse(argc, argv, options, "KIND N",
-          "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
-          "grid, rotated (a grid turned out of its axes), or hub (one point "
-          "amid N-1 on a sphere). N: 4 to 4294901760 (2^32 - 2^16).",
-          2, &s);
+    if (parse(
+            argc, argv, options, "KIND N",
+            "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
+            "grid, rotated (a grid turned out of its axes), or hub (one point "
+            "amid N-1 on a sphere). N: 4 to 4294901760 (2^32 - 2^16).",
+            2, &s, error) != 0) {
+        return error->code;
+    }
     if (host_parse_number(s.argument[1], HOST_GEN_MIN, host_gen_max, &n) != 0) {
         return host_fail(error, HOST_USAGE,
-                         "gen %s %s: not a number of points; give %d to "
+                         "gen %s %s: not a whole number of points; give %d to "
                          "%llu",
                          s.argument[0], s.argument[1], HOST_GEN_MIN,
                          (unsigned long long)host_gen_max);
@@ -153,12 +158,15 @@ static int command_verify(int argc, char **argv, struct host_error *error)
     struct host_points points = {0};
     struct host_tetrahedra tets = {0};
     struct simple s = {0};
-    parse(argc, argv, NULL, "POINTS TETS",
-          "Checks exactly that TETS is the Delaunay triangulation of POINTS: "
-          "every tetrahedron positive, no vertex inside the sphere of a "
-          "neighbour, facets in pairs or on the convex hull, every distinct "
-          "point a vertex, Euler's relation.",
-          2, &s);
+    if (parse(
+            argc, argv, NULL, "POINTS TETS",
+            "Checks exactly that TETS is the Delaunay triangulation of POINTS: "
+            "every tetrahedron positive, no vertex inside the sphere of a "
+            "neighbour, facets in pairs or on the convex hull, every distinct "
+            "point a vertex, Euler's relation.",
+            2, &s, error) != 0) {
+        return error->code;
+    }
     int status = host_points_read(s.argument[0], &points, error);
     if (status == 0) {
         status = host_tetrahedra_read(s.argument[1], &tets, NULL, error);
@@ -187,10 +195,12 @@ static int command_digest(int argc, char **argv, struct host_error *error)
     struct host_tetrahedra tets = {0};
     struct host_digest digest;
     struct simple s = {0};
-    parse(argc, argv, NULL, "TETS",
-          "Prints the digest of a file of tetrahedra: SHA-256 of its rows, "
-          "vertices and rows in ascending order.",
-          1, &s);
+    if (parse(argc, argv, NULL, "TETS",
+              "Prints the digest of a file of tetrahedra: SHA-256 of its rows, "
+              "vertices and rows in ascending order.",
+              1, &s, error) != 0) {
+        return error->code;
+    }
     int status = host_tetrahedra_read(s.argument[0], &tets, NULL, error);
     if (status == 0) {
         host_tetrahedra_sort(&tets);
@@ -204,19 +214,24 @@ static int command_digest(int argc, char **argv, struct host_error *error)
 static int command_convert(int argc, char **argv, struct host_error *error)
 {
     struct simple s = {0};
-    parse(argc, argv, NULL, "IN OUT",
-          "Converts points to points, or tetrahedra to tetrahedra, by the "
-          "files' extensions.",
-          2, &s);
+    if (parse(argc, argv, NULL, "IN OUT",
+              "Converts points to points, or tetrahedra to tetrahedra, by the "
+              "files' extensions.",
+              2, &s, error) != 0) {
+        return error->code;
+    }
     return host_convert(s.argument[0], s.argument[1], error);
 }
 
 static int command_cube(int argc, char **argv, struct host_error *error)
 {
     struct simple s = {0};
-    parse(argc, argv, NULL, "FILE",
-          "Checks a cube file, and prints how each of its nodes is started.", 1,
-          &s);
+    if (parse(
+            argc, argv, NULL, "FILE",
+            "Checks a cube file, and prints how each of its nodes is started.",
+            1, &s, error) != 0) {
+        return error->code;
+    }
     return host_cube_print(s.argument[0], error);
 }
 
@@ -226,11 +241,13 @@ static int command_bench(int argc, char **argv, struct host_error *error)
         {"nodes", 'n', "N", 0, "Up to N nodes. Default: 8", 0}, {0}};
     struct host_run_options run;
     struct simple s = {.nodes = 8};
-    parse(argc, argv, options, "paper|links",
-          "Measures this machine: paper prints Tables 2 and 4 of Cignoni, "
-          "Laforenza, Perego, Scopigno and Montani (1995); links prints what a "
-          "link does over each driver.",
-          1, &s);
+    if (parse(argc, argv, options, "paper|links",
+              "Measures this machine: paper prints Tables 2 and 4 of Cignoni, "
+              "Laforenza, Perego, Scopigno and Montani (1995); links prints "
+              "what a link does over each driver.",
+              1, &s, error) != 0) {
+        return error->code;
+    }
     if (strcmp(s.argument[0], "links") == 0) {
         return host_bench_links(error);
     }
@@ -262,6 +279,8 @@ struct command {
 
 enum { HELP_COLUMN = 23, TEXT_MAX = 2048 };
 
+static int command_help(int argc, char **argv, struct host_error *error);
+
 static const struct command commands[] = {
     {"run", "POINTS -o OUT", "triangulate on a cube of nodes", command_run},
     {"gen", "KIND N -o FILE",
@@ -275,7 +294,9 @@ static const struct command commands[] = {
     {"bench", "paper|links", "the paper's tables on this machine; its links",
      command_bench},
     {"sim", "--seeds A..B", "whole cubes in virtual time, with faults",
-     command_sim}};
+     command_sim},
+    {"help", "[COMMAND]", "this list, or what --help says of a command",
+     command_help}};
 
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 
@@ -315,23 +336,52 @@ static char *list_commands(int key, const char *text, void *input)
     return asprintf(&whole, text, rows) < 0 ? NULL : whole;
 }
 
+static const char *command_name(const void *unused, unsigned i)
+{
+    (void)unused;
+    return i < COMMANDS ? commands[i].name : NULL;
+}
+
 /* Stops at the first word that is no option: the command. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
 static error_t parse_top(int key, char *value, struct argp_state *state)
 {
     int *command = state->input;
-    switch (key) {
-    case ARGP_KEY_ARG:
-        (void)value;
-        *command = state->next - 1;
-        state->next = state->argc;
-        return 0;
-    case ARGP_KEY_NO_ARGS:
-        argp_error(state, "no command; allowed: %s", command_names());
-        return 0;
-    default:
+    if (key != ARGP_KEY_ARG) {
         return ARGP_ERR_UNKNOWN;
     }
+    (void)value;
+    *command = state->next - 1;
+    state->next = state->argc;
+    return 0;
+}
+
+static const struct argp top = {
+    NULL,
+    parse_top,
+    "COMMAND ARGUMENT...",
+    "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
+    "Commands:\n%s\n"
+    "incode COMMAND --help says more of each.",
+    NULL,
+    list_commands,
+    NULL};
+
+/* No command: what was meant. */
+static int refuse_command(const char *word, struct host_error *error)
+{
+    const char *nearest = host_text_nearest(word, command_name, NULL);
+    if (nearest == NULL && (access(word, F_OK) == 0 || strchr(word, '.'))) {
+        return host_fail(
+            error, HOST_USAGE,
+            "%s: a file's name, no command; to triangulate it, write "
+            "incode run %s -o OUT",
+            word, word);
+    }
+    return host_fail(
+        error, HOST_USAGE, "%s: no such command; %s%s%sallowed: %s", word,
+        nearest == NULL ? "" : "did you mean ", nearest == NULL ? "" : nearest,
+        nearest == NULL ? "" : "? ", command_names());
 }
 
 static int dispatch(int argc, char **argv, struct host_error *error)
@@ -344,8 +394,24 @@ static int dispatch(int argc, char **argv, struct host_error *error)
             return commands[i].run(argc, argv, error);
         }
     }
-    return host_fail(error, HOST_USAGE, "%s: no such command; allowed: %s",
-                     argv[0], command_names());
+    return refuse_command(argv[0], error);
+}
+
+static int command_help(int argc, char **argv, struct host_error *error)
+{
+    static char program[] = "incode", option[] = "--help";
+    if (argc > 2) {
+        return host_fail(error, HOST_USAGE,
+                         "%s: one command too many; incode help says more of "
+                         "one",
+                         argv[2]);
+    }
+    if (argc == 2 && argv[1][0] != '-' && strcmp(argv[1], "help") != 0) {
+        char *words[] = {argv[1], option, NULL};
+        return dispatch(2, words, error);
+    }
+    char *words[] = {program, option, NULL};
+    return host_options_parse(&top, 2, words, 0, NULL, error);
 }
 
 /* What was printed, help included, has to arrive. */
@@ -358,38 +424,38 @@ static void finish_stdout(void)
     }
 }
 
-int main(int argc, char **argv)
+static int run(int argc, char **argv, struct host_error *error)
 {
-    static const struct argp argp = {
-        NULL,
-        parse_top,
-        "COMMAND ARGUMENT...",
-        "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
-        "Commands:\n%s\n"
-        "incode COMMAND --help says more of each.",
-        NULL,
-        list_commands,
-        NULL};
-    struct host_error error = {0};
     int command = 0;
-    argp_err_exit_status = HOST_USAGE;
-    host_begin();
-    (void)atexit(finish_stdout);
-    (void)argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &command);
+    if (host_options_parse(&top, argc, argv, ARGP_IN_ORDER, &command, error) !=
+        0) {
+        return error->code;
+    }
+    if (command == 0) {
+        return host_fail(error, HOST_USAGE,
+                         "COMMAND: none is given; allowed: %s",
+                         command_names());
+    }
     const char *fault = incode_arithmetic_fault();
     if (fault != NULL) {
-        fprintf(stderr,
-                "incode: this machine: %s; run make clean and make without "
-                "flags that loosen floating point\n",
-                fault);
-        return HOST_BROKEN;
+        return host_fail(error, HOST_BROKEN,
+                         "this machine: %s; run make clean and make without "
+                         "flags that loosen floating point",
+                         fault);
     }
-    int status = dispatch(argc - command, argv + command, &error);
-    if (status != 0) {
-        if (error.text[0] != '\0') { /* else it is said */
-            fprintf(stderr, "incode: %s\n", error.text);
-        }
-        return status;
+    return dispatch(argc - command, argv + command, error);
+}
+
+int main(int argc, char **argv)
+{
+    static char name[] = "incode";
+    struct host_error error = {0};
+    host_begin();
+    (void)atexit(finish_stdout);
+    argv[0] = name;
+    int status = run(argc, argv, &error);
+    if (status != 0 && error.text[0] != '\0') { /* else it is said */
+        fprintf(stderr, "incode: %s\n", error.text);
     }
-    return 0;
+    return status;
 }

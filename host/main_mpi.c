@@ -1,7 +1,6 @@
 /* `incode run` in rank 0 of MPI: the host as it is elsewhere, on a cube of
  * ranks.  The program incode becomes this one where mpirun has started it, and
  * starts mpirun where nobody has (host/run/launch.h). */
-#include <argp.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -60,7 +59,6 @@ int main(int argc, char **argv)
 {
     struct host_error error = {0};
     static char name[] = "incode run";
-    argp_err_exit_status = HOST_USAGE;
     host_begin();
     prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
     mpi_environment();

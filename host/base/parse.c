@@ -1,19 +1,71 @@
 #include "parse.h"
 
-#include <errno.h>
-#include <stdlib.h>
+#include <stdbool.h>
+#include <stdio.h>
 #include <string.h>
+#include <strings.h>
+
+enum { ALLOWED_MAX = 80 };
+
+static bool is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
+/* 10 * *number + digit; false: it is too large. */
+static bool append(uint64_t *number, unsigned digit)
+{
+    uint64_t tens;
+    return !__builtin_mul_overflow(*number, (uint64_t)10, &tens) &&
+           !__builtin_add_overflow(tens, (uint64_t)digit, number);
+}
+
+/* Digits, moving *text past them; false: none, or too large a number. */
+static bool read_digits(const char **text, uint64_t *number)
+{
+    const char *at = *text;
+    bool good = is_digit(*at);
+    while (good && is_digit(*at)) {
+        good = append(number, (unsigned)(*at++ - '0'));
+    }
+    *text = at;
+    return good;
+}
+
+/* The fraction and exponent of a whole number, as ".5e3". */
+static bool read_exponent(const char *text, uint64_t *number)
+{
+    uint64_t exponent = 0, places = 0;
+    if (*text == '.') {
+        const char *point = text++;
+        if (!read_digits(&text, number)) {
+            return false;
+        }
+        places = (uint64_t)(text - point - 1);
+    }
+    if (*text != 'e' && *text != 'E') {
+        return false;
+    }
+    text += text[1] == '+' ? 2 : 1;
+    bool good = read_digits(&text, &exponent) && *text == '\0';
+    while (good && *number != 0 && exponent > places) {
+        good = append(number, 0);
+        exponent--;
+    }
+    for (; good && places > exponent; places--) {
+        good = *number % 10 == 0;
+        *number /= 10;
+    }
+    return good;
+}
 
 int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
                       uint64_t *number)
 {
-    char *end;
-    errno = 0;
-    if (*text < '0' || *text > '9') {
-        return -1;
-    }
-    unsigned long long value = strtoull(text, &end, 10);
-    if (errno != 0 || *end != '\0' || value < lo || value > hi) {
+    uint64_t value = 0;
+    if (!read_digits(&text, &value) ||
+        (*text != '\0' && !read_exponent(text, &value)) || value < lo ||
+        value > hi) {
         return -1;
     }
     *number = value;
@@ -22,25 +74,46 @@ int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
 
 int host_parse_bytes(const char *text, uint64_t *bytes)
 {
-    char *end;
-    errno = 0;
-    if (*text < '0' || *text > '9') {
+    static const char units[] = "KMG";
+    uint64_t value = 0;
+    unsigned shift = 0;
+    if (!read_digits(&text, &value)) {
         return -1;
     }
-    unsigned long long value = strtoull(text, &end, 10);
-    unsigned shift = 0;
-    if (*end != '\0') {
-        static const char units[] = "KMG";
-        const char *unit = strchr(units, *end >= 'a' ? *end - 32 : *end);
-        if (unit == NULL) {
+    text += *text == ' ' && text[1] != '\0' ? 1 : 0;
+    if (*text != '\0') {
+        const char *unit = strchr(units, *text >= 'a' ? *text - 32 : *text);
+        if (unit == NULL ||
+            (text[1] != '\0' && strcasecmp(text + 1, "b") != 0 &&
+             strcasecmp(text + 1, "ib") != 0)) {
             return -1;
         }
         shift = 10 * (unsigned)(unit - units + 1);
-        end += strcmp(end + 1, "iB") == 0 ? 3 : 1;
     }
-    if (errno != 0 || *end != '\0' || value > UINT64_MAX >> 20 >> shift) {
+    if (value > UINT64_MAX >> 20 >> shift) {
         return -1;
     }
-    *bytes = (uint64_t)value << shift;
+    *bytes = value << shift;
     return 0;
+}
+
+int host_parse_nodes(const char *text, unsigned most, const char *more,
+                     unsigned *nodes, struct host_error *error)
+{
+    char allowed[ALLOWED_MAX] = "1";
+    uint64_t n = 0;
+    bool number = host_parse_number(text, 0, UINT64_MAX, &n) == 0;
+    if (number && n > 0 && n <= most && (n & (n - 1)) == 0) {
+        *nodes = (unsigned)n;
+        return 0;
+    }
+    for (unsigned k = 2; k <= most; k *= 2) {
+        size_t used = strlen(allowed);
+        snprintf(allowed + used, sizeof allowed - used, ", %u", k);
+    }
+    return host_fail(error, HOST_USAGE, "--nodes %s: %s; allowed: %s%s", text,
+                     !number    ? "not a number"
+                     : n > most ? "more nodes than there can be here"
+                                : "not a power of two, as a cube has nodes",
+                     allowed, number && n > most ? more : "");
 }

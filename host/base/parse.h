@@ -13,12 +13,21 @@
 
 #include <stdint.h>
 
-/* A whole number in decimal, lo to hi.  0, or -1: *number stays as it is. */
+#include "error.h"
+
+/* A whole number in decimal, lo to hi, also as 1e6 or 2.5e3.  0, or -1: *number
+ * stays as it is. */
 int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
                       uint64_t *number);
 
-/* Bytes, with an optional K, M or G, or KiB, MiB, GiB: 4M.  0, or -1: *bytes
- * stays as it is. */
+/* Bytes, with an optional K, M or G, which are powers of 1024 as memory comes,
+ * of either case and with or without B or iB: 4M, 4MB, "4 MiB".  0, or -1:
+ * *bytes stays as it is. */
 int host_parse_bytes(const char *text, uint64_t *bytes);
+
+/* The value of --nodes: a power of two, up to `most`, which is one.  `more`:
+ * what else to do for more nodes, or "". */
+int host_parse_nodes(const char *text, unsigned most, const char *more,
+                     unsigned *nodes, struct host_error *error);
 
 #endif

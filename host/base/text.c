@@ -89,6 +89,57 @@ int host_text_quote(char *out, size_t size, const char *text)
     return fits ? 0 : -1;
 }
 
+/* --- what was meant ---------------------------------------------------------
+ */
+
+enum { WORD_MAX = 40 };
+
+static unsigned least(unsigned a, unsigned b)
+{
+    return a < b ? a : b;
+}
+
+/* Row i: from the first i letters of a to the first k of b, for every k. */
+static unsigned distance(const char *a, const char *b)
+{
+    unsigned row[3][WORD_MAX + 1];
+    size_t n = strnlen(a, WORD_MAX), m = strnlen(b, WORD_MAX);
+    for (unsigned k = 0; k <= m; k++) {
+        row[0][k] = k;
+    }
+    for (unsigned i = 1; i <= n; i++) {
+        unsigned *now = row[i % 3];
+        const unsigned *before = row[(i + 2) % 3], *first = row[(i + 1) % 3];
+        now[0] = i;
+        for (unsigned k = 1; k <= m; k++) {
+            now[k] = least(least(before[k], now[k - 1]) + 1,
+                           before[k - 1] + (a[i - 1] != b[k - 1]));
+            if (i > 1 && k > 1 && a[i - 1] == b[k - 2] &&
+                a[i - 2] == b[k - 1]) {
+                now[k] = least(now[k], first[k - 2] + 1);
+            }
+        }
+    }
+    return row[n % 3][m];
+}
+
+const char *host_text_nearest(const char *word,
+                              const char *(*name)(const void *context,
+                                                  unsigned i),
+                              const void *context)
+{
+    const char *nearest = NULL;
+    unsigned best = (unsigned)(strlen(word) + 2) / 3 + 1;
+    for (unsigned i = 0; name(context, i) != NULL; i++) {
+        unsigned far = distance(word, name(context, i));
+        if (far < best) {
+            best = far;
+            nearest = name(context, i);
+        }
+    }
+    return nearest;
+}
+
 /* --- for a terminal --------------------------------------------------------
  */
 

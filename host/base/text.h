@@ -30,4 +30,12 @@ int host_text_quote(char *out, size_t size, const char *text);
 void host_say(FILE *stream, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
+/* Of the names that `name` gives from 0 up to NULL, the one that may have been
+ * meant by `word`, by the fewest letters changed, left out, put in or swapped
+ * (Damerau, CACM 7:171-176, 1964); NULL: none is near. */
+const char *host_text_nearest(const char *word,
+                              const char *(*name)(const void *context,
+                                                  unsigned i),
+                              const void *context);
+
 #endif

@@ -1,11 +1,12 @@
 #include "arguments.h"
 
-#include <argp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/options.h"
 #include "host/base/parse.h"
+#include "host/base/text.h"
 #include "host/formats/formats.h"
 #include "host/order/names.h"
 #include "host/service/strategies/strategies.h"
@@ -125,10 +126,17 @@ static bool is_among(const char *names, const char *name)
     return at != NULL;
 }
 
+typedef const char *row_name(unsigned i);
+
+static const char *name_at(const void *context, unsigned i)
+{
+    return (*(row_name *const *)context)(i);
+}
+
 /* Which of the rows that `name` gives, up to NULL, `value` is, or -1 with the
  * error: what is allowed, and what other versions have (later). */
 static int choose(struct parse *p, const char *option, const char *value,
-                  const char *(*name)(unsigned i), const char *later)
+                  row_name *name, const char *later)
 {
     char allowed[sizeof p->error->text] = "";
     size_t used = 0;
@@ -141,9 +149,13 @@ static int choose(struct parse *p, const char *option, const char *value,
                                      "%s%s", i == 0 ? "" : ", ", name(i));
         }
     }
-    host_fail(p->error, HOST_USAGE, "--%s %s: %s; allowed: %s", option, value,
-              is_among(later, value) ? "not in this version" : "no such name",
-              allowed);
+    const char *nearest = host_text_nearest(value, name_at, &name);
+    bool elsewhere = is_among(later, value);
+    host_fail(p->error, HOST_USAGE, "--%s %s: %s; %s%s%sallowed: %s", option,
+              value, elsewhere ? "not in this version" : "no such name",
+              elsewhere || nearest == NULL ? "" : "did you mean ",
+              elsewhere || nearest == NULL ? "" : nearest,
+              elsewhere || nearest == NULL ? "" : "? ", allowed);
     return -1;
 }
 
@@ -175,19 +187,6 @@ static int number(struct parse *p, const char *option, const char *value,
     return 0;
 }
 
-static void parse_nodes(struct parse *p, const char *value)
-{
-    uint64_t n = 0;
-    if (host_parse_number(value, 1, HOST_PROCESSES_MAX, &n) != 0 ||
-        (n & (n - 1)) != 0) {
-        host_fail(p->error, HOST_USAGE,
-                  "--nodes %s: not a number of nodes of a cube; allowed: 1, "
-                  "2, 4, 8, 16, 32, 64",
-                  value);
-    }
-    p->options->nodes = (unsigned)n;
-}
-
 static void parse_memory(struct parse *p, const char *value)
 {
     uint64_t *bytes = &p->options->memory;
@@ -195,7 +194,7 @@ static void parse_memory(struct parse *p, const char *value)
         *bytes > UINT64_C(1) << 30) {
         host_fail(p->error, HOST_USAGE,
                   "--memory %s: not a size of memory that is allowed; give "
-                  "640K to 1G, or less to a small cube",
+                  "640K to 1G, as in 4M, or less to a small cube",
                   value);
     }
     *bytes = *bytes / 4096 * 4096;
@@ -286,9 +285,9 @@ static bool parse_testing(int key, const char *value, struct parse *p)
     }
 }
 
-static error_t parse_report(int key, char *value, struct argp_state *state,
-                            struct host_run_options *o)
+static error_t parse_report(int key, const char *value, struct parse *p)
 {
+    struct host_run_options *o = p->options;
     switch (key) {
     case KEY_VERIFY:
         o->verify = true;
@@ -310,15 +309,17 @@ static error_t parse_report(int key, char *value, struct argp_state *state,
         return 0;
     case ARGP_KEY_ARG:
         if (o->input != NULL) {
-            argp_error(state, "%s: more than one file of points; give one",
-                       value);
+            host_fail(p->error, HOST_USAGE,
+                      "%s: a second file of points after %s; give one", value,
+                      o->input);
         }
         o->input = value;
         return 0;
     case ARGP_KEY_END:
         if (o->input == NULL) {
-            argp_error(state, "no POINTS; give a file, or - for "
-                              "standard input");
+            host_fail(
+                p->error, HOST_USAGE,
+                "POINTS: not given; name a file, or - for standard input");
         }
         return 0;
     default:
@@ -340,7 +341,9 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         parse_output(p, value);
         return 0;
     case KEY_NODES:
-        parse_nodes(p, value);
+        (void)host_parse_nodes(value, HOST_PROCESSES_MAX,
+                               ", or with --cube what its file says",
+                               &p->options->nodes, p->error);
         return 0;
     case KEY_MEMORY:
         parse_memory(p, value);
@@ -359,7 +362,7 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
                   "strategies that are not in this version; leave them out");
         return 0;
     default:
-        return parse_report(key, value, state, p->options);
+        return parse_report(key, value, p);
     }
 }
 
@@ -487,15 +490,15 @@ static int parse_run(int argc, char **argv, unsigned flags,
         NULL};
     struct parse parse = {options, error, 0};
     host_run_defaults(options);
-    if (argp_parse(&argp, argc, argv, flags, NULL, &parse) != 0) {
-        return host_fail(error, HOST_USAGE,
-                         "incode run: wrong usage; see incode run --help");
+    int status = host_options_parse(&argp, argc, argv, flags, &parse, error);
+    if (status != 0) {
+        return status;
     }
     if (options->throttle.bytes_a_second != 0 &&
         options->throttle.slow_us == 0) {
         options->throttle.slow_us = 30000000;
     }
-    return error->code != 0 ? error->code : check_together(&parse);
+    return check_together(&parse);
 }
 
 int host_arguments_run(int argc, char **argv, struct host_run_options *options,

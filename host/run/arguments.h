@@ -10,9 +10,8 @@
 
 #include "run.h"
 
-/* argv[0] is the name for messages ("incode run").  Wrong usage: HOST_USAGE;
- * where the C library's parser found it, it has printed why, and ends the
- * program with that status itself. */
+/* argv[0] is the name for messages ("incode run").  0, or the command ends with
+ * error->code: see host_options_parse. */
 int host_arguments_run(int argc, char **argv, struct host_run_options *options,
                        struct host_error *error);
 

@@ -1,6 +1,6 @@
-#include <argp.h>
 #include <string.h>
 
+#include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/service/machine.h"
 #include "sim.h"
@@ -51,6 +51,10 @@ static error_t parse_sim_option(int key, char *value, struct argp_state *state)
     struct parse_sim *p = state->input;
     uint64_t n = 0;
     switch (key) {
+    case ARGP_KEY_ARG:
+        host_fail(p->error, HOST_USAGE,
+                  "%s: sim takes options alone; see incode sim --help", value);
+        return 0;
     case KEY_SEED:
         if (host_parse_number(value, 0, UINT64_MAX, &n) != 0) {
             host_fail(p->error, HOST_USAGE,
@@ -70,14 +74,8 @@ static error_t parse_sim_option(int key, char *value, struct argp_state *state)
         }
         return 0;
     case KEY_NODES:
-        if (host_parse_number(value, 1, HOST_NODES_MAX, &n) != 0 ||
-            (n & (n - 1)) != 0) {
-            host_fail(p->error, HOST_USAGE,
-                      "--nodes %s: not a number of nodes of a cube; allowed: "
-                      "1, 2, 4 .. %d",
-                      value, HOST_NODES_MAX);
-        }
-        p->options->nodes = (unsigned)n;
+        (void)host_parse_nodes(value, HOST_NODES_MAX, "", &p->options->nodes,
+                               p->error);
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -121,12 +119,9 @@ int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
         NULL};
     struct parse_sim parse = {options, error};
     memset(options, 0, sizeof *options);
-    if (argp_parse(&argp, argc, argv, 0, NULL, &parse) != 0) {
-        return host_fail(error, HOST_USAGE,
-                         "incode sim: wrong usage; see incode sim --help");
-    }
-    if (error->code == 0 && options->ranges == 0) {
+    int status = host_options_parse(&argp, argc, argv, 0, &parse, error);
+    if (status == 0 && options->ranges == 0) {
         add_range(&parse, 1, 1);
     }
-    return error->code;
+    return status;
 }

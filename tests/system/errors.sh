@@ -308,29 +308,16 @@ interrupted HUP
 
 # --- usage -------------------------------------------------------------------
 
-# The C library's parser says more than one line, in its own form.
 usage() { # NAME PATTERN ARGUMENT...
-    local name=usage/$1 pattern=$2 status
-    shift 2
-    rm -rf "$left"
-    mkdir "$left"
-    "$INCODE" "$@" > "$scratch/output" 2> "$scratch/errors"
-    status=$?
-    if [ $status != 2 ]; then
-        fail "$name" "exit $status, not 2: $(last "$scratch/errors")"
-    elif ! grep -qE -e "$pattern" "$scratch/errors"; then
-        fail "$name" "no '$pattern' in: $(last "$scratch/errors")"
-    else
-        check "$name" 'it left a file' test -z "$(ls -A "$left")"
-    fi
+    refuses "usage/$1" 2 "$2" "$INCODE" "${@:3}"
 }
 out="$left/o.npy"
-usage 'no command' 'run' 
+usage 'no command' '^incode: COMMAND: none is given; allowed: run, gen'
 usage 'unknown command' 'run' frobnicate
-usage 'no points' 'POINTS' run -o "$out"
+usage 'no points' 'POINTS: not given; ' run -o "$out"
 usage 'two point files' 'good' run "$good" "$good" -o "$out"
 usage 'unknown option' 'frob' run "$good" --frob -o "$out"
-usage 'option without its value' 'nodes' run "$good" --nodes
+usage 'option without its value' '--nodes: wants a value; ' run "$good" --nodes
 usage 'nodes not a power of two' '(2, 4|power)' run "$good" --nodes 3 -o "$out"
 usage 'no nodes' 'nodes' run "$good" --nodes 0 -o "$out"
 usage 'negative nodes' 'nodes' run "$good" --nodes=-2 -o "$out"
@@ -378,6 +365,36 @@ check 'as many as are triangulated' 'the limits differ' test \
 usage 'verify without tetrahedra' 'TETS' verify "$good"
 usage 'digest without a file' 'TETS' digest
 usage 'convert to nothing' 'OUT' convert "$good"
+
+# What a new user writes: done as it was meant, or what to write instead.
+usage 'a command mistyped' 'gne: no such command; did you mean gen\?' gne
+usage 'a file for a command' 'write incode run .*good.xyz -o OUT' "$good"
+usage 'an option mistyped' '--strateyg: .*did you mean --strategy\?' run "$good" \
+    --strateyg auto
+usage 'one dash' '-nodes: .*did you mean --nodes\?' run "$good" -nodes 2
+usage 'a short option' '-x: no such option of incode run; ' run "$good" -x
+usage 'two files' 'other.xyz: a second file of points' run "$good" other.xyz
+usage '128 nodes' '--nodes 128: .*allowed: 1, 2, .*64' run "$good" \
+    --nodes 128
+usage 'half a point' 'gen uniform 4.5: not a whole number' gen uniform 4.5
+usage 'help of nothing' 'runn: .*did you mean run\?' help runn
+for memory in 4MB '4 MiB' 4m 4096K; do
+    succeeds "usage/--memory $memory" incode run "$good" -q --nodes 2 \
+        --memory "$memory" --stats "$scratch/memory.json"
+    check "usage/--memory $memory, the bytes" 'not 4 MiB' \
+        test "$(jq .memory_bytes "$scratch/memory.json")" = 4194304
+done
+succeeds 'usage/gen uniform 1e3' \
+    incode gen uniform 1e3 -o "$scratch/thousand.xyz"
+check 'usage/1e3 points' "$(wc -l < "$scratch/thousand.xyz")" \
+    test "$(wc -l < "$scratch/thousand.xyz")" = 1000
+incode --help > "$scratch/help"
+incode run --help > "$scratch/help.run"
+for words in -h 'help' 'run -h' 'help run'; do
+    # shellcheck disable=SC2086
+    check "usage/$words is --help" 'another text' eval \
+        'incode $words | cmp - "$scratch/help$([ "${words#*run}" = "$words" ] || echo .run)"'
+done
 
 # --- no error ----------------------------------------------------------------
 

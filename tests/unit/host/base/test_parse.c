@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -20,15 +21,23 @@ static void test_bytes(void **unused)
                 {"512k", 524288},
                 {"4M", 4194304},
                 {"4MiB", 4194304},
+                {"4MB", 4194304},
+                {"4mb", 4194304},
+                {"4m", 4194304},
+                {"4 MiB", 4194304},
+                {"4 M", 4194304},
+                {"4096K", 4194304},
                 {"1G", UINT64_C(1) << 30}};
     static const char *const bad[] = {"",
                                       "K",
                                       "-1",
                                       "4T",
-                                      "4MB",
+                                      "4MBB",
+                                      "4B",
+                                      "4 ",
                                       "4M4",
                                       " 4",
-                                      "4 M",
+                                      "4  M",
                                       "0x4",
                                       "4Mi",
                                       "99999999999999999999",
@@ -60,9 +69,66 @@ static void test_numbers(void **unused)
         host_parse_number("18446744073709551616", 0, UINT64_MAX, &n), -1);
 }
 
+/* Whole numbers in exponent form, and no others. */
+static void test_exponents(void **unused)
+{
+    static const struct {
+        const char *text;
+        uint64_t number;
+    } good[] = {{"1e6", 1000000},
+                {"1E6", 1000000},
+                {"1e+6", 1000000},
+                {"2.5e3", 2500},
+                {"2.50e1", 25},
+                {"1e0", 1},
+                {"0e99999", 0},
+                {"0.0001e4", 1},
+                {"1.8446744073709551615e19", UINT64_MAX}};
+    static const char *const bad[] = {
+        "1e",    "e6",   "1e-1", "1.5",  "2.55e1", "1.e3",
+        ".5e1",  "1e20", "1e6x", "1e 6", "1e++6",  "1e99999999999999999999",
+        "0x1e6", "1e6.0"};
+    uint64_t n;
+    (void)unused;
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        assert_int_equal(host_parse_number(good[i].text, 0, UINT64_MAX, &n), 0);
+        assert_true(n == good[i].number);
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        assert_int_equal(host_parse_number(bad[i], 0, UINT64_MAX, &n), -1);
+    }
+}
+
+/* What is wrong with a number of nodes, and which ones there are. */
+static void test_nodes(void **unused)
+{
+    static const struct {
+        const char *text, *said;
+    } wrong[] = {{"3", "--nodes 3: not a power of two"},
+                 {"0", "not a power of two"},
+                 {"128", "more nodes than there can be here; allowed: 1, 2, 4, "
+                         "8, 16, 32, 64, or fewer"},
+                 {"-1", "not a number; allowed: 1, 2, 4, 8, 16, 32, 64"},
+                 {"4294967298", "more nodes"}};
+    (void)unused;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        struct host_error error = {0};
+        unsigned nodes = 7;
+        assert_int_equal(
+            host_parse_nodes(wrong[i].text, 64, ", or fewer", &nodes, &error),
+            HOST_USAGE);
+        assert_non_null(strstr(error.text, wrong[i].said));
+        assert_int_equal(nodes, 7);
+        error.code = 0;
+        assert_int_equal(host_parse_nodes("64", 64, "", &nodes, &error), 0);
+        assert_int_equal(nodes, 64);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bytes),
-                                       cmocka_unit_test(test_numbers)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_bytes), cmocka_unit_test(test_numbers),
+        cmocka_unit_test(test_exponents), cmocka_unit_test(test_nodes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -147,6 +147,40 @@ static void test_what_a_shell_reads(void **unused)
     assert_int_equal(at, size);
 }
 
+static const char *name_of(const void *names, unsigned i)
+{
+    return ((const char *const *)names)[i];
+}
+
+static void test_nearest(void **unused)
+{
+    static const char *const names[] = {"run",    "gen",     "verify",
+                                        "digest", "convert", NULL};
+    static const struct {
+        const char *word, *nearest;
+    } cases[] = {{"gne", "gen"},
+                 {"rum", "run"},
+                 {"verfy", "verify"},
+                 {"digset", "digest"},
+                 {"covnetr", "convert"},
+                 {"xyz", NULL},
+                 {"", NULL},
+                 {"q", NULL},
+                 {"a.xyz", NULL}};
+    static const char long_word[] = "a word that is longer than any name, and "
+                                    "than the table of its distances";
+    (void)unused;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const char *found = host_text_nearest(cases[i].word, name_of, names);
+        if (cases[i].nearest == NULL) {
+            assert_null(found);
+        } else {
+            assert_string_equal(found, cases[i].nearest);
+        }
+    }
+    (void)host_text_nearest(long_word, name_of, names);
+}
+
 /* A line of an error, and one that is said. */
 static void test_said(void **unused)
 {
@@ -168,8 +202,11 @@ static void test_said(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_printable), cmocka_unit_test(test_bounds),
+        cmocka_unit_test(test_printable),
+        cmocka_unit_test(test_bounds),
         cmocka_unit_test(test_quoted_where_needed),
-        cmocka_unit_test(test_what_a_shell_reads), cmocka_unit_test(test_said)};
+        cmocka_unit_test(test_what_a_shell_reads),
+        cmocka_unit_test(test_nearest),
+        cmocka_unit_test(test_said)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

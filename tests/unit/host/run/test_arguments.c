@@ -100,8 +100,13 @@ static void test_refused(void **unused)
          "no such name; allowed: tcp"},
         {"--board=mps2-an500", "not in this version; allowed: linux"},
         {"--cluster=4", "not in this version"},
-        {"--nodes=3", "1, 2, 4, 8, 16, 32, 64"},
-        {"--nodes=128", "1, 2, 4, 8, 16, 32, 64"},
+        {"--strategy=spatail", "did you mean spatial? allowed: "},
+        {"--nodes=3", "not a power of two, as a cube has nodes; allowed: 1, 2, "
+                      "4, 8, 16, 32, 64"},
+        {"--nodes=128", "1, 2, 4, 8, 16, 32, 64, or with --cube "},
+        {"--verfy",
+         "--verfy: no such option of incode run; did you mean --verify?"},
+        {"b.xyz", "b.xyz: a second file of points after a.xyz; give one"},
         {"--memory=1K", "640K to 1G"},
         {"--window=0", "1 to 64"}};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {

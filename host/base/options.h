@@ -1,0 +1,27 @@
+/* The options of a command, from its table for argp: what argp does, but that
+ * whatever is wrong is a host_error, names the option that may have been meant,
+ * and is printed as other errors are.
+ *
+ * Memory: 4 KB of stack.  Work: two passes over the arguments.
+ *
+ *     if (host_options_parse(&argp, argc, argv, 0, &wanted, &error) != 0)
+ *         return error.code;
+ */
+#ifndef HOST_OPTIONS_H
+#define HOST_OPTIONS_H
+
+#include <argp.h>
+
+#include "error.h"
+
+enum { HOST_OPTIONS_MAX = 96 }; /* rows of a table, groups and end included */
+
+/* argv[0] is the name for messages ("incode run"); flags: of argp_parse; input:
+ * what the parser of `argp` finds as state->input.  That parser tells its own
+ * errors with host_fail and returns 0; of --help it hears nothing but what is
+ * asked of it.  Not 0: the command ends now with error->code.  --help, -h and
+ * --version end the program themselves. */
+int host_options_parse(const struct argp *argp, int argc, char **argv,
+                       unsigned flags, void *input, struct host_error *error);
+
+#endif

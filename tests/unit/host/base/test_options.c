@@ -1,0 +1,133 @@
+/* The arguments of a command: what is wrong with them, and what was meant. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/base/options.h"
+
+enum { WORDS_MAX = 6 };
+
+struct seen {
+    unsigned quiet, words;
+    char seed[8], window[8];
+};
+
+static error_t take(int key, char *value, struct argp_state *state)
+{
+    struct seen *seen = state->input;
+    switch (key) {
+    case 'q':
+        seen->quiet++;
+        return 0;
+    case 's':
+        snprintf(seen->seed, sizeof seen->seed, "%s", value);
+        return 0;
+    case 300:
+        snprintf(seen->window, sizeof seen->window, "%s", value);
+        return 0;
+    case ARGP_KEY_ARG:
+        seen->words++;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option options[] = {
+    {NULL, 0, NULL, 0, "A group:", 1},
+    {"seed", 's', "S", 0, "a value", 1},
+    {"window", 300, "N", 0, "no letter", 1},
+    {"windows", 301, NULL, 0, "begins like another", 2},
+    {"quiet", 'q', NULL, 0, "no value, and the last letter", 2},
+    {0}};
+static const struct argp argp = {options, take, "", "", NULL, NULL, NULL};
+
+static int parse(const char *const words[], struct seen *seen,
+                 struct host_error *error)
+{
+    char text[WORDS_MAX + 2][40] = {"incode try"};
+    char *argv[WORDS_MAX + 2] = {text[0]};
+    int argc = 1;
+    memset(seen, 0, sizeof *seen);
+    memset(error, 0, sizeof *error);
+    for (; words[argc - 1] != NULL; argc++) {
+        snprintf(text[argc], sizeof text[argc], "%s", words[argc - 1]);
+        argv[argc] = text[argc];
+    }
+    return host_options_parse(&argp, argc, argv, ARGP_NO_HELP, seen, error);
+}
+
+static void test_taken(void **unused)
+{
+    struct seen seen;
+    struct host_error error;
+    static const char *const words[] = {"a",        "-qs4", "b",
+                                        "--window", "9",    NULL};
+    static const char *const dashes[] = {"--see=1", "-q", "--", "-x", NULL};
+    (void)unused;
+    assert_int_equal(parse(words, &seen, &error), 0);
+    assert_int_equal(seen.words, 2);
+    assert_int_equal(seen.quiet, 1);
+    assert_string_equal(seen.seed, "4");
+    assert_string_equal(seen.window, "9");
+    assert_int_equal(parse(dashes, &seen, &error), 0);
+    assert_int_equal(seen.words, 1);
+}
+
+static void test_refused(void **unused)
+{
+    static const struct {
+        const char *word, *said;
+    } wrong[] = {
+        {"--sede=4", "--sede: no such option of incode try; did you mean "
+                     "--seed?"},
+        {"--hlep", "did you mean --help?"},
+        {"--zzzzzzzz", "--zzzzzzzz: no such option of incode try; see incode "
+                       "try --help"},
+        {"--win=4", "--win: more than one option of incode try; write --window "
+                    "or --windows"},
+        {"--quiet=yes", "--quiet=yes: an option of incode try that takes no "
+                        "value; write --quiet"},
+        {"--seed", "--seed: wants a value; "},
+        {"-s", "-s: wants a value; "},
+        {"-x", "-x: no such option of incode try; see incode try --help"},
+        {"-qx", "-x: no such option"},
+        {"-seeds", ""}, /* -s with a value */
+        {"-windwo", "-windwo: no such option of incode try; did you mean "
+                    "--window?"},
+        {"-\x1b", "-\\x1b: no such option"},
+        {"--\x1b", "--\\x1b: no such option"}};
+    (void)unused;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        const char *const words[] = {"a", wrong[i].word, NULL};
+        struct seen seen;
+        struct host_error error;
+        int status = parse(words, &seen, &error);
+        assert_int_equal(status, wrong[i].said[0] == '\0' ? 0 : HOST_USAGE);
+        assert_non_null(strstr(error.text, wrong[i].said));
+    }
+}
+
+/* -h ends a command that has done nothing, and is no error. */
+static void test_help(void **unused)
+{
+    static const char *const words[] = {"-h", "--zzz", NULL};
+    struct seen seen;
+    struct host_error error;
+    (void)unused;
+    assert_int_not_equal(parse(words, &seen, &error), 0);
+    assert_int_equal(error.code, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_taken),
+                                       cmocka_unit_test(test_refused),
+                                       cmocka_unit_test(test_help)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
