@@ -169,6 +169,7 @@ static int command_verify(int argc, char **argv, struct host_error *error)
     }
     int status = host_points_read(s.argument[0], &points, error);
     if (status == 0) {
+        host_points_note(s.argument[0], &points);
         status = host_tetrahedra_read(s.argument[1], &tets, NULL, error);
     }
     if (status == 0) {

@@ -150,6 +150,7 @@ static int convert(const char *in, const char *out, struct host_error *error)
     }
     struct host_points points;
     if (host_points_read(in, &points, error) == 0) {
+        host_points_note(in, &points);
         host_points_write(out, &points, error);
         host_points_free(&points);
     }

@@ -1,5 +1,5 @@
-/* NumPy's .npy: (n,3) points of any kind of number, (m,4) tetrahedra of whole
- * numbers. */
+/* NumPy's .npy: points, of which (n,3) are of any kind of number and those with
+ * more columns of floating-point ones; (m,4) tetrahedra of whole numbers. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -103,17 +103,25 @@ static int parse_header(const struct host_source *source, struct npy *npy,
     return 0;
 }
 
+static bool is_floating(const struct npy *npy)
+{
+    return npy->type == HOST_F64 || npy->type == HOST_F32;
+}
+
 static int check_size(const struct host_source *source, const struct npy *npy,
                       struct host_error *error)
 {
-    size_t row = host_number_bytes(npy->type) * (size_t)npy->columns;
+    size_t bytes = host_number_bytes(npy->type);
     size_t have = source->bytes - npy->start;
-    if (npy->rows > have / row || npy->rows * row != have) {
+    if (npy->columns > have / bytes ||
+        npy->rows > have / (bytes * (size_t)npy->columns) ||
+        npy->rows * bytes * npy->columns != have) {
         return host_fail(error, HOST_INPUT,
-                         "%s: %zu bytes of numbers where %llu rows of %zu are "
-                         "due; the file is cut short or damaged, get it whole",
+                         "%s: %zu bytes of numbers where %llu rows of %llu "
+                         "numbers are due; the file is cut short or damaged, "
+                         "get it whole",
                          source->path, have, (unsigned long long)npy->rows,
-                         row);
+                         (unsigned long long)npy->columns);
     }
     return 0;
 }
@@ -121,20 +129,23 @@ static int check_size(const struct host_source *source, const struct npy *npy,
 static int read_points(const struct host_source *source, const struct npy *npy,
                        struct host_points *points, struct host_error *error)
 {
-    if (npy->columns != 3) {
+    if (npy->columns < 3 || (npy->columns > 3 && !is_floating(npy))) {
         return host_fail(error, HOST_INPUT,
-                         "%s: %llu columns where x, y and z are due; save an "
+                         "%s: %llu columns%s where x, y and z are due; save an "
                          "array of shape (n, 3)",
-                         source->path, (unsigned long long)npy->columns);
+                         source->path, (unsigned long long)npy->columns,
+                         npy->columns > 3 ? " of whole numbers" : "");
     }
+    points->wide = npy->columns > 3;
     if (check_size(source, npy, error) != 0) {
         return error->code;
     }
     const uint8_t *data = source->data + npy->start;
     size_t bytes = host_number_bytes(npy->type);
     if (!npy->fortran) {
-        return host_append_numbers(points, data, npy->rows, 3 * bytes,
-                                   npy->type, npy->big, error);
+        return host_append_numbers(points, data, npy->rows,
+                                   (size_t)npy->columns * bytes, npy->type,
+                                   npy->big, error);
     }
     for (uint64_t i = 0; i < npy->rows; i++) {
         double xyz[3];
@@ -153,11 +164,12 @@ static int read_tetrahedra(const struct host_source *source,
                            const struct npy *npy, struct host_tetrahedra *tets,
                            struct host_error *error)
 {
-    if (npy->columns != 4) {
+    if (npy->columns != 4 || is_floating(npy)) {
         return host_fail(error, HOST_INPUT,
-                         "%s: %llu columns where 4 vertices are due; save an "
-                         "array of shape (m, 4)",
-                         source->path, (unsigned long long)npy->columns);
+                         "%s: %llu columns of %s numbers where 4 vertices are "
+                         "due; save an array of integers of shape (m, 4)",
+                         source->path, (unsigned long long)npy->columns,
+                         is_floating(npy) ? "floating-point" : "whole");
     }
     if (check_size(source, npy, error) != 0) {
         return error->code;

@@ -1,6 +1,8 @@
 #include "read.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "formats.h"
 #include "host/base/progress.h"
@@ -68,6 +70,16 @@ int host_points_read(const char *path, struct host_points *points,
         take_points(&source, format, points, error);
     }
     return error->code;
+}
+
+void host_points_note(const char *path, const struct host_points *points)
+{
+    if (points->wide) {
+        (void)fprintf(stderr,
+                      "incode: %s: the first three columns are x, y and z; "
+                      "those after them are passed over\n",
+                      strcmp(path, "-") == 0 ? "stdin" : path);
+    }
 }
 
 int host_points_parse(const char *path, const void *data, size_t bytes,

@@ -20,6 +20,10 @@
 int host_points_read(const char *path, struct host_points *points,
                      struct host_error *error);
 
+/* Says on standard error, once, that there were columns which reading has
+ * passed over; nothing where there were none. */
+void host_points_note(const char *path, const struct host_points *points);
+
 /* The same from memory; `path` gives the extension and the name in errors. */
 int host_points_parse(const char *path, const void *data, size_t bytes,
                       struct host_points *points, struct host_error *error);

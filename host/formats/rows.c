@@ -1,8 +1,90 @@
 #include "rows.h"
 
 #include <ctype.h>
+#include <limits.h>
+#include <string.h>
 
+#include "csv.h"
 #include "numbers.h"
+
+enum next { NEXT_FIELD, NEXT_EMPTY, NEXT_NONE };
+
+/* Goes to the next field of the line; one with more than `most` delimiters
+ * before it comes after an empty one. */
+static enum next go_to_field(struct host_scan *s, unsigned most)
+{
+    const char *c = s->at;
+    for (unsigned delimiters = 0; c < s->end; c++) {
+        if (*c == ',' || *c == ';') {
+            if (++delimiters > most) {
+                s->at = c;
+                return NEXT_EMPTY;
+            }
+        } else if (*c != ' ' && *c != '\t' && *c != '\r') {
+            s->at = c;
+            return *c == '\n' || *c == '#' ? NEXT_NONE : NEXT_FIELD;
+        }
+    }
+    s->at = c;
+    return NEXT_NONE;
+}
+
+static int wrong_columns(struct host_scan *s, int columns, enum next next,
+                         struct host_error *error)
+{
+    static const char *const few[] = {
+        "", "1 column where x, y and z are due; complete the line",
+        "2 columns where x, y and z are due; complete the line"};
+    return host_scan_fail(s, s->at, error,
+                          next == NEXT_EMPTY ? HOST_CSV_EMPTY : few[columns]);
+}
+
+/* What stands between two numbers of a line, for the eye that looks for decimal
+ * commas: those that are alone, before a digit. */
+enum { COMMA_NONE = 1, COMMA_DECIMAL = 2 };
+
+static unsigned commas_between(const char *from, const char *to)
+{
+    if (to - from == 1) {
+        return *from != ','               ? COMMA_NONE
+               : *to >= '0' && *to <= '9' ? COMMA_DECIMAL
+                                          : 0;
+    }
+    return memchr(from, ',', (size_t)(to - from)) == NULL ? COMMA_NONE : 0;
+}
+
+int host_take_point(struct host_scan *s, bool is_csv,
+                    struct host_points *points, struct host_error *error)
+{
+    double xyz[3];
+    unsigned most = is_csv ? 1 : UINT_MAX, commas = 0;
+    enum next next = NEXT_NONE;
+    if (is_csv && host_csv_begins_empty(s)) {
+        return wrong_columns(s, 0, NEXT_EMPTY, error);
+    }
+    for (int d = 0; d < 3; d++) {
+        if (host_scan_double(s, &xyz[d], error) != 0) {
+            return error->code;
+        }
+        const char *end = s->at;
+        next = go_to_field(s, most);
+        commas |= next == NEXT_FIELD ? commas_between(end, s->at) : 0;
+        if (d < 2 && next != NEXT_FIELD) {
+            return wrong_columns(s, d + 1, next, error);
+        }
+    }
+    if (next != NEXT_NONE) {
+        if (commas == (COMMA_NONE | COMMA_DECIMAL)) {
+            return host_scan_fail(s, s->at, error,
+                                  "more than 3 columns, parted by commas here "
+                                  "and by something else there; write decimal "
+                                  "points, or part all columns alike");
+        }
+        points->wide = true;
+        host_scan_next_line(s);
+    }
+    return host_points_append(points, xyz, 1, error);
+}
 
 int host_take_element(struct host_mesh *mesh, const uint64_t number[4],
                       uint64_t base, const struct host_source *source,

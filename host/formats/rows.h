@@ -13,6 +13,13 @@
 #include "format.h"
 #include "scan.h"
 
+/* Appends the point on the line at hand, and goes to the end of that: its first
+ * three columns, whatever those behind them hold.  Fewer are HOST_INPUT; so are
+ * columns parted by commas that look like decimal ones.  In a .csv none of the
+ * three is empty. */
+int host_take_point(struct host_scan *s, bool is_csv,
+                    struct host_points *points, struct host_error *error);
+
 /* Appends the tetrahedron on the line that is being read, whose vertices are
  * numbered from `base`.  HOST_INPUT for one that is no row number. */
 int host_take_element(struct host_mesh *mesh, const uint64_t number[4],

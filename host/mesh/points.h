@@ -13,6 +13,7 @@
 #ifndef HOST_POINTS_H
 #define HOST_POINTS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "host/base/error.h"
@@ -23,6 +24,7 @@ struct host_points {
     uint64_t count;
     uint64_t capacity; /* rows that xyz has room for */
     uint32_t base;     /* number of row 0 in the input: 0, or 1 in a .node */
+    bool wide;         /* columns after the third were passed over */
 };
 
 /* Appends rows; HOST_BROKEN without memory, HOST_INPUT past 2^32 - 2 rows. */

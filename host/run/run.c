@@ -472,6 +472,9 @@ int host_run(const struct host_run_options *options,
     host_progress_begin(options->progress && !options->quiet);
     int status = host_points_read(options->input, &points, error);
     result->time_read_s = seconds_since(start);
+    if (status == 0 && !options->quiet) {
+        host_points_note(options->input, &points);
+    }
     if (status == 0) {
         status = run_on(options, &points, result, &alone, error);
     }

@@ -408,6 +408,19 @@ check 'duplicates and -0.0 are counted' "$(cat "$scratch/four.json")" \
 check 'duplicates and -0.0 are told' "$(tr '\n' ' ' < "$scratch/output")" \
     test "$(grep -cE ': 4 distinct points, 1 tetra|2 of 6 points are dup|-0\.0.*: 1$' \
     "$scratch/output")" = 3
+# A scan with colours is its points, which is said once, and not to those who
+# want nothing but errors.
+sed 's/$/ 255 0 0 roof/' "$in/four.xyz" > "$in/scan.xyz"
+incode run "$in/scan.xyz" -o "$scratch/scan.npy" > "$scratch/output" \
+    2> "$scratch/errors"
+check 'columns after the third' "exit $?, $(last "$scratch/errors")" \
+    cmp "$scratch/scan.npy" "$scratch/four.npy"
+check 'columns after the third are told once' "$(cat "$scratch/errors")" \
+    test "$(grep -c '^incode: .*scan.xyz: .*passed over$' "$scratch/errors") \
+$(wc -l < "$scratch/errors")" = '1 1'
+check 'columns after the third, quietly' "$(cat "$scratch/errors")" \
+    eval 'incode run "$in/scan.xyz" -q 2> "$scratch/errors" &&
+        [ ! -s "$scratch/errors" ]'
 mkdir "$in/packed"
 "$INCODE" run "$good" -q -o "$in/packed/a.ele" -o "$scratch/plain.vtu"
 gzip "$in/packed/a.ele"

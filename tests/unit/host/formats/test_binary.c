@@ -104,38 +104,84 @@ static void ply_is_as_long_as_it_says(void **unused)
     }
 }
 
+/* The beginning of an array of 5 rows. */
+static void put_npy(struct bytes *b, int version, const char *type,
+                    bool fortran, const char *columns)
+{
+    char header[128];
+    (void)snprintf(header, sizeof header,
+                   "{'descr': '%s', 'fortran_order': %s, 'shape': (5, %s), }"
+                   "%*s\n",
+                   type, fortran ? "True" : "False", columns, 20, "");
+    b->n = 0;
+    put(b, "\x93NUMPY", 6);
+    put_word(b, (uint64_t)version, 1, false);
+    put_word(b, 0, 1, false);
+    put_word(b, strlen(header), version == 1 ? 2 : 4, false);
+    put_text(b, header);
+}
+
 static void npy_of_every_kind(void **unused)
 {
     (void)unused;
-    for (int bits = 0; bits < 16; bits++) {
+    static struct bytes b;
+    for (unsigned bits = 0; bits < 64; bits++) {
         bool big = (bits & 1) != 0, wide = (bits & 2) != 0;
         bool fortran = (bits & 4) != 0;
-        int version = (bits & 8) != 0 ? 2 : 1;
-        struct bytes b = {.n = 0};
-        char header[128];
-        (void)snprintf(header, sizeof header,
-                       "{'descr': '%cf%d', 'fortran_order': %s, 'shape': (5, "
-                       "3), }%*s\n",
-                       big ? '>' : '<', wide ? 8 : 4,
-                       fortran ? "True" : "False", 20, "");
-        put(&b, "\x93NUMPY", 6);
-        put_word(&b, (uint64_t)version, 1, false);
-        put_word(&b, 0, 1, false);
-        put_word(&b, strlen(header), version == 1 ? 2 : 4, false);
-        put_text(&b, header);
-        for (uint64_t i = 0; i < 15; i++) {
-            uint64_t at = fortran ? i % 5 * 3 + i / 5 : i;
-            put_number(&b, value_of(at), wide, big);
+        const unsigned columns = 3 + bits / 16;
+        char type[] = {big ? '>' : '<', 'f', wide ? '8' : '4', '\0'};
+        char width[] = {(char)('0' + columns), '\0'};
+        put_npy(&b, (bits & 8) != 0 ? 2 : 1, type, fortran, width);
+        for (unsigned i = 0; i < 5 * columns; i++) {
+            unsigned row = fortran ? i % 5 : i / columns;
+            unsigned column = fortran ? i / 5 : i % columns;
+            put_number(&b, column < 3 ? value_of(3 * row + column) : NAN, wide,
+                       big);
         }
         expect_rows("a.npy", &b, 5);
         expect_cuts_refused("a.npy", &b, 0);
-        put_word(&b, 0, 1, false);
         struct host_points points;
         struct host_error error = {0};
+        assert_int_equal(
+            host_points_parse("a.npy", b.data, b.n, &points, &error), 0);
+        assert_int_equal(points.wide, columns > 3);
+        host_points_free(&points);
+        put_word(&b, 0, 1, false);
         assert_int_equal(
             host_points_parse("a.npy", b.data, b.n, &points, &error),
             HOST_INPUT);
     }
+}
+
+/* Of another number of columns than points and tetrahedra have. */
+static void npy_of_other_shapes(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *type, *columns, *why;
+    } wrong[] = {{"<f8", "2", "2 columns where"},
+                 {"<i4", "4", "4 columns of whole numbers where"},
+                 {"<f8", "2305843009213693952", "are due; the file is cut"},
+                 {"<f8", "18446744073709551615", "are due; the file is cut"}};
+    static struct bytes b;
+    struct host_points points;
+    struct host_tetrahedra tets;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        struct host_error error = {0};
+        put_npy(&b, 1, wrong[i].type, false, wrong[i].columns);
+        put_values(&b, 20, true, false);
+        assert_int_equal(
+            host_points_parse("a.npy", b.data, b.n, &points, &error),
+            HOST_INPUT);
+        assert_non_null(strstr(error.text, wrong[i].why));
+    }
+    struct host_error error = {0};
+    put_npy(&b, 1, "<f8", false, "4");
+    put_values(&b, 20, true, false);
+    assert_int_equal(
+        host_tetrahedra_parse("a.npy", b.data, b.n, &tets, NULL, &error),
+        HOST_INPUT);
+    assert_non_null(strstr(error.text, "4 columns of floating-point numbers"));
 }
 
 static void binary_nan_is_named(void **unused)
@@ -257,6 +303,7 @@ int main(void)
         cmocka_unit_test(ply_is_as_long_as_it_says),
         cmocka_unit_test(ply_of_every_coding),
         cmocka_unit_test(npy_of_every_kind),
+        cmocka_unit_test(npy_of_other_shapes),
         cmocka_unit_test(binary_nan_is_named),
         cmocka_unit_test(plot3d_of_every_variant),
         cmocka_unit_test(real_data),

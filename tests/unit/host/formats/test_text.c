@@ -136,6 +136,36 @@ static void text_in_all_its_habits(void **unused)
     expect_rows("a.off", &b, 2);
 }
 
+/* The first three count, whatever the others hold and however many they are. */
+static void columns_after_the_third(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *path, *text;
+        bool wide;
+    } files[] = {
+        {"a.xyz", "-3 -2.5 -2 255 0 0\n-1.5 -1 -.5 0 255 0\n", true},
+        {"a.txt", "-3 -2.5 -2\n-1.5 -1 -.5 red 'or so' nan \\ \"\r\n", true},
+        {"a.xyz", "-3,-2.5,-2,1,,,\n-1.5, -1, -.5 one, two # three\n", true},
+        {"a.xyz", "-3\t-2.5 -2  7;8\n-1.5,-1,-.5,\n", true},
+        {"a.csv", "-3,-2.5,-2,,\n-1.5,-1,-.5,\"a,b\",1e999\n", true},
+        {"a.csv", "-3;-2.5;-2;7,5;8\n-1.5;-1;-.5", true},
+        {"-", "-3 -2.5 -2 9\n-1.5 -1 -.5 9 9", true},
+        {"a.xyz", "-3 -2.5 -2 # 9\n-1.5 -1 -.5,\n", false},
+        {"a.csv", "x,y,z,r\n-3,-2.5,-2,9\n-1.5,-1,-.5,9\n", false}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        struct host_points points;
+        struct host_error error = {0};
+        struct bytes b = {.n = 0};
+        put_text(&b, files[i].text);
+        expect_rows(files[i].path, &b, 2);
+        assert_int_equal(
+            host_points_parse(files[i].path, b.data, b.n, &points, &error), 0);
+        assert_int_equal(points.wide, files[i].wide);
+        host_points_free(&points);
+    }
+}
+
 static void text_faults_have_their_place(void **unused)
 {
     (void)unused;
@@ -148,7 +178,12 @@ static void text_faults_have_their_place(void **unused)
     refused("a.xyz", "1 1e999 3\n", "a.xyz:1:3: the number is too large");
     refused("a.xyz", "1 2\n", "a.xyz:1:4: 2 columns");
     refused("a.xyz", "1\n", "a.xyz:1:2: 1 column");
-    refused("a.xyz", "1 2 3 4\n", "a.xyz:1:7: more than 3 columns");
+    refused("a.xyz", "1 2 3 4\n5 6\n", "a.xyz:2:4: 2 columns");
+    refused("a.xyz", "1 2 3 4\n5 6 # 7\n", "a.xyz:2:5: 2 columns");
+    refused("a.xyz", "1,5 2,5 3,5\n", "a.xyz:1:7: more than 3 columns, parted");
+    refused("a.txt", "1 2,5 3\n", "a.txt:1:7: more than 3 columns, parted");
+    refused("a.txt", "1 2 3,5\n", "a.txt:1:7: more than 3 columns, parted");
+    refused("a.csv", "1,5;2,5;3,5\n", "a.csv:1:7: more than 3 columns, parted");
     refused("a.xyz", "0x1p3 2 3\n", "a.xyz:1:1: '0x1p3' is no number");
     refused("a.xyz", "1e 2 3\n", "a.xyz:1:1: '1e' is no number");
     refused("a.xyz", "1 2 - 3\n", "a.xyz:1:5: '-' is no number");
@@ -175,9 +210,9 @@ static void text_faults_have_their_place(void **unused)
     refused("a.csv", "1,2,3\n1,,2,3\n", "a.csv:2:3: an empty field");
     refused("a.csv", "1,2,3\n1, ;2\n", "a.csv:2:4: an empty field");
     refused("a.csv", "1,2,3\n ,1,2,3\n", "a.csv:2:3: an empty field");
-    refused("a.csv", "1,2,3,,\n", "a.csv:1:7: an empty field");
     refused("a.csv", "1,2\n", "a.csv:1:4: 2 columns");
-    refused("a.csv", "1,2,3,4\n", "a.csv:1:7: more than 3 columns");
+    refused("a.csv", "1,2,3,4\n5,6\n", "a.csv:2:4: 2 columns");
+    refused("a.csv", "1,2,3,4\n5,,6,7\n", "a.csv:2:3: an empty field");
     refused("a.csv", "\"1\",\"2\",\"3\"\n", "a.csv:1:1: '\"1\"' is no number");
     refused("a.csv", "nan,nan,nan\n1,2,3\n", "a.csv:1:1: NaN is no");
     refused("a.csv", "inf;inf;inf\n1;2;3\n", "a.csv:1:1: infinity is no");
@@ -266,6 +301,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_correctly_rounded),
         cmocka_unit_test(text_in_all_its_habits),
+        cmocka_unit_test(columns_after_the_third),
         cmocka_unit_test(text_faults_have_their_place),
         cmocka_unit_test(binary_is_no_text),
         cmocka_unit_test(text_is_as_long_as_it_says),
