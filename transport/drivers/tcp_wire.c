@@ -91,20 +91,39 @@ static void drop(struct tcp_candidate *c)
     }
 }
 
-/* A free place, or that of the oldest. */
+/* Whether it has begun as the peer does. */
+static bool begun(const struct tcp_wire *wire, const struct tcp_candidate *c)
+{
+    return wire->config.suite != NULL && c->heard.shake.greeted;
+}
+
+/* A free place, or one that is taken from the oldest of those that have not
+ * begun as the peer does; from the oldest that has, where they have more than
+ * half of the places, so that newcomers have time to begin.  So strangers who
+ * say little cannot crowd out one who is about to prove himself. */
 static struct tcp_candidate *place(struct tcp_wire *wire)
 {
-    struct tcp_candidate *best = &wire->candidate[0];
+    struct tcp_candidate *oldest[2] = {NULL, NULL};
+    unsigned count[2] = {0, 0};
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         struct tcp_candidate *c = &wire->candidate[i];
         if (c->fd < 0) {
             return c;
         }
-        best = c->since_us < best->since_us ? c : best;
+        bool has = begun(wire, c);
+        count[has]++;
+        if (oldest[has] == NULL || c->since_us < oldest[has]->since_us) {
+            oldest[has] = c;
+        }
     }
-    drop(best);
-    wire->strangers++;
-    return best;
+    return oldest[count[true] > count[false]];
+}
+
+/* Whether the next to come would take the place of one who began well. */
+static bool crowded(struct tcp_wire *wire)
+{
+    const struct tcp_candidate *c = place(wire);
+    return c->fd >= 0 && begun(wire, c);
 }
 
 static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
@@ -135,6 +154,10 @@ static bool accept_some(struct tcp_wire *wire, uint64_t now_us)
 {
     bool some = false;
     for (unsigned i = 0; i < TCP_ACCEPTS_MAX; i++) {
+        struct tcp_candidate *c = place(wire);
+        if (i >= TCP_TURNS_MAX && crowded(wire)) {
+            break;
+        }
         int fd = accept4(wire->listener, NULL, NULL, SOCK_CLOEXEC);
         if (fd < 0) {
             break;
@@ -144,18 +167,20 @@ static bool accept_some(struct tcp_wire *wire, uint64_t now_us)
             close(fd);
             continue;
         }
-        (void)begin(wire, place(wire), fd, true, now_us);
+        wire->strangers += c->fd >= 0;
+        drop(c);
+        (void)begin(wire, c, fd, true, now_us);
     }
     return some;
 }
 
 /* A call that failed is made again after a pause, longer each time. */
-static void pause_calls(struct tcp_wire *wire, uint64_t now_us)
+static void pause_calls(struct tcp_wire *wire, uint64_t now_us, uint64_t most)
 {
     uint64_t pause = 2 * wire->pause_us;
-    wire->pause_us = pause < TCP_PAUSE_MIN_US   ? TCP_PAUSE_MIN_US
-                     : pause > TCP_PAUSE_MAX_US ? TCP_PAUSE_MAX_US
-                                                : pause;
+    wire->pause_us = pause < TCP_PAUSE_MIN_US ? TCP_PAUSE_MIN_US
+                     : pause > most           ? most
+                                              : pause;
     wire->call_us = now_us + wire->pause_us;
 }
 
@@ -174,7 +199,12 @@ static void call(struct tcp_wire *wire, uint64_t now_us)
     if (fd >= 0) {
         close(fd);
     }
-    pause_calls(wire, now_us);
+    pause_calls(wire, now_us, TCP_PAUSE_MAX_US);
+}
+
+static uint64_t within(uint64_t least_us, uint64_t us)
+{
+    return us < least_us ? least_us : us > TCP_PROVE_US ? TCP_PROVE_US : us;
 }
 
 /* Whether the call was answered: 1, 0 not yet, -1 no. */
@@ -195,6 +225,7 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
         wire->fault = fault;
         return -1;
     }
+    wire->answer_us = within(TCP_CALL_MIN_US, 8 * (now_us - c->since_us));
     c->connected = true;
     c->since_us = now_us;
     return 1;
@@ -237,7 +268,6 @@ static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
 static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
                     uint64_t now_us)
 {
-    uint64_t patience = 8 * (now_us - c->since_us);
     if (wire->tcp.fd >= 0) {
         close(wire->tcp.fd);
         wire->replaced = true;
@@ -247,9 +277,7 @@ static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
     wire->connections++;
     wire->pause_us = 0;
     wire->fault = 0;
-    wire->prove_us = patience < TCP_PROVE_MIN_US ? TCP_PROVE_MIN_US
-                     : patience > TCP_PROVE_US   ? TCP_PROVE_US
-                                                 : patience;
+    wire->prove_us = within(TCP_PROVE_MIN_US, 8 * (now_us - c->since_us));
     wire->proven = wire->config.suite != NULL;
     if (wire->proven) {
         struct link_pipe beneath = tcp_link_pipe(&wire->tcp);
@@ -259,14 +287,28 @@ static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
     }
 }
 
-/* A proof that does not come: bytes of it are lost, or the way is longer than
- * was thought.  The end that called gives up first, and calls again. */
+/* A call that is not answered, or a proof that does not come: bytes of it are
+ * lost, strangers crowd the other end, or the way is longer than was thought.
+ * The end that called gives up first, and calls again. */
 static uint64_t patience(const struct tcp_wire *wire,
                          const struct tcp_candidate *c)
 {
-    return !c->connected          ? TCP_CALL_US
-           : wire->config.listens ? TCP_PROVE_US
-                                  : wire->prove_us;
+    return wire->config.listens ? TCP_PROVE_US
+           : c->connected       ? wire->prove_us
+                                : wire->answer_us;
+}
+
+/* A call came to nothing: whether for want of time, or of a key. */
+static void call_again(struct tcp_wire *wire, const struct tcp_candidate *c,
+                       bool late, uint64_t now_us)
+{
+    bool crowded_out = late ? !c->connected : c->connected && !wire->other_key;
+    uint64_t *again = c->connected ? &wire->prove_us : &wire->answer_us;
+    if (late) {
+        *again = within(0, 2 * *again);
+    }
+    pause_calls(wire, now_us,
+                crowded_out ? TCP_PAUSE_AWAY_US : TCP_PAUSE_MAX_US);
 }
 
 static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
@@ -287,12 +329,7 @@ static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
     if (wire->config.listens) {
         wire->strangers++;
     } else {
-        if (status == 0 && c->connected) {
-            wire->prove_us = 2 * wire->prove_us < TCP_PROVE_US
-                                 ? 2 * wire->prove_us
-                                 : TCP_PROVE_US;
-        }
-        pause_calls(wire, now_us);
+        call_again(wire, c, status == 0, now_us);
     }
     drop(c);
 }
@@ -304,6 +341,12 @@ static bool holds_off(const struct tcp_wire *wire, uint64_t now_us)
            now_us < wire->look_us;
 }
 
+/* Whether the door is open. */
+static bool admits(const struct tcp_wire *wire, uint64_t now_us)
+{
+    return wire->listener >= 0 && now_us >= wire->admit_us;
+}
+
 static void tick(struct tcp_wire *wire)
 {
     uint64_t now_us = clock_us();
@@ -312,10 +355,10 @@ static void tick(struct tcp_wire *wire)
     if (holds_off(wire, now_us)) {
         return;
     }
-    if (wire->listener >= 0) {
+    if (admits(wire, now_us)) {
         met = !quiet && accept_some(wire, now_us);
-    } else if (wire->tcp.fd < 0 && wire->candidate[0].fd < 0 &&
-               now_us >= wire->call_us) {
+    } else if (wire->listener < 0 && wire->tcp.fd < 0 &&
+               wire->candidate[0].fd < 0 && now_us >= wire->call_us) {
         call(wire, now_us);
     }
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
@@ -324,7 +367,11 @@ static void tick(struct tcp_wire *wire)
             look_at(wire, &wire->candidate[i], now_us);
         }
     }
+    bool in_use = wire->tcp.fd >= 0 && wire->proven;
     wire->look_us = met ? now_us + TCP_LOOK_US : 0;
+    if (admits(wire, now_us)) {
+        wire->admit_us = !in_use && crowded(wire) ? now_us + TCP_CROWD_US : 0;
+    }
 }
 
 /* --- the pipe ------------------------------------------------------------ */
@@ -337,7 +384,7 @@ static int broken(struct tcp_wire *wire)
         tcp_pipe_init(&wire->tcp, -1);
         wire->proven = false;
         wire->first.begin = wire->first.end = 0;
-        pause_calls(wire, clock_us());
+        pause_calls(wire, clock_us(), TCP_PAUSE_MAX_US);
     }
     return LINK_PIPE_CLOSED;
 }
@@ -406,7 +453,7 @@ static int listen_there(struct tcp_wire *wire)
     }
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
     if (tcp_prepare(fd) != 0 || bind(fd, &at->to.any, at->size) != 0 ||
-        listen(fd, 16) != 0) {
+        listen(fd, TCP_QUEUE_MAX) != 0) {
         int reason = errno;
         close(fd);
         errno = reason;
@@ -421,6 +468,7 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
     memset(wire, 0, sizeof *wire);
     wire->config = *config;
     wire->listener = -1;
+    wire->answer_us = TCP_CALL_MIN_US;
     wire->prove_us = TCP_PROVE_MIN_US;
     tcp_pipe_init(&wire->tcp, -1);
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
@@ -462,10 +510,11 @@ unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
     if (events != 0) {
         fds[used++] = (struct pollfd){wire->tcp.fd, events, 0};
     }
-    if (holds_off(wire, clock_us())) {
+    uint64_t now_us = clock_us();
+    if (holds_off(wire, now_us)) {
         return used;
     }
-    if (wire->listener >= 0) {
+    if (admits(wire, now_us)) {
         fds[used++] = (struct pollfd){wire->listener, POLLIN, 0};
     }
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
@@ -480,7 +529,10 @@ unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
 
 uint64_t tcp_wire_wait_us(const struct tcp_wire *wire)
 {
-    return wire->listener >= 0 && wire->look_us != 0 ? TCP_LOOK_US : UINT64_MAX;
+    return wire->listener < 0    ? UINT64_MAX
+           : wire->admit_us != 0 ? TCP_CROWD_US
+           : wire->look_us != 0  ? TCP_LOOK_US
+                                 : UINT64_MAX;
 }
 
 void tcp_wire_heard(struct tcp_wire *wire, const struct pollfd *fds,

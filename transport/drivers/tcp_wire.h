@@ -5,11 +5,13 @@
  * listens on and calls loopback addresses only.
  *
  * Strangers: at most TCP_CANDIDATES_MAX connections are being proven at a time,
- * the oldest giving way, each for TCP_PROVE_US at most; the peer's own new
- * connection, once proven, takes the place of the old one.  Without a key the
- * proof is a link's greeting; who keeps silent is taken while there is no
- * better one.  While a connection is in use, others are looked at every
- * TCP_LOOK_US.
+ * each for TCP_PROVE_US at most; the oldest of those that have not begun as the
+ * peer does give way.  Where most of them have, TCP_TURNS_MAX are let in every
+ * TCP_CROWD_US, so that the peer has time for its proof however many call, and
+ * the others wait in the kernel.  The peer's own new connection, once proven,
+ * takes the place of the old one.  Without a key the proof is a link's
+ * greeting; who keeps silent is taken while there is no better one.  While a
+ * connection is in use, others are looked at every TCP_LOOK_US.
  *
  * Memory: struct tcp_wire and in the kernel two buffers of TCP_BUFFER_BYTES a
  * connection.  Work: tcp_wire's pipe accepts at most TCP_ACCEPTS_MAX
@@ -32,18 +34,22 @@
 #include "tcp.h"
 
 enum {
-    TCP_CANDIDATES_MAX = 8,
-    TCP_ACCEPTS_MAX = 4,
+    TCP_CANDIDATES_MAX = 16,
+    TCP_ACCEPTS_MAX = 16,
+    TCP_TURNS_MAX = 4,  /* of those, in the place of one who began well */
+    TCP_QUEUE_MAX = 64, /* that wait to be let in */
     TCP_WIRE_FDS_MAX = TCP_CANDIDATES_MAX + 2,
     TCP_FIRST_BYTES = 256, /* within which a greeting must be */
     TCP_PROVE_US = 3000000,
     TCP_PROVE_MIN_US = 250000, /* at the end that calls, at first */
+    TCP_CALL_MIN_US = 50000,   /* for a call to be answered, at first */
     TCP_QUIET_US = 100000,     /* without a key: says nothing for so long */
     TCP_LOOK_US = 10000,
+    TCP_CROWD_US = 1000,
     TCP_SILENT_MS = 5000,       /* with bytes that are not acknowledged */
-    TCP_CALL_US = 3000000,      /* for a connection to be made */
     TCP_PAUSE_MIN_US = 20000,   /* before the next call, doubled each time */
-    TCP_PAUSE_MAX_US = 1000000, /* up to this */
+    TCP_PAUSE_AWAY_US = 40000,  /* up to this by one who had no place, */
+    TCP_PAUSE_MAX_US = 1000000, /* else up to this */
 };
 
 struct tcp_address {
@@ -99,8 +105,10 @@ struct tcp_wire {
     bool quiet;          /* nobody called when it was last waited for */
     bool other_key;      /* the last one called had another key */
     uint64_t call_us, pause_us;
-    uint64_t prove_us; /* patience with the peer's proof, of the caller */
+    uint64_t answer_us, prove_us; /* patience with the peer's answer, and with
+                                     its proof, of the caller */
     uint64_t look_us;  /* when candidates are looked at again; 0: at once */
+    uint64_t admit_us; /* when others are let in; 0: at once */
     struct tcp_first first;
     struct tcp_candidate candidate[TCP_CANDIDATES_MAX];
     struct secure_records records;

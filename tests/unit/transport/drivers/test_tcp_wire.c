@@ -279,6 +279,112 @@ static void strangers_without_a_key_change_nothing(void **unused)
     with_strangers(NULL);
 }
 
+/* What a caller says before it is answered: as many bytes as come. */
+static size_t greeting_with(const uint8_t *with, uint8_t *bytes, size_t size)
+{
+    static struct end end;
+    struct tcp_address at = free_address(AF_INET);
+    ssize_t got = 0;
+    int listener = socket(AF_INET, SOCK_STREAM, 0);
+    assert_true(listener >= 0);
+    assert_int_equal(bind(listener, &at.to.any, at.size), 0);
+    assert_int_equal(listen(listener, 1), 0);
+    open_end(&end, 0, &at, with);
+    step(&end);
+    int fd = accept(listener, NULL, NULL);
+    assert_true(fd >= 0);
+    while (got <= 0) {
+        step(&end);
+        got = recv(fd, bytes, size, MSG_DONTWAIT);
+    }
+    close(fd);
+    close(listener);
+    close_end(&end);
+    return (size_t)got;
+}
+
+enum { SILENT, SLOW, OTHER_KEY, HALF_RIGHT, ALL_KINDS };
+enum { FLOOD = 400, OPENING_MAX = 256 };
+
+struct flood {
+    int kind, fd[FLOOD];
+    size_t size[2];                  /* of a greeting with the other key, and */
+    uint8_t opening[2][OPENING_MAX]; /* of the right one; random behind it */
+    unsigned called;
+};
+
+/* So many strangers more; the first go.  Those that talk slowly say a byte. */
+static void flood_on(struct flood *f, const struct tcp_address *at,
+                     unsigned count)
+{
+    while (count-- > 0) {
+        unsigned i = f->called++ % FLOOD;
+        unsigned kind =
+            f->kind == ALL_KINDS ? i % ALL_KINDS : (unsigned)f->kind;
+        unsigned right = kind == HALF_RIGHT;
+        if (f->fd[i] >= 0) {
+            close(f->fd[i]);
+        }
+        f->fd[i] = stranger(at);
+        if (kind == HALF_RIGHT || kind == OTHER_KEY) {
+            size_t size = right ? f->size[1] : OPENING_MAX;
+            (void)!write(f->fd[i], f->opening[right], size);
+        }
+    }
+    for (unsigned i = 0; i < FLOOD; i++) {
+        bool slow = f->kind == SLOW || (f->kind == ALL_KINDS && i % 4 == SLOW);
+        if (f->fd[i] >= 0 && slow) {
+            (void)!send(f->fd[i], f->opening[1], 1, MSG_NOSIGNAL);
+        }
+    }
+}
+
+/* Hundreds come, three at each look of the one who listens; one with the key
+ * comes behind them, and answers at every third look only.  It is taken within
+ * so many looks. */
+static void a_flood_keeps_nobody_out(void **unused)
+{
+    enum { LOOKS_MAX = 60 };
+    static struct end ends[2];
+    static struct flood f;
+    (void)unused;
+    assert_int_equal(getrandom(f.opening, sizeof f.opening, 0),
+                     sizeof f.opening);
+    f.size[0] = greeting_with(other_key, f.opening[0], OPENING_MAX);
+    f.size[1] = greeting_with(key, f.opening[1], OPENING_MAX);
+    for (f.kind = 0; f.kind <= ALL_KINDS; f.kind++) {
+        struct tcp_address at = free_address(AF_INET);
+        unsigned looks = 0;
+        f.called = 0;
+        memset(f.fd, -1, sizeof f.fd);
+        open_end(&ends[1], 1, &at, key);
+        flood_on(&f, &at, TCP_QUEUE_MAX / 2);
+        for (; looks < 40; looks++) {
+            usleep(TCP_CROWD_US);
+            flood_on(&f, &at, TCP_ACCEPTS_MAX);
+            step(&ends[1]);
+        }
+        open_end(&ends[0], 0, &at, key);
+        for (looks = 0; ends[1].wire.connections == 0; looks++) {
+            usleep(TCP_CROWD_US);
+            flood_on(&f, &at, 3);
+            step(&ends[1]);
+            if (looks % 3 == 0) {
+                step(&ends[0]);
+            }
+            if (looks == LOOKS_MAX) {
+                fail_msg("kind %d: not taken in %u looks", f.kind, looks);
+            }
+        }
+        assert_true(f.called > 200);
+        for (unsigned i = 0; i < FLOOD; i++) {
+            close(f.fd[i]);
+        }
+        close_end(&ends[0]);
+        close_end(&ends[1]);
+    }
+}
+
 /* Without a key, and with nobody better there, one who only listens is taken:
  * a node that does not know who it is; and gives way to one who greets. */
 static void a_silent_caller_is_taken_for_want_of_a_better(void **unused)
@@ -353,6 +459,7 @@ int main(void)
         cmocka_unit_test(another_key_never_connects),
         cmocka_unit_test(strangers_change_nothing),
         cmocka_unit_test(strangers_without_a_key_change_nothing),
+        cmocka_unit_test(a_flood_keeps_nobody_out),
         cmocka_unit_test(a_silent_caller_is_taken_for_want_of_a_better),
         cmocka_unit_test(a_lost_proof_is_asked_for_again),
         cmocka_unit_test(without_a_key_on_loopback_only),
