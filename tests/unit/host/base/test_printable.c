@@ -27,8 +27,9 @@ static void test_printable(void **unused)
         {"\x7f", "\\x7f"},
         {"gr\xc3\xbc\xc3\x9f", "gr\xc3\xbc\xc3\x9f"},
         {"\xe2\x82\xac \xf0\x9f\x98\x80", "\xe2\x82\xac \xf0\x9f\x98\x80"},
-        {"\xc2\x9b\x31m", "\\xc2\\x9b1m"},         /* CSI as one character */
-        {"\xe2\x80\xaetxt", "\\xe2\\x80\\xaetxt"}, /* writes backwards */
+        {"\xc2\x9b\x31m", "\\xc2\\x9b1m"}, /* CSI as one character */
+        /* Writes backwards.  NOLINTNEXTLINE(misc-misleading-bidirectional) */
+        {"\xe2\x80\xaetxt", "\\xe2\\x80\\xaetxt"},
         {"\xff\xfe", "\\xff\\xfe"},
         {"\xc0\xaf", "\\xc0\\xaf"},          /* not the shortest form */
         {"\xe0\x80\x8a", "\\xe0\\x80\\x8a"}, /* nor this */
