@@ -34,7 +34,7 @@ Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
 MPI_CFLAGS = $(addprefix -isystem ,$(shell mpicc --showme:incdirs))
 MPI_LIBS = $(addprefix -L,$(shell mpicc --showme:libdirs)) -lmpi
-HOST_LIBS = -lconfig -lsodium -lserialport -ljansson -lnettle -lexpat -lz -lm
+HOST_LIBS = -lconfig -lsodium -lserialport -ljansson -lnettle -lexpat -lpng -lz -lm
 
 # libsodium's own code is the same under either C library; its headers are
 # made visible to musl's compiler alone.
@@ -253,7 +253,13 @@ ifeq ($(POINTS),)
 endif
 	@name=$$(basename '$(points)' .gz); result='$(OUT)'/$${name%.*}; \
 	set -x; $(BUILD)/incode run '$(points)' --strategy spatial --nodes 8 \
-		--verify --table --stats "$$result.json" -o "$$result.vtu"
+		--verify --table --stats "$$result.json" -o "$$result.vtu" && \
+		$(BUILD)/incode draw '$(points)' "$$result.vtu" -o "$$result.svg" \
+		&& { set +x; } 2> /dev/null && printf '%s\n' '' \
+		"The tetrahedra are in $$result.vtu, the statistics in $$result.json," \
+		"and a section is drawn in $$result.svg.  To look at them:" \
+		"  paraview $$result.vtu    then Apply, and Surface With Edges" \
+		"  xdg-open $$result.svg    or any browser"
 
 check: deps-test
 	@exec env BUILD='$(BUILD)' bash tests/run --check
@@ -312,7 +318,7 @@ help:
 
 # --- packages --------------------------------------------------------------
 
-run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev nettle-dev \
+run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev libpng-dev nettle-dev \
 	libjansson-dev libserialport-dev libsodium-dev libconfig-dev \
 	libopenmpi-dev openmpi-bin
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \

@@ -10,6 +10,7 @@
 #include "host/bench/bench_links.h"
 #include "host/bench/bench_paper.h"
 #include "host/check/verify.h"
+#include "host/draw/draw.h"
 #include "host/files/output.h"
 #include "host/formats/convert.h"
 #include "host/formats/read.h"
@@ -224,6 +225,15 @@ static int command_convert(int argc, char **argv, struct host_error *error)
     return host_convert(s.argument[0], s.argument[1], error);
 }
 
+static int command_draw(int argc, char **argv, struct host_error *error)
+{
+    struct host_draw_options options;
+    if (host_draw_arguments(argc, argv, &options, error) != 0) {
+        return error->code;
+    }
+    return host_draw(&options, error);
+}
+
 static int command_cube(int argc, char **argv, struct host_error *error)
 {
     struct simple s = {0};
@@ -290,6 +300,7 @@ static const struct command commands[] = {
     {"verify", "POINTS TETS", "check a triangulation exactly", command_verify},
     {"digest", "TETS", "print what tells triangulations apart", command_digest},
     {"convert", "IN OUT", "from one file format to another", command_convert},
+    {"draw", "POINTS TETS -o FILE", "a section, as SVG or PNG", command_draw},
     {"cube", "FILE", "check a cube file, print what starts its nodes",
      command_cube},
     {"bench", "paper|links", "the paper's tables on this machine; its links",

@@ -66,24 +66,6 @@ static int points_beside(const char *in, const char *out,
     return error->code;
 }
 
-static int check_rows(const char *in, const struct host_tetrahedra *tets,
-                      const struct host_points *points,
-                      struct host_error *error)
-{
-    for (uint64_t i = 0; i < tets->count; i++) {
-        for (int k = 0; k < 4; k++) {
-            if (tets->v[i][k] >= points->count) {
-                return host_fail(error, HOST_INPUT,
-                                 "%s: tetrahedron %llu has vertex %u of %llu "
-                                 "points; give the points that belong to it",
-                                 in, (unsigned long long)i, tets->v[i][k],
-                                 (unsigned long long)points->count);
-            }
-        }
-    }
-    return 0;
-}
-
 /* Whether writing it takes no points: a file of rows with none beside it. */
 static bool holds_rows_only(const char *path)
 {
@@ -105,7 +87,7 @@ static int convert_tetrahedra(const char *in, const char *out,
         points_beside(in, out, &points, error);
     }
     if (error->code == 0 &&
-        (!needed || check_rows(in, &tets, &points, error) == 0)) {
+        (!needed || host_rows_check(in, &tets, &points, error) == 0)) {
         host_tetrahedra_sort(&tets);
         host_write(out, &points, &tets, error);
     }

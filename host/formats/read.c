@@ -147,3 +147,20 @@ int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
     }
     return error->code;
 }
+
+int host_rows_check(const char *path, const struct host_tetrahedra *tets,
+                    const struct host_points *points, struct host_error *error)
+{
+    for (uint64_t i = 0; i < tets->count; i++) {
+        for (int k = 0; k < 4; k++) {
+            if (tets->v[i][k] >= points->count) {
+                return host_fail(error, HOST_INPUT,
+                                 "%s: tetrahedron %llu has vertex %u of %llu "
+                                 "points; give the points that belong to it",
+                                 path, (unsigned long long)i, tets->v[i][k],
+                                 (unsigned long long)points->count);
+            }
+        }
+    }
+    return 0;
+}

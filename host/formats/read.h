@@ -38,4 +38,9 @@ int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
                           struct host_tetrahedra *tets,
                           struct host_points *points, struct host_error *error);
 
+/* HOST_INPUT where the tetrahedra of `path` have a vertex that is no row of the
+ * points. */
+int host_rows_check(const char *path, const struct host_tetrahedra *tets,
+                    const struct host_points *points, struct host_error *error);
+
 #endif

@@ -25,7 +25,7 @@ if ! ls "$vm"/debs/linux-image-*.deb > /dev/null 2>&1; then
         sed -n 's/ *Depends: //p')
     if ! get apt-get -qq download "${kernel:-linux-image-arm64}" \
         busybox-static libserialport-dev libjansson-dev nettle-dev \
-        libexpat1-dev zlib1g-dev libsodium-dev libconfig-dev; then
+        libexpat1-dev libpng-dev zlib1g-dev libsodium-dev libconfig-dev; then
         skip 'vm/the host on real serial ports' \
             "no arm64 packages: $(last "$scratch/said")"
         exit 0

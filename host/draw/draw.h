@@ -1,0 +1,35 @@
+/* `incode draw`: a plane section through a triangulation, as a picture.
+ *
+ * Memory: the points, the tetrahedra, the section and the picture.  Work: what
+ * reading takes, as a rule.
+ *
+ *     if (host_draw_arguments(argc, argv, &draw, &error) != 0)
+ *         return error.code;
+ *     return host_draw(&draw, &error);
+ */
+#ifndef HOST_DRAW_H
+#define HOST_DRAW_H
+
+#include <stdbool.h>
+
+#include "host/base/error.h"
+
+struct host_draw_options {
+    const char *points, *tets, *output;
+    int axis;    /* 0 to 2; -1: the one in which the points extend least */
+    bool has_at; /* else in the middle */
+    double at;
+    unsigned width; /* pixels */
+    bool quiet;
+};
+
+/* The command's arguments.  Wrong usage: HOST_USAGE, as in arguments.h. */
+int host_draw_arguments(int argc, char **argv,
+                        struct host_draw_options *options,
+                        struct host_error *error);
+
+/* The command: its last act is host_output_commit. */
+int host_draw(const struct host_draw_options *options,
+              struct host_error *error);
+
+#endif

@@ -1,0 +1,65 @@
+/* A section as a picture: where its cells lie in it, their colours - the
+ * smaller a tetrahedron is, the bluer - and the formats that it is written in.
+ *
+ * Memory: an output's buffer; see svg.c and png.c.  Work: one pass over the
+ * cells for each of the colours (SVG) or a few ns a pixel (PNG).
+ *
+ *     const struct host_picture_format *format = host_picture_format("a.png");
+ *     struct host_picture picture = host_picture_of(&section, 640);
+ *     if (host_output_open(&out, "a.png", &error) == 0)
+ *         format->write(&out, &picture, &error);
+ *     host_output_close(&out, 1, &error);
+ */
+#ifndef HOST_PICTURE_H
+#define HOST_PICTURE_H
+
+#include "host/files/output.h"
+#include "section.h"
+
+enum {
+    HOST_PICTURE_MIN = 16, /* pixels a side */
+    HOST_PICTURE_MAX = 8192,
+    HOST_COLOURS = 41 /* of cells, from blue to light green */
+};
+
+struct host_picture {
+    const struct host_section *section;
+    unsigned width, height; /* pixels */
+    double scale;           /* pixels that the section's longer side takes */
+    double line;            /* width of the cells' edges in pixels */
+    uint64_t merged;        /* cells too small to be drawn by themselves */
+};
+
+/* So many pixels wide; a section that is more than twice as high as wide
+ * becomes narrower. */
+struct host_picture host_picture_of(const struct host_section *section,
+                                    unsigned width);
+
+/* A corner's place in pixels, from the upper left. */
+void host_picture_place(const struct host_picture *picture,
+                        const float corner[2], double at[2]);
+
+/* The cell's colour, 0 to HOST_COLOURS - 1, and a colour as 0xrrggbb. */
+unsigned host_picture_colour(const struct host_picture *picture,
+                             const struct host_cell *cell);
+uint32_t host_picture_rgb(unsigned colour);
+enum { HOST_PICTURE_EDGES = 0x1b2a41 };
+
+typedef int host_picture_writer(struct host_output *out,
+                                struct host_picture *picture,
+                                struct host_error *error);
+
+/* A format of pictures is a row of picture.c. */
+struct host_picture_format {
+    const char *extension;
+    host_picture_writer *write;
+};
+extern host_picture_writer host_picture_svg, host_picture_png;
+
+/* By the extension; "-" is the first of the table.  NULL: none has it. */
+const struct host_picture_format *host_picture_format(const char *path);
+
+/* ".svg .png": the extensions that there are. */
+void host_picture_formats(char *text, size_t size);
+
+#endif

@@ -1,0 +1,210 @@
+#include "section.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "host/base/memory.h"
+
+/* Differences of doubles that are far apart, or next to 0, want the range of
+ * the longer format. */
+typedef long double wide;
+
+/* What all of this module's functions know. */
+struct cut {
+    const double *xyz;
+    struct host_plane plane;
+    unsigned side[2]; /* the axes of the picture */
+    wide lo[2], scale;
+};
+
+static void bounds(const struct host_points *points, unsigned axis, double *lo,
+                   double *hi)
+{
+    *lo = *hi = points->xyz[axis];
+    for (uint64_t i = 1; i < points->count; i++) {
+        double x = points->xyz[3 * i + axis];
+        *lo = x < *lo ? x : *lo;
+        *hi = x > *hi ? x : *hi;
+    }
+}
+
+double host_plane_middle(const struct host_points *points, unsigned axis)
+{
+    double lo, hi;
+    bounds(points, axis, &lo, &hi);
+    double middle = (double)(((wide)lo + (wide)hi) / 2);
+    return middle > lo ? middle : hi;
+}
+
+struct host_plane host_plane_through_middle(const struct host_points *points)
+{
+    unsigned least = 2;
+    wide extent[3];
+    for (unsigned d = 0; d < 3; d++) {
+        double lo, hi;
+        bounds(points, d, &lo, &hi);
+        extent[d] = (wide)hi - (wide)lo;
+    }
+    for (unsigned d = 2; d-- > 0;) {
+        /* What random points differ in by chance decides nothing. */
+        least = extent[d] < 0.75L * extent[least] ? d : least;
+    }
+    return (struct host_plane){least, host_plane_middle(points, least)};
+}
+
+/* How many vertices are above the plane, and which are: first those, then the
+ * others. */
+static unsigned split(const struct cut *c, const uint32_t v[4],
+                      const double *vertex[4])
+{
+    unsigned above = 0, below = 4;
+    for (unsigned k = 0; k < 4; k++) {
+        const double *p = c->xyz + 3 * (uint64_t)v[k];
+        vertex[p[c->plane.axis] >= c->plane.at ? above++ : --below] = p;
+    }
+    return above;
+}
+
+/* Where the plane meets the edge, which is the same for all that share it. */
+static void meet(const struct cut *c, const double *above, const double *below,
+                 wide at[2])
+{
+    unsigned axis = c->plane.axis;
+    wide t = ((wide)c->plane.at - (wide)below[axis]) /
+             ((wide)above[axis] - (wide)below[axis]);
+    for (unsigned d = 0; d < 2; d++) {
+        unsigned side = c->side[d];
+        at[d] = (wide)below[side] + t * ((wide)above[side] - (wide)below[side]);
+    }
+}
+
+/* The corners of the cell of vertices of which `above` are above. */
+static unsigned corners(const struct cut *c, const double *vertex[4],
+                        unsigned above, wide at[4][2])
+{
+    static const unsigned quadrilateral[4][2] = {
+        {0, 2}, {0, 3}, {1, 3}, {1, 2}};
+    if (above == 2) {
+        for (unsigned k = 0; k < 4; k++) {
+            meet(c, vertex[quadrilateral[k][0]], vertex[quadrilateral[k][1]],
+                 at[k]);
+        }
+        return 4;
+    }
+    for (unsigned k = 0; k < 3; k++) {
+        meet(c, vertex[above == 1 ? 0 : k], vertex[above == 1 ? k + 1 : 3],
+             at[k]);
+    }
+    return 3;
+}
+
+static double size_of(const double *vertex[4])
+{
+    wide sum = 0;
+    for (unsigned i = 0; i < 4; i++) {
+        for (unsigned j = i + 1; j < 4; j++) {
+            wide square = 0;
+            for (unsigned d = 0; d < 3; d++) {
+                wide x = (wide)vertex[i][d] - (wide)vertex[j][d];
+                square += x * x;
+            }
+            sum += sqrtl(square);
+        }
+    }
+    return (double)logl(sum / 6);
+}
+
+/* The first pass: how many cells there are, and their box. */
+static uint64_t measure(struct cut *c, const struct host_tetrahedra *tets,
+                        struct host_section *section)
+{
+    wide hi[2] = {0, 0}, at[4][2];
+    const double *vertex[4];
+    uint64_t count = 0;
+    for (uint64_t i = 0; i < tets->count; i++) {
+        unsigned above = split(c, tets->v[i], vertex);
+        if (above == 0 || above == 4) {
+            continue;
+        }
+        unsigned n = corners(c, vertex, above, at);
+        for (unsigned k = 0; k < n; k++) {
+            for (unsigned d = 0; d < 2; d++) {
+                bool first = count == 0 && k == 0;
+                c->lo[d] = first || at[k][d] < c->lo[d] ? at[k][d] : c->lo[d];
+                hi[d] = first || at[k][d] > hi[d] ? at[k][d] : hi[d];
+            }
+        }
+        count++;
+    }
+    wide u = hi[0] - c->lo[0], v = hi[1] - c->lo[1];
+    c->scale = u > v ? u : v;
+    section->extent[0] = (double)u;
+    section->extent[1] = (double)v;
+    section->proportion[0] = c->scale > 0 ? (double)(u / c->scale) : 0.0;
+    section->proportion[1] = c->scale > 0 ? (double)(v / c->scale) : 0.0;
+    return count;
+}
+
+/* The second pass: the cells. */
+static void take(const struct cut *c, const struct host_tetrahedra *tets,
+                 struct host_section *section)
+{
+    const double *vertex[4];
+    wide at[4][2];
+    double sum = 0.0;
+    for (uint64_t i = 0; i < tets->count; i++) {
+        unsigned above = split(c, tets->v[i], vertex);
+        if (above == 0 || above == 4) {
+            continue;
+        }
+        struct host_cell *cell = &section->cells[section->count++];
+        cell->corners = corners(c, vertex, above, at);
+        cell->size = (float)size_of(vertex);
+        sum += (double)cell->size;
+        for (unsigned k = 0; k < cell->corners; k++) {
+            for (unsigned d = 0; d < 2; d++) {
+                cell->corner[k][d] = (float)((at[k][d] - c->lo[d]) / c->scale);
+            }
+        }
+    }
+    section->size_mean = sum / (double)section->count;
+}
+
+static int beside(const struct host_points *points, struct host_plane plane,
+                  struct host_error *error)
+{
+    double lo, hi;
+    bounds(points, plane.axis, &lo, &hi);
+    return host_fail(error, HOST_INPUT,
+                     "--at %.17g: the plane passes beside the tetrahedra, or "
+                     "touches them only; give a %c between %.17g and %.17g",
+                     plane.at, "xyz"[plane.axis], lo, hi);
+}
+
+int host_section_make(struct host_section *section,
+                      const struct host_points *points,
+                      const struct host_tetrahedra *tets,
+                      struct host_plane plane, struct host_error *error)
+{
+    struct cut c = {.xyz = points->xyz, .plane = plane};
+    memset(section, 0, sizeof *section);
+    c.side[0] = plane.axis == 0 ? 1 : 0;
+    c.side[1] = plane.axis == 2 ? 1 : 2;
+    uint64_t count = measure(&c, tets, section);
+    if (section->proportion[0] <= 0.0 || section->proportion[1] <= 0.0) {
+        return beside(points, plane, error);
+    }
+    section->cells = host_map(count * sizeof *section->cells);
+    if (section->cells == NULL) {
+        return host_fail_memory(error, "the section");
+    }
+    take(&c, tets, section);
+    return 0;
+}
+
+void host_section_free(struct host_section *section)
+{
+    host_unmap(section->cells, section->count * sizeof *section->cells);
+    memset(section, 0, sizeof *section);
+}
