@@ -88,6 +88,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
         node->sent = node->received = node->missed = 0;
         node->silent_us = node->still_us = 0;
         node->awaited = INCODE_NONE;
+        node->left = false;
         s->report[i].up = s->report[i].ready = false;
         if (lost) {
             close_start(s, i);

@@ -7,8 +7,8 @@
 #include "failure_detector.h"
 #include "idle_nodes.h"
 #include "missing_links.h"
-#include "node/result.h"
 #include "node/totals.h"
+#include "results.h"
 
 /* A message that no sound node sends: what is wrong with it, as printf. */
 __attribute__((format(printf, 3, 4))) static int
@@ -74,13 +74,10 @@ static int take_requests(struct host_service *s,
     return 0;
 }
 
-/* Rows go straight to their place; a commit may follow any of them. */
 static int take_results(struct host_service *s,
                         const struct cube_message *message,
                         struct host_error *error)
 {
-    struct node_result_reader reader;
-    enum node_result_event event;
     struct node_result_header header;
     if (message->size < sizeof header) {
         return wrong_size(message, "results", sizeof header, error);
@@ -97,30 +94,7 @@ static int take_results(struct host_service *s,
         !host_ledger_current(&s->ledger, message->source, header.epoch)) {
         return 0;
     }
-    /* Four bytes are the least that a tetrahedron takes. */
-    size_t room = message->size / 4u + 1;
-    node_result_open(&reader, message->data + sizeof header,
-                     message->size - sizeof header,
-                     s->order->bricks * INCODE_BRICK_POINTS);
-    do {
-        size_t count;
-        uint32_t(*rows)[4] = host_tetrahedra_room(s->tets, room, error);
-        if (rows == NULL) {
-            return error->code;
-        }
-        event = node_result_read(&reader, rows, room, &count);
-        if (event == NODE_RESULT_GARBAGE) {
-            return unsound(message, error, "invalid results");
-        }
-        host_tetrahedra_keep(s->tets, count);
-        node->unreported += count;
-        if (event == NODE_RESULT_COMMIT &&
-            s->strategy->commit(&s->work, message->source, reader.brick) != 0) {
-            return unsound(message, error, "committed brick %u, not of its job",
-                           reader.brick);
-        }
-    } while (event != NODE_RESULT_END);
-    return 0;
+    return host_results_take(s, message, error);
 }
 
 static int take_spill(struct host_service *s,
@@ -329,8 +303,8 @@ int host_handle(struct host_service *service,
         return unsound(message, error, "not in this cube");
     }
     struct host_node *node = &service->node[message->source];
-    if (service->work.lost[message->source]) {
-        return 0; /* it has no part in this generation */
+    if (service->work.lost[message->source] || node->left) {
+        return 0; /* it has no part in this generation, or no more */
     }
     if (message->type != NODE_PONG) {
         host_idle_progress(service, message->source);

@@ -50,6 +50,7 @@ bool host_idle_leave(struct host_service *service, unsigned node,
     struct host_node *n = &s->node[node];
     n->still_us = 0;
     s->blamed = node;
+    n->left = true;
     if (n->started_anew) {
         return false;
     }

@@ -54,6 +54,7 @@ struct host_node {
     /* Whether it is there: failure_detector.h. */
     bool given_up;           /* for the rest of the run */
     bool aside;              /* has no work for the rest of the run */
+    bool left;               /* for the rest of this generation */
     bool started_anew;       /* as it was not to be trusted with work */
     uint32_t work;           /* as its last pong counted it, */
     uint32_t awaited;        /* and the page that it waited for */

@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -49,6 +50,13 @@ static void *open_cube(void)
 }
 
 static void *cube_arena;
+static char said[400]; /* the last line to the user */
+
+static void keep_told(void *context, const char *line)
+{
+    (void)context;
+    snprintf(said, sizeof said, "%s", line);
+}
 
 static int set_up(void **unused)
 {
@@ -73,6 +81,8 @@ static void begin(void)
     cube_arena = open_cube();
     machine.nodes = NODES;
     machine.dimension = 2;
+    machine.told = keep_told;
+    said[0] = '\0';
     service.machine = &machine;
     service.order = &order;
     service.tets = &tets;
@@ -195,8 +205,88 @@ static void test_epochs(void **unused)
     assert_int_equal(tets.count, 1);
     assert_int_equal(service.ledger.committed, 1);
     /* The same brick a second time cannot be. */
-    assert_int_equal(send(0, NODE_RESULT, data, size, &error), HOST_CUBE);
+    assert_int_equal(send(0, NODE_RESULT, data, size, &error), 0);
+    assert_non_null(strstr(said, "node 0 link 2: a result of brick 0, which it "
+                                 "has committed before; "));
+    assert_true(service.loss && service.node[0].aside);
+    assert_int_equal(tets.count, 1);
+    assert_int_equal(service.ledger.committed, 1);
     end();
+}
+
+/* A batch of one tetrahedron of node 1, and the commit of a brick of its job.
+ */
+static size_t batch_of(uint8_t *data, const uint32_t v[4], uint32_t brick)
+{
+    struct node_result_writer writer;
+    struct node_result_header header = {service.ledger.job[1].epoch, 0};
+    const uint32_t apexes[1][3] = {{v[1], v[2], v[3]}};
+    memcpy(data, &header, sizeof header);
+    node_result_begin(&writer, data + sizeof header, 100);
+    assert_int_equal(node_result_star(&writer, v[0], apexes, 1), 1);
+    assert_int_equal(node_result_commit(&writer, brick), 1);
+    return sizeof header + writer.size;
+}
+
+/* What cannot be is refused before it is used: the node is named, and has no
+ * part in the run any more; where it was ended and started again, it gets no
+ * second start. */
+static bool ends_node(void *context, unsigned node)
+{
+    (void)context;
+    assert_int_equal(node, 1);
+    return true;
+}
+
+static void refuses(const uint32_t v[4], uint32_t brick, const char *text)
+{
+    uint8_t data[128];
+    struct host_error error = {0};
+    for (int anew = 0; anew < 3; anew++) {
+        begin();
+        machine.kill = anew > 0 ? ends_node : NULL;
+        service.node[1].started_anew = anew == 2;
+        size_t size = batch_of(data, v, brick);
+        assert_int_equal(send(1, NODE_RESULT, data, size, &error),
+                         anew == 2 ? HOST_CUBE : 0);
+        if (strstr(anew == 2 ? error.text : said, text) == NULL) {
+            fail_msg("no '%s' in: %s %s", text, said, error.text);
+        }
+        assert_int_equal(service.node[1].aside, anew == 0);
+        assert_int_equal(service.loss, anew == 0);
+        assert_int_equal(service.ledger.committed, 0);
+        /* Whatever else it says is of no interest. */
+        assert_int_equal(send(1, NODE_RESULT, data, 3, &error), 0);
+        machine.kill = NULL;
+        end();
+    }
+}
+
+static void test_refused_results(void **unused)
+{
+    (void)unused;
+    uint32_t first = order.region[1].first, v = first * INCODE_BRICK_POINTS;
+    uint32_t loose = first, last = order.bricks - 1;
+    char text[80];
+    while (order.fill[loose] == INCODE_BRICK_POINTS) {
+        assert_true(++loose < order.region[1].last);
+    }
+    uint32_t padding = loose * INCODE_BRICK_POINTS + order.fill[loose];
+    snprintf(text, sizeof text, "a result with vertex %u, which is no point",
+             padding);
+    for (unsigned i = 0; i < 4; i++) {
+        uint32_t row[4] = {v, v + 1, v + 2, v + 3};
+        row[i] = padding;
+        refuses(row, first, text);
+    }
+    refuses((uint32_t[]){v, v + 1, v + 2, v + 1}, first, " twice");
+    refuses((uint32_t[]){v, v + 1, v, v + 2}, first, " twice");
+    refuses((uint32_t[]){v, v, v + 1, v + 2}, first, " twice");
+    refuses((uint32_t[]){0, 1, 2, 3}, first,
+            "a result of brick 0, which is not of its job");
+    refuses((uint32_t[]){v, v + 1, v + 2, v + 3}, last, "committed brick ");
+    refuses((uint32_t[]){v, v + 1, v + 2, 64 * last + 64}, first,
+            "invalid results");
 }
 
 /* What comes after a message that was lost does not count, and is a loss. */
@@ -293,8 +383,8 @@ static void test_starts(void **unused)
         assert_int_equal(send(1, NODE_FINISHED, &told, sizeof told, &error), 0);
         assert_int_equal(sum->make_tetra_calls, 50);
     }
-    size_t size =
-        batch(data, service.ledger.job[1].epoch, service.ledger.job[1].first);
+    uint32_t brick = order.region[1].first, v = brick * INCODE_BRICK_POINTS;
+    size_t size = batch_of(data, (uint32_t[]){v, v + 1, v + 2, v + 3}, brick);
     assert_int_equal(send(1, NODE_RESULT, data, size, &error), 0);
     service.report[1].up = false; /* a new generation */
     service.node[1].received = 0;
@@ -438,10 +528,15 @@ static void test_texts(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_any_bytes), cmocka_unit_test(test_epochs),
-        cmocka_unit_test(test_gaps),      cmocka_unit_test(test_unfinished),
-        cmocka_unit_test(test_answers),   cmocka_unit_test(test_starts),
-        cmocka_unit_test(test_fault),     cmocka_unit_test(test_strategy),
+        cmocka_unit_test(test_any_bytes),
+        cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_gaps),
+        cmocka_unit_test(test_unfinished),
+        cmocka_unit_test(test_answers),
+        cmocka_unit_test(test_starts),
+        cmocka_unit_test(test_refused_results),
+        cmocka_unit_test(test_fault),
+        cmocka_unit_test(test_strategy),
         cmocka_unit_test(test_texts),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
