@@ -1,16 +1,19 @@
 #include "cube_file.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "cube_reader.h"
 #include "host/base/parse.h"
 #include "host/base/progress.h"
 #include "transport/drivers/key_file.h"
 
-enum { TEXT_MAX = 4 << 20 };
+enum { TEXT_MAX = 4 << 20 }; /* that of 1,024 nodes has half a MiB */
 
 static int read_key(struct host_cube_file *file, const config_setting_t *where,
                     struct host_error *error)
@@ -162,6 +165,11 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
             "\"host\"; .. }, .. );");
     }
     unsigned count = (unsigned)config_setting_length(links);
+    if (count > file->nodes * (file->dimension + 2) + 8) {
+        return host_cube_wrong(file, links, error,
+                               "links: many more than the cube has; name each "
+                               "once");
+    }
     file->wire = calloc(count + 1, sizeof *file->wire);
     if (file->wire == NULL) {
         return host_fail_memory(error, "the cube file");
@@ -181,46 +189,69 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
                : host_cube_check_ends(file, error);
 }
 
-/* The whole text, as libconfig ends the program where it cannot read; NULL: as
- * the error says. */
+/* Read here, as libconfig ends the program where it cannot.  The name may be
+ * that of a pipe, which would be waited for. */
+static int open_text(const char *path, struct host_error *error)
+{
+    struct stat about;
+    int fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd < 0 || fstat(fd, &about) != 0) {
+        host_fail(error, HOST_INPUT, "%s: %s; check name and rights", path,
+                  strerror(errno));
+    } else if (!S_ISREG(about.st_mode)) {
+        host_fail(error, HOST_INPUT, "%s: %s; give the cube's file", path,
+                  S_ISDIR(about.st_mode) ? "a directory" : "a pipe or device");
+    } else {
+        return fd;
+    }
+    if (fd >= 0) {
+        close(fd);
+    }
+    return -1;
+}
+
+/* NULL: as the error says. */
 static char *read_text(const char *path, struct host_error *error)
 {
-    FILE *stream = fopen(path, "re");
-    char *text = stream == NULL ? NULL : malloc(TEXT_MAX + 1);
-    size_t size = text == NULL ? 0 : fread(text, 1, TEXT_MAX + 1, stream);
-    int status = 0;
-    if (stream == NULL || ferror(stream)) {
-        status = host_fail(error, HOST_INPUT, "%s: %s; check name and rights",
-                           path, strerror(errno));
-    } else if (text == NULL) {
-        status = host_fail_memory(error, "the cube file");
+    int fd = open_text(path, error);
+    char *text = fd < 0 ? NULL : malloc(TEXT_MAX + 1);
+    size_t size = 0;
+    ssize_t got = text == NULL ? 0 : 1;
+    while (got > 0 && size <= TEXT_MAX) {
+        got = read(fd, text + size, TEXT_MAX + 1 - size);
+        size += got > 0 ? (size_t)got : 0;
+    }
+    if (fd < 0) {
+        return NULL;
+    }
+    if (text == NULL) {
+        host_fail_memory(error, "the cube file");
+    } else if (got < 0) {
+        host_fail(error, HOST_INPUT, "%s: %s; check name and rights", path,
+                  strerror(errno));
     } else if (size > TEXT_MAX || memchr(text, '\0', size) != NULL) {
-        status = host_fail(error, HOST_INPUT,
-                           "%s: not a text of at most 4 MB; give the cube's "
-                           "file",
-                           path);
+        host_fail(error, HOST_INPUT,
+                  "%s: not a text of at most %d MiB; give the cube's file",
+                  path, TEXT_MAX >> 20);
     } else {
         text[size] = '\0';
     }
-    if (stream != NULL) {
-        fclose(stream);
-    }
-    if (status != 0) {
+    close(fd);
+    if (error->code != 0) {
         free(text);
         text = NULL;
     }
     return text;
 }
 
-int host_cube_file_read(struct host_cube_file *file, const char *path,
-                        struct host_error *error)
+int host_cube_file_parse(struct host_cube_file *file, const char *path,
+                         const char *text, struct host_error *error)
 {
     config_t config;
     int status;
     memset(file, 0, sizeof *file);
     file->path = path;
-    char *text = read_text(path, error);
-    if (text == NULL) {
+    if (host_cube_scan(path, text, error) != 0) {
         return error->code;
     }
     config_init(&config);
@@ -232,10 +263,19 @@ int host_cube_file_read(struct host_cube_file *file, const char *path,
             path, config_error_line(&config), config_error_text(&config));
     }
     config_destroy(&config);
-    free(text);
     if (status != 0) {
         host_cube_file_free(file);
     }
+    return status;
+}
+
+int host_cube_file_read(struct host_cube_file *file, const char *path,
+                        struct host_error *error)
+{
+    char *text = read_text(path, error);
+    int status = text == NULL ? error->code
+                              : host_cube_file_parse(file, path, text, error);
+    free(text);
     return status;
 }
 

@@ -51,6 +51,9 @@ struct host_cube_file {
  * found. */
 int host_cube_file_read(struct host_cube_file *file, const char *path,
                         struct host_error *error);
+/* The same of a text; `path` names it. */
+int host_cube_file_parse(struct host_cube_file *file, const char *path,
+                         const char *text, struct host_error *error);
 void host_cube_file_free(struct host_cube_file *file);
 
 /* The k-th wire of the host, 0 or 1; NULL: none. */

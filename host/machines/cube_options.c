@@ -2,6 +2,9 @@
 #include <string.h>
 
 #include "cube_reader.h"
+#include "host/base/text.h"
+
+#define NEVER UINT64_MAX
 
 static void print_wire(const struct host_cube_wire *wire, unsigned link,
                        bool first, char text[HOST_NODE_OPTION_BYTES])
@@ -31,15 +34,18 @@ unsigned host_cube_node_options(
                                             : NULL;
     const struct {
         const char *name;
-        uint64_t value;
-    } numbers[] = {{"--node", node},
-                   {"--dimension", file->dimension},
-                   {"--memory", file->memory},
-                   {"--window", file->window},
-                   {"--dead", UINT64_C(1000000) * file->dead_s},
-                   {"--serial-baud", file->serial_baud},
-                   {"--host-port", host != NULL ? 1 : 0}};
+        uint64_t value, usual; /* the program's default; NEVER: always given */
+    } numbers[] = {{"--node", node, NEVER},
+                   {"--dimension", file->dimension, NEVER},
+                   {"--memory", file->memory, 4u << 20},
+                   {"--window", file->window, 0},
+                   {"--dead", UINT64_C(1000000) * file->dead_s, 0},
+                   {"--serial-baud", file->serial_baud, 0},
+                   {"--host-port", node != 0 && host != NULL ? 1 : 0, 0}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        if (numbers[i].value == numbers[i].usual) {
+            continue;
+        }
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", numbers[i].name);
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%llu",
                  (unsigned long long)numbers[i].value);
@@ -59,9 +65,20 @@ unsigned host_cube_node_options(
             print_wire(wire, d, wire->node == node, options[n++]);
         }
     }
-    snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--board");
-    snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", file->board->name);
+    if (file->board != host_board_row(0)) {
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--board");
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", file->board->name);
+    }
     return n;
+}
+
+/* A byte becomes "$(printf '\\377')" at most. */
+static void print_word(const char *word, const char *before)
+{
+    char quoted[20 * HOST_NODE_OPTION_BYTES];
+    if (host_text_quote(quoted, sizeof quoted, word) == 0) {
+        printf("%s%s", before, quoted);
+    }
 }
 
 int host_cube_print(const char *path, struct host_error *error)
@@ -73,9 +90,9 @@ int host_cube_print(const char *path, struct host_error *error)
     }
     for (unsigned i = 0; i < file.nodes; i++) {
         unsigned count = host_cube_node_options(&file, i, options);
-        printf("%s", file.board->program);
+        print_word(file.board->program, "");
         for (unsigned k = 0; k < count; k++) {
-            printf(" %s", options[k]);
+            print_word(options[k], " ");
         }
         printf("\n");
     }

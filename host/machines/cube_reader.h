@@ -15,6 +15,11 @@
 
 #include "cube_file.h"
 
+/* Whether the library can be given a text: HOST_INPUT with the line where it
+ * asks for other files, or for more than any cube file has.  Work: a pass. */
+int host_cube_scan(const char *path, const char *text,
+                   struct host_error *error);
+
 /* HOST_INPUT with the line of a setting; NULL: the first. */
 int host_cube_wrong(const struct host_cube_file *file,
                     const config_setting_t *where, struct host_error *error,

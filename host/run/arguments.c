@@ -383,6 +383,7 @@ static int check_together(const struct parse *p)
     } options[] = {
         {KEY_MEMORY, cube, "--memory: the cube file of --cube says it"},
         {KEY_LINK, cube, "--link: the cube file of --cube says it"},
+        {KEY_BOARD, cube, "--board: the cube file of --cube says it"},
         {KEY_WINDOW, cube, "--window: the cube file of --cube says it"},
         {KEY_HOST_UNPLUG, cube || !o->link->terminals,
          "--host-unplug: goes with --link serial alone"},

@@ -63,6 +63,16 @@ static bool has(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
     return false;
 }
 
+static bool named(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
+                  unsigned count, const char *name)
+{
+    bool found = false;
+    for (unsigned i = 0; i < count; i++) {
+        found = found || strcmp(options[i], name) == 0;
+    }
+    return found;
+}
+
 static void nodes_are_started_as_it_says(void **unused)
 {
     static struct host_cube_file file;
@@ -85,7 +95,9 @@ static void nodes_are_started_as_it_says(void **unused)
     assert_true(has(options, count, "--memory", "524288"));
     assert_true(has(options, count, "--serial-baud", "921600"));
     assert_true(has(options, count, "--key", key_path));
-    assert_true(has(options, count, "--board", "linux"));
+    assert_false(named(options, count, "--board")); /* the program's own */
+    assert_false(named(options, count, "--window"));
+    assert_false(named(options, count, "--host-port")); /* node 0 has it */
     assert_true(
         has(options, count, "--wire", "0=serial:/dev/ttyUSB0:921600:rtscts"));
     assert_true(has(options, count, "--wire", "1=listen:10.0.0.1:7000"));
@@ -234,12 +246,72 @@ static void other_types_are_no_values(void **unused)
     }
 }
 
+/* What the library would follow, or not come back from, it never sees. */
+static void what_the_library_is_not_given(void **unused)
+{
+    static const struct {
+        const char *text, *said;
+    } cases[] = {
+        {"dimension = 0;\n  @include \"/dev/zero\"\n", ":2: @: "},
+        {"@include \"lab.cube\"", ":1: @: "},
+        {"a = \"\\\"\"; /* \" */ # \"\n// \"\n@include \"a\"", ":3: @: "},
+        {"a = \"\n\n\"; @", ":3: @: "},
+        {"a = ((((((((((((((((((((", ":1: too many brackets"},
+        {"a=[[]];b=[[]];c=[[]];d=({[[{[[((((((((((((", ":1: too many brackets"},
+        /* Read on, and refused for what they are. */
+        {"# @include \"a\"\n/* @ */ // @\ndimension = \"@include\";",
+         ":3: dimension: "},
+        {"dimension = 1; /* @", ":1: links: "},
+        {"dimension = \"1", ":1: syntax error"},
+        {")))]]]}}}", ":1: syntax error"},
+        {"", ":1: dimension: "}};
+    static struct host_cube_file file;
+    static char many[4096];
+    struct host_error error = {0};
+    (void)unused;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        error = (struct host_error){0};
+        assert_int_equal(
+            host_cube_file_parse(&file, "a.cube", cases[i].text, &error), 3);
+        if (strstr(error.text, cases[i].said) == NULL) {
+            fail_msg("%s: %s", cases[i].text, error.text);
+        }
+    }
+    for (int i = 0; i < 100; i++) {
+        snprintf(many + strlen(many), sizeof many - strlen(many), "a%d=1;", i);
+    }
+    error = (struct host_error){0};
+    assert_int_equal(host_cube_file_parse(&file, "a.cube", many, &error), 3);
+    assert_non_null(strstr(error.text, ":1: more settings"));
+}
+
 static void files_that_are_not_taken(void **unused)
 {
+    static const struct {
+        const char *path, *what;
+    } others[] = {{"/no/such.cube", "No such file"},
+                  {"/tmp", "a directory; "},
+                  {"/dev/zero", "a pipe or device; "},
+                  {"/dev/null", "a pipe or device; "}};
     static struct host_cube_file file;
     struct host_error error = {0};
     (void)unused;
-    assert_int_equal(host_cube_file_read(&file, "/no/such.cube", &error), 3);
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        error = (struct host_error){0};
+        assert_int_equal(host_cube_file_read(&file, others[i].path, &error), 3);
+        assert_non_null(strstr(error.text, others[i].what));
+    }
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(mkfifo(path, 0600), 0); /* which nobody writes to */
+    error = (struct host_error){0};
+    assert_int_equal(host_cube_file_read(&file, path, &error), 3);
+    assert_non_null(strstr(error.text, "a pipe or device; "));
+    assert_int_equal(unlink(path), 0);
+    write_file(path, good);
+    assert_int_equal(truncate(path, INT32_MAX), 0);
+    error = (struct host_error){0};
+    assert_int_equal(host_cube_file_read(&file, path, &error), 3);
+    assert_non_null(strstr(error.text, "at most 4 MiB; "));
     write_file(path, good);
     assert_int_equal(chmod(key_path, 0602), 0);
     error = (struct host_error){0};
@@ -254,6 +326,7 @@ int main(void)
         cmocka_unit_test(nodes_are_started_as_it_says),
         cmocka_unit_test(mistakes_are_named),
         cmocka_unit_test(other_types_are_no_values),
+        cmocka_unit_test(what_the_library_is_not_given),
         cmocka_unit_test(files_that_are_not_taken),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

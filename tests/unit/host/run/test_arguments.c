@@ -127,6 +127,7 @@ static void test_in_vain(void **unused)
     } cases[] = {{"--memory=1M", "--cube=lab.cube", "--nodes=2"},
                  {"--link=tcp", "--cube=lab.cube", "--nodes=2"},
                  {"--link=mpi", "--cube=lab.cube", "--nodes=2"},
+                 {"--board=linux", "--cube=lab.cube", "--nodes=2"},
                  {"--window=4", "--cube=lab.cube", "--nodes=2"},
                  {"--host-unplug=99", "--link=tcp", "--link=serial"},
                  {"--host-unplug=99", "--cube=lab.cube", "--link=serial"},
