@@ -166,6 +166,11 @@ void cube_for_serial(struct cube_config *config, uint32_t baud);
  * 10" (`window` stands for host_window too); NULL: the config is sound. */
 const char *cube_config_fault(const struct cube_config *config);
 
+/* The end to which link d of an end leads, be it a node or CUBE_HOST; of the
+ * config, what says who has host ports. */
+struct link_end cube_peer_of(const struct cube_config *config, unsigned self,
+                             unsigned d);
+
 struct cube; /* opaque: lives at the start of its arena */
 
 size_t cube_arena_bytes(const struct cube_config *config);

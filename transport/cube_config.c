@@ -8,20 +8,20 @@
 static_assert(CUBE_DIMENSION_MAX == 10 && CUBE_HOST_PORTS_MAX == 8,
               "the texts of cube_config_fault say so");
 
-struct cube_end cube_peer_of(const struct cube_config *config, unsigned self,
+struct link_end cube_peer_of(const struct cube_config *config, unsigned self,
                              unsigned d)
 {
     bool many = config->host_ports > 1;
     unsigned spare = config->spare_node;
     if (self == CUBE_HOST) {
         unsigned node = many || d == 0 || spare == 0 ? d : spare;
-        return (struct cube_end){(uint16_t)node, config->dimension};
+        return (struct link_end){(uint16_t)node, config->dimension};
     }
     if (d >= config->dimension) {
         unsigned port = many ? self : self != 0;
-        return (struct cube_end){CUBE_HOST, (uint8_t)port};
+        return (struct link_end){CUBE_HOST, (uint8_t)port};
     }
-    return (struct cube_end){(uint16_t)(self ^ 1u << d), (uint8_t)d};
+    return (struct link_end){(uint16_t)(self ^ 1u << d), (uint8_t)d};
 }
 
 struct link_config cube_link_config(const struct cube_config *config,
@@ -29,7 +29,7 @@ struct link_config cube_link_config(const struct cube_config *config,
 {
     bool host = config->self == CUBE_HOST;
     bool to_host = !host && d == config->dimension;
-    struct cube_end peer = cube_peer_of(config, config->self, d);
+    struct link_end peer = cube_peer_of(config, config->self, d);
     struct link_config c;
     memset(&c, 0, sizeof c);
     c.pipe = config->pipes[d];

@@ -17,12 +17,6 @@ enum {
     CUBE_MESSAGE_MAX = CUBE_HEAD + CUBE_PAYLOAD_MAX
 };
 
-/* An end of a link. */
-struct cube_end {
-    uint16_t node; /* or CUBE_HOST */
-    uint8_t port;
-};
-
 /* The oldest message of a link, while it is under way. */
 struct cube_arrival {
     struct link_message message;
@@ -61,10 +55,7 @@ struct cube {
     uint64_t looked_us; /* when links were looked at last */
 };
 
-/* cube_config.c: the end to which link d of an end must lead; links of the
- * config's own end, and the config of each. */
-struct cube_end cube_peer_of(const struct cube_config *config, unsigned self,
-                             unsigned d);
+/* cube_config.c: links of the config's own end, and the config of each. */
 unsigned cube_links_of(const struct cube_config *config);
 struct link_config cube_link_config(const struct cube_config *config,
                                     unsigned d);

@@ -38,7 +38,7 @@ void cube_wrong_text(const struct cube_wrong *wrong,
                      char text[CUBE_FAULT_BYTES])
 {
     struct cube_text t = cube_text_in(text, CUBE_FAULT_BYTES);
-    struct cube_end peer = cube_peer_of(config, wrong->node, wrong->link);
+    struct link_end peer = cube_peer_of(config, wrong->node, wrong->link);
     say_end(&t, "", wrong->node);
     say_link(&t, " ", wrong->link);
     if (wrong->refusal == LINK_WRONG_WIRE && wrong->peer_node != peer.node) {

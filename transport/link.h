@@ -44,6 +44,12 @@ struct link_pipe {
     int (*receive)(void *context, uint8_t *bytes, size_t size);
 };
 
+/* An end of a link: which node, and which port of it. */
+struct link_end {
+    uint16_t node;
+    uint8_t port;
+};
+
 enum link_state {
     LINK_DOWN,    /* the pipe is closed */
     LINK_OPENING, /* shaking hands */

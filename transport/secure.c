@@ -2,30 +2,40 @@
 
 #include <string.h>
 
+#include "bytes.h"
 #include "check.h"
 #include "secure_wipe.h"
 
-static const uint8_t magic[8] = {'i', 'n', 'c', 'o', 'd', 'e', 's', 2};
+/* The last byte is the version. */
+static const uint8_t mark[SECURE_MARK_BYTES] = {'i', 'n', 'c', 'o',
+                                                'd', 'e', 's', 3};
+
+/* Where the fields of a greeting begin. */
+enum {
+    ROLE = SECURE_MARK_BYTES, /* 'c': the caller, 'l': the listener */
+    PORT,
+    NODE,
+    PEER_NODE = NODE + 2,
+    PEER_PORT = PEER_NODE + 2,
+    NONCE = PEER_PORT + 2,
+    TAG = NONCE + SECURE_NONCE_BYTES
+};
 
 /* The complement tells a changed size at once: bytes that never come are not
  * waited for.  The number, its low 32 bits, tells what is missing before it. */
 static void put_head(uint8_t head[SECURE_HEAD_BYTES], size_t size,
                      uint64_t number)
 {
-    head[0] = (uint8_t)size;
-    head[1] = (uint8_t)(size >> 8);
-    head[2] = (uint8_t)~head[0];
-    head[3] = (uint8_t)~head[1];
-    for (unsigned i = 0; i < 4; i++) {
-        head[4 + i] = (uint8_t)(number >> 8 * i);
-    }
+    bytes_put16(head, (unsigned)size);
+    bytes_put16(head + 2, ~(unsigned)size);
+    bytes_put32(head + 4, (uint32_t)number);
 }
 
 /* The size that a head states, or SIZE_MAX: none. */
 static size_t head_size(const uint8_t head[SECURE_HEAD_BYTES])
 {
-    size_t size = (size_t)head[0] | (size_t)head[1] << 8;
-    bool sound = (head[0] ^ head[2]) == 0xff && (head[1] ^ head[3]) == 0xff;
+    size_t size = bytes_get16(head);
+    bool sound = (size ^ bytes_get16(head + 2)) == 0xffff;
     return sound && size <= SECURE_RECORD_MAX ? size : SIZE_MAX;
 }
 
@@ -33,138 +43,269 @@ static size_t head_size(const uint8_t head[SECURE_HEAD_BYTES])
 static uint32_t head_ahead(const uint8_t head[SECURE_HEAD_BYTES],
                            uint64_t expected)
 {
-    uint32_t number = (uint32_t)head[4] | (uint32_t)head[5] << 8 |
-                      (uint32_t)head[6] << 16 | (uint32_t)head[7] << 24;
-    return number - (uint32_t)expected;
+    return bytes_get32(head + 4) - (uint32_t)expected;
 }
 
 /* --- proving ------------------------------------------------------------- */
 
-void secure_shake_init(struct secure_shake *shake,
-                       const struct secure_suite *suite,
-                       const uint8_t key[SECURE_KEY_BYTES], bool caller,
-                       const uint8_t nonce[SECURE_NONCE_BYTES])
+static void put_ends(uint8_t *greeting, const struct secure_ends *ends)
 {
-    memset(shake, 0, sizeof *shake);
-    shake->suite = suite;
-    shake->key = key;
-    shake->caller = caller;
-    memcpy(shake->out, magic, sizeof magic);
-    memcpy(shake->out + sizeof magic, nonce, SECURE_NONCE_BYTES);
-    shake->out_end = SECURE_GREETING_BYTES;
+    greeting[PORT] = ends->self.port;
+    bytes_put16(greeting + NODE, ends->self.node);
+    bytes_put16(greeting + PEER_NODE, ends->peer.node);
+    greeting[PEER_PORT] = ends->peer.port;
 }
 
-/* Both greetings, the caller's first, make a root of this connection alone, and
- * that a key for each direction. */
-static void derive(struct secure_shake *shake)
+/* That who sent a greeting knows the key, or repeats one who did. */
+static void make_tag(uint8_t tag[SECURE_TAG_BYTES],
+                     const struct secure_self *self, const uint8_t *greeting)
 {
-    uint8_t both[2 * SECURE_GREETING_BYTES], root[SECURE_KEY_BYTES];
-    const uint8_t caller = 'c', listener = 'l';
-    uint8_t *first = both, *second = both + SECURE_GREETING_BYTES;
-    memcpy(shake->caller ? first : second, shake->out, SECURE_GREETING_BYTES);
-    memcpy(shake->caller ? second : first, shake->in, SECURE_GREETING_BYTES);
-    shake->suite->hash(root, shake->key, both, sizeof both);
-    shake->suite->hash(shake->keys.out, root,
-                       shake->caller ? &caller : &listener, 1);
-    shake->suite->hash(shake->keys.in, root,
-                       shake->caller ? &listener : &caller, 1);
-    secure_wipe(root, sizeof root);
+    uint8_t whole[SECURE_KEY_BYTES];
+    self->suite->hash(whole, self->key, greeting, TAG);
+    memcpy(tag, whole, SECURE_TAG_BYTES);
 }
 
-/* The peer's nonce is here: ours is the proof, an empty record. */
-static bool take_greeting(struct secure_shake *shake)
+/* In a time that says nothing of the bytes. */
+static bool is_same(const uint8_t *a, const uint8_t *b, size_t size)
 {
-    uint8_t *proof = shake->out + SECURE_GREETING_BYTES;
-    if (memcmp(shake->in, magic, sizeof magic) != 0 ||
-        memcmp(shake->in, shake->out, SECURE_GREETING_BYTES) == 0) {
-        return false;
+    unsigned bits = 0;
+    for (size_t i = 0; i < size; i++) {
+        bits |= a[i] ^ b[i];
     }
-    derive(shake);
-    put_head(proof, 0, shake->keys.out_count);
-    shake->suite->seal(proof + SECURE_HEAD_BYTES, proof, 0, proof,
-                       shake->keys.out_count++, shake->keys.out);
-    shake->out_end = SECURE_OPENING_BYTES;
-    shake->greeted = true;
-    return true;
+    return bits == 0;
 }
 
-static bool take_proof(struct secure_shake *shake)
+static void put_point(struct secure_shake *shake)
 {
-    uint8_t *proof = shake->in + SECURE_GREETING_BYTES;
+    static const uint8_t base[SECURE_KEY_BYTES] = {9};
+    shake->self.suite->x25519(shake->out + SECURE_GREETING_BYTES, shake->secret,
+                              base);
+    shake->out_end = SECURE_POINT_END;
+}
+
+/* A listener keeps its point to itself until the caller has greeted well: so a
+ * stranger costs it hashes, and no multiplication. */
+void secure_shake_init(struct secure_shake *shake,
+                       const struct secure_self *self,
+                       const struct secure_seed *seed)
+{
+    uint8_t *greeting = shake->out;
+    memset(shake, 0, sizeof *shake);
+    shake->self = *self;
+    memcpy(shake->secret, seed->secret, sizeof shake->secret);
+    memcpy(greeting, mark, sizeof mark);
+    greeting[ROLE] = self->caller ? 'c' : 'l';
+    put_ends(greeting, &self->ends);
+    memcpy(greeting + NONCE, seed->nonce, SECURE_NONCE_BYTES);
+    make_tag(greeting + TAG, self, greeting);
+    shake->out_end = SECURE_GREETING_BYTES;
+    if (self->caller) {
+        put_point(shake);
+    }
+}
+
+/* What is wrong with what has come of a greeting. */
+static enum secure_fault hear_greeting(struct secure_shake *shake)
+{
+    enum { VERSION = SECURE_MARK_BYTES - 1 };
+    size_t have =
+        shake->in_end < SECURE_MARK_BYTES ? shake->in_end : SECURE_MARK_BYTES;
+    uint8_t tag[SECURE_TAG_BYTES];
+    if (memcmp(shake->in, mark, have < VERSION ? have : VERSION) != 0) {
+        return link_greets(shake->in, shake->in_end) ? SECURE_NO_KEY
+                                                     : SECURE_NO_GREETING;
+    }
+    if (memcmp(shake->in, mark, have) != 0) {
+        return SECURE_OTHER_VERSION;
+    }
+    if (shake->in_end < SECURE_GREETING_BYTES) {
+        return SECURE_SOUND;
+    }
+    make_tag(tag, &shake->self, shake->in);
+    shake->greeted = is_same(tag, shake->in + TAG, sizeof tag) &&
+                     shake->in[ROLE] == (shake->self.caller ? 'l' : 'c');
+    return shake->greeted ? SECURE_SOUND : SECURE_OTHER_KEY;
+}
+
+/* Both greetings and points, the caller's first, and what the exchange gives
+ * make a root of this connection alone, and that a key for each direction.
+ * False: the peer's point leaves nothing secret. */
+static bool derive(struct secure_shake *shake)
+{
+    enum { BOTH = 2 * SECURE_POINT_END };
+    static const uint8_t nothing[SECURE_KEY_BYTES];
+    static const uint8_t caller = 'c', listener = 'l';
+    const struct secure_suite *suite = shake->self.suite;
+    bool calls = shake->self.caller;
+    uint8_t all[BOTH + SECURE_KEY_BYTES], root[SECURE_KEY_BYTES];
+    memcpy(all + (calls ? 0 : BOTH / 2), shake->out, BOTH / 2);
+    memcpy(all + (calls ? BOTH / 2 : 0), shake->in, BOTH / 2);
+    suite->x25519(all + BOTH, shake->secret, shake->in + SECURE_GREETING_BYTES);
+    secure_wipe(shake->secret, sizeof shake->secret);
+    bool sound = !is_same(all + BOTH, nothing, sizeof nothing);
+    suite->hash(root, shake->self.key, all, sizeof all);
+    suite->hash(shake->keys.out, root, calls ? &caller : &listener, 1);
+    suite->hash(shake->keys.in, root, calls ? &listener : &caller, 1);
+    secure_wipe(all, sizeof all);
+    secure_wipe(root, sizeof root);
+    return sound;
+}
+
+/* The peer's point is here: ours, if it is not sent yet, and the proof, an
+ * empty record. */
+static enum secure_fault take_point(struct secure_shake *shake)
+{
+    uint8_t *proof = shake->out + SECURE_POINT_END;
+    if (!shake->self.caller) {
+        put_point(shake);
+    }
+    if (!derive(shake)) {
+        return SECURE_OTHER_KEY;
+    }
+    put_head(proof, 0, shake->keys.out_count);
+    shake->self.suite->seal(proof + SECURE_HEAD_BYTES, proof, 0, proof,
+                            shake->keys.out_count++, shake->keys.out);
+    shake->out_end = SECURE_OPENING_BYTES;
+    shake->derived = true;
+    return SECURE_SOUND;
+}
+
+static enum secure_fault take_proof(struct secure_shake *shake)
+{
+    uint8_t *proof = shake->in + SECURE_POINT_END;
     shake->proven =
         head_size(proof) == 0 && head_ahead(proof, 0) == 0 &&
-        shake->suite->open(proof, proof + SECURE_HEAD_BYTES, 0, proof,
-                           shake->keys.in_count++, shake->keys.in);
-    return shake->proven;
+        shake->self.suite->open(proof, proof + SECURE_HEAD_BYTES, 0, proof,
+                                shake->keys.in_count++, shake->keys.in);
+    return shake->proven ? SECURE_SOUND : SECURE_OTHER_KEY;
 }
 
-static bool send_opening(struct secure_shake *shake,
-                         const struct link_pipe *pipe)
+static enum secure_fault send_opening(struct secure_shake *shake,
+                                      const struct link_pipe *pipe)
 {
     if (shake->out_begin == shake->out_end) {
-        return true;
+        return SECURE_SOUND;
     }
     int sent = pipe->send(pipe->context, shake->out + shake->out_begin,
                           shake->out_end - shake->out_begin);
     shake->out_begin += sent > 0 ? (size_t)sent : 0;
-    return sent >= 0;
+    return sent < 0 ? SECURE_GONE : SECURE_SOUND;
 }
 
-static bool receive_opening(struct secure_shake *shake,
-                            const struct link_pipe *pipe)
+static enum secure_fault receive_opening(struct secure_shake *shake,
+                                         const struct link_pipe *pipe)
 {
-    size_t want = shake->greeted ? SECURE_OPENING_BYTES : SECURE_GREETING_BYTES;
+    size_t want = shake->derived   ? SECURE_OPENING_BYTES
+                  : shake->greeted ? SECURE_POINT_END
+                                   : SECURE_GREETING_BYTES;
     if (shake->proven) {
-        return true;
+        return SECURE_SOUND;
     }
     int got = pipe->receive(pipe->context, shake->in + shake->in_end,
                             want - shake->in_end);
     shake->in_end += got > 0 ? (size_t)got : 0;
-    if (got < 0) {
-        return false;
+    if (got <= 0) {
+        return got < 0 ? SECURE_GONE : SECURE_SOUND;
+    }
+    if (!shake->greeted) {
+        return hear_greeting(shake);
     }
     if (shake->in_end < want) {
-        return true;
+        return SECURE_SOUND;
     }
-    return shake->greeted ? take_proof(shake) : take_greeting(shake);
+    return shake->derived ? take_proof(shake) : take_point(shake);
+}
+
+static enum secure_fault exchange(struct secure_shake *shake,
+                                  const struct link_pipe *pipe)
+{
+    /* Greeting, point and proof may have come together. */
+    for (int i = 0; i < 3; i++) {
+        enum secure_fault fault = send_opening(shake, pipe);
+        if (fault == SECURE_SOUND) {
+            fault = receive_opening(shake, pipe);
+        }
+        if (fault != SECURE_SOUND) {
+            return fault;
+        }
+    }
+    return send_opening(shake, pipe);
 }
 
 int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe)
 {
-    /* Twice: greeting and proof may have come together. */
-    for (int i = 0; i < 2 && !shake->failed; i++) {
-        shake->failed =
-            !send_opening(shake, pipe) || !receive_opening(shake, pipe);
+    if (shake->fault == SECURE_SOUND) {
+        shake->fault = exchange(shake, pipe);
     }
-    shake->failed = shake->failed || !send_opening(shake, pipe);
-    if (shake->failed) {
+    if (shake->fault != SECURE_SOUND) {
+        secure_shake_end(shake);
         return -1;
     }
     return shake->proven && shake->out_begin == shake->out_end ? 1 : 0;
 }
 
-bool secure_shake_other_key(const struct secure_shake *shake)
+struct secure_ends secure_shake_peer(const struct secure_shake *shake)
 {
-    return shake->in_end == SECURE_OPENING_BYTES && !shake->proven;
+    const uint8_t *greeting = shake->in;
+    LINK_ASSERT(shake->proven);
+    return (struct secure_ends){
+        .self = {bytes_get16(greeting + NODE), greeting[PORT]},
+        .peer = {bytes_get16(greeting + PEER_NODE), greeting[PEER_PORT]}};
+}
+
+static bool fits(struct link_end a, struct link_end b)
+{
+    bool node = a.node == b.node || a.node == SECURE_NODE_UNKNOWN ||
+                b.node == SECURE_NODE_UNKNOWN;
+    bool port = a.port == b.port || a.port == SECURE_PORT_UNKNOWN ||
+                b.port == SECURE_PORT_UNKNOWN;
+    return node && port;
+}
+
+bool secure_shake_misled(const struct secure_shake *shake)
+{
+    const struct secure_ends *ours = &shake->self.ends;
+    struct secure_ends theirs = secure_shake_peer(shake);
+    return !fits(ours->self, theirs.peer) || !fits(ours->peer, theirs.self);
+}
+
+void secure_shake_end(struct secure_shake *shake)
+{
+    enum secure_fault fault = shake->fault;
+    secure_wipe(shake, sizeof *shake);
+    shake->fault = fault == SECURE_SOUND ? SECURE_GONE : fault;
+}
+
+bool secure_greets(const uint8_t *bytes, size_t size)
+{
+    return size >= sizeof mark && memcmp(bytes, mark, sizeof mark - 1) == 0;
 }
 
 /* --- records ------------------------------------------------------------- */
 
 void secure_records_start(struct secure_records *records,
-                          const struct secure_shake *shake,
+                          struct secure_shake *shake,
                           const struct link_pipe *pipe)
 {
-    LINK_ASSERT(shake->proven && !shake->failed);
+    LINK_ASSERT(shake->proven && shake->fault == SECURE_SOUND);
     memset(records, 0, sizeof *records);
-    records->suite = shake->suite;
+    records->suite = shake->self.suite;
     records->keys = shake->keys;
     records->pipe = *pipe;
+    secure_shake_end(shake);
+}
+
+void secure_records_end(struct secure_records *records)
+{
+    secure_wipe(&records->keys, sizeof records->keys);
+    secure_wipe(records->plain, sizeof records->plain);
+    records->plain_begin = records->plain_end = 0;
+    records->failed = true;
 }
 
 static int fail(struct secure_records *r)
 {
-    r->failed = true;
-    secure_wipe(&r->keys, sizeof r->keys);
+    secure_records_end(r);
     return LINK_PIPE_CLOSED;
 }
 

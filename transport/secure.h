@@ -1,21 +1,22 @@
 /* Authenticated, fresh and secret bytes over a pipe that strangers can reach,
  * beneath a link: both ends prove that they know the cube's key, and every
- * record carries a number of its direction under keys of this connection alone.
- * PROTOCOL.md has the bytes.  A record that is not of the peer's making, or is
- * older than the last one, is as good as lost: the next one is found behind it,
- * and the link beneath hears of a gap by a zero byte, which ends a frame.  Many
- * in a row fail the connection; the link goes on over the next.
- *
- * The primitives are given: keyed BLAKE2b-256 and ChaCha20-Poly1305 (RFC 7693,
- * RFC 8439), from a library that is known for them.
+ * record carries a number of its direction under keys of this connection alone,
+ * made of the cube's key and an exchange (X25519): who learns the key later
+ * cannot read what he has recorded.  Both say which node and port they are at,
+ * as far as they know.  PROTOCOL.md has the bytes.  A record that is not of the
+ * peer's making, or is older than the last one, is as good as lost: the next
+ * one is found behind it, and the link above hears of a gap by a zero byte,
+ * which ends a frame.  Many in a row fail the connection; the link goes on over
+ * the next.
  *
  * Memory: struct secure_shake while a connection is not proven, struct
- * secure_records then.  Work: a shake hashes at most three short inputs and
- * opens one empty record; all functions are linear in the bytes given
- * and taken, and between two good records no more than SECURE_LOST_MAX bytes
- * are opened or skipped in vain.
+ * secure_records then; keys are wiped as soon as they are not needed.  Work: a
+ * shake hashes five short inputs, opens one empty record, and multiplies twice
+ * on the curve, where it listens only for who knows the key; all else is linear
+ * in the bytes given and taken, and between two good records no more than
+ * SECURE_LOST_MAX bytes are opened or skipped in vain.
  *
- *     secure_shake_init(&shake, &suite, key, true, nonce);
+ *     secure_shake_init(&shake, &self, &seed);
  *     while ((status = secure_shake(&shake, &pipe)) == 0)
  *         wait();
  *     if (status > 0)
@@ -26,16 +27,45 @@
 #define TRANSPORT_SECURE_H
 
 #include "link.h"
-#include "secure_suite.h"
+#include "secure_seed.h"
 
 enum {
     SECURE_RECORD_MAX = 2048, /* bytes of the link in a record */
-    SECURE_GREETING_BYTES = 32,
+    SECURE_MARK_BYTES = 8,    /* that a greeting begins with */
+    SECURE_GREETING_BYTES = 16 + SECURE_NONCE_BYTES + SECURE_TAG_BYTES,
+    SECURE_POINT_END = SECURE_GREETING_BYTES + SECURE_KEY_BYTES,
     SECURE_PROOF_BYTES = SECURE_HEAD_BYTES + SECURE_TAG_BYTES,
-    SECURE_OPENING_BYTES = SECURE_GREETING_BYTES + SECURE_PROOF_BYTES,
+    SECURE_OPENING_BYTES = SECURE_POINT_END + SECURE_PROOF_BYTES,
     SECURE_WIRE_MAX = SECURE_HEAD_BYTES + SECURE_RECORD_MAX + SECURE_TAG_BYTES,
     SECURE_AHEAD_MAX = 65536, /* records that may be lost in a row */
     SECURE_LOST_MAX = 262144
+};
+
+enum { SECURE_NODE_UNKNOWN = 0xffff, SECURE_PORT_UNKNOWN = 0xff };
+
+/* A wire as one end of it sees it; of what it does not know yet, with the
+ * numbers above. */
+struct secure_ends {
+    struct link_end self, peer;
+};
+
+/* An end of a connection; what it points to stays the caller's, and in use
+ * while the shake lasts. */
+struct secure_self {
+    const struct secure_suite *suite;
+    const uint8_t *key; /* of the cube, SECURE_KEY_BYTES */
+    bool caller;        /* the end that made the connection */
+    struct secure_ends ends;
+};
+
+/* Why a shake failed. */
+enum secure_fault {
+    SECURE_SOUND,
+    SECURE_GONE,          /* the pipe was closed */
+    SECURE_NO_KEY,        /* it greets as a link does that has no key */
+    SECURE_NO_GREETING,   /* it says something else */
+    SECURE_OTHER_VERSION, /* of this layer */
+    SECURE_OTHER_KEY      /* or what it sent was damaged on the way */
 };
 
 struct secure_keys {
@@ -44,28 +74,39 @@ struct secure_keys {
 };
 
 struct secure_shake {
-    const struct secure_suite *suite;
-    const uint8_t *key; /* of the cube; stays the caller's */
-    bool caller, greeted, proven, failed;
+    struct secure_self self;
+    bool greeted; /* the peer has, as one who knows the key */
+    bool derived, proven;
+    enum secure_fault fault;
+    uint8_t secret[SECURE_KEY_BYTES]; /* of the exchange */
     struct secure_keys keys;
     uint8_t out[SECURE_OPENING_BYTES], in[SECURE_OPENING_BYTES];
     size_t out_begin, out_end, in_end;
 };
 
-/* caller: the end that made the connection.  nonce: never used before with this
- * key by anyone; it need not be secret.  Random bytes will do. */
+/* seed: drawn for this connection alone (secure_seed.h); it is the caller's to
+ * wipe. */
 void secure_shake_init(struct secure_shake *shake,
-                       const struct secure_suite *suite,
-                       const uint8_t key[SECURE_KEY_BYTES], bool caller,
-                       const uint8_t nonce[SECURE_NONCE_BYTES]);
+                       const struct secure_self *self,
+                       const struct secure_seed *seed);
 
 /* Moves bytes: 1 when the peer has proven itself and has what proves us, 0 not
- * yet, -1 it does not know the key, or is gone. */
+ * yet, -1 it failed, as shake->fault says; then its secrets are wiped. */
 int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe);
 
-/* Whether it failed because the peer has another key, or what it sent was
- * damaged on the way. */
-bool secure_shake_other_key(const struct secure_shake *shake);
+/* The wire as the peer sees it, once it has proven itself. */
+struct secure_ends secure_shake_peer(const struct secure_shake *shake);
+
+/* Whether the two ends see another wire: it leads elsewhere than one of them
+ * takes it to, by a mistake, or as somebody has joined it to another one.  What
+ * an end does not know fits all.  Once the peer has proven itself. */
+bool secure_shake_misled(const struct secure_shake *shake);
+
+/* Wipes its secrets; it has failed, if it had not before. */
+void secure_shake_end(struct secure_shake *shake);
+
+/* Whether this is what an end with a key says first. */
+bool secure_greets(const uint8_t *bytes, size_t size);
 
 struct secure_records {
     const struct secure_suite *suite;
@@ -83,10 +124,13 @@ struct secure_records {
     uint8_t plain[1 + SECURE_RECORD_MAX]; /* behind a zero, for a gap */
 };
 
-/* Takes the keys of a shake that returned 1. */
+/* Takes the keys of a shake that returned 1, and ends it. */
 void secure_records_start(struct secure_records *records,
-                          const struct secure_shake *shake,
+                          struct secure_shake *shake,
                           const struct link_pipe *pipe);
+
+/* Wipes the keys and what was opened with them; the pipe is closed. */
+void secure_records_end(struct secure_records *records);
 
 /* LINK_PIPE_CLOSED from either function: this connection is over. */
 struct link_pipe secure_records_pipe(struct secure_records *records);

@@ -2,7 +2,16 @@
 
 #include <sodium.h>
 #include <string.h>
-#include <sys/random.h>
+
+#include "transport/secure_wipe.h"
+
+/* libsodium leaves parts of keys on the stack: it is wiped where its functions
+ * had their frames. */
+static __attribute__((noinline)) void burn_stack(void)
+{
+    uint8_t below[2048];
+    secure_wipe(below, sizeof below);
+}
 
 static void hash(uint8_t out[SECURE_KEY_BYTES],
                  const uint8_t key[SECURE_KEY_BYTES], const uint8_t *in,
@@ -10,6 +19,7 @@ static void hash(uint8_t out[SECURE_KEY_BYTES],
 {
     (void)crypto_generichash_blake2b(out, SECURE_KEY_BYTES, in, size, key,
                                      SECURE_KEY_BYTES);
+    burn_stack();
 }
 
 /* libsodium tells a point of a small order by its status, and may leave `out`
@@ -21,6 +31,7 @@ static void x25519(uint8_t out[SECURE_KEY_BYTES],
     if (crypto_scalarmult_curve25519(out, secret, point) != 0) {
         memset(out, 0, SECURE_KEY_BYTES);
     }
+    burn_stack();
 }
 
 static void make_nonce(uint8_t nonce[12], uint64_t counter)
@@ -39,6 +50,7 @@ static void seal(uint8_t *out, const uint8_t *in, size_t size,
     make_nonce(nonce, counter);
     (void)crypto_aead_chacha20poly1305_ietf_encrypt(
         out, NULL, in, size, ad, SECURE_HEAD_BYTES, NULL, nonce, key);
+    burn_stack();
 }
 
 static bool open(uint8_t *out, const uint8_t *in, size_t size,
@@ -47,16 +59,12 @@ static bool open(uint8_t *out, const uint8_t *in, size_t size,
 {
     uint8_t nonce[12];
     make_nonce(nonce, counter);
-    return crypto_aead_chacha20poly1305_ietf_decrypt(
-               out, NULL, NULL, in, size + SECURE_TAG_BYTES, ad,
-               SECURE_HEAD_BYTES, nonce, key) == 0;
+    int status = crypto_aead_chacha20poly1305_ietf_decrypt(
+        out, NULL, NULL, in, size + SECURE_TAG_BYTES, ad, SECURE_HEAD_BYTES,
+        nonce, key);
+    burn_stack();
+    return status == 0;
 }
 
 const struct secure_suite secure_sodium = {
     .hash = hash, .x25519 = x25519, .seal = seal, .open = open};
-
-bool secure_system_random(void *context, uint8_t *bytes, size_t size)
-{
-    (void)context;
-    return getrandom(bytes, size, 0) == (ssize_t)size;
-}

@@ -10,6 +10,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "transport/secure_wipe.h"
+
 static uint64_t clock_us(void)
 {
     struct timespec now;
@@ -88,6 +90,7 @@ static void drop(struct tcp_candidate *c)
     if (c->fd >= 0) {
         close(c->fd);
         c->fd = -1;
+        secure_wipe(&c->heard, sizeof c->heard);
     }
 }
 
@@ -126,18 +129,38 @@ static bool crowded(struct tcp_wire *wire)
     return c->fd >= 0 && begun(wire, c);
 }
 
+static bool system_random(void *context, uint8_t *bytes, size_t size)
+{
+    (void)context;
+    return getrandom(bytes, size, 0) == (ssize_t)size;
+}
+
+static bool begin_shake(struct tcp_wire *wire, struct secure_shake *shake)
+{
+    static const struct link_end unknown = {SECURE_NODE_UNKNOWN,
+                                            SECURE_PORT_UNKNOWN};
+    const struct tcp_wire_config *c = &wire->config;
+    struct secure_self self = {
+        c->suite, c->key, !c->listens, {unknown, unknown}};
+    struct secure_seed seed;
+    if (!secure_seed_draw(&wire->source, c->suite, c->key, &seed)) {
+        return false;
+    }
+    if (c->ends != NULL) {
+        self.ends = *c->ends;
+    }
+    secure_shake_init(shake, &self, &seed);
+    secure_wipe(&seed, sizeof seed);
+    return true;
+}
+
 static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
                   bool connected, uint64_t now_us)
 {
-    uint8_t nonce[SECURE_NONCE_BYTES];
     memset(&c->heard, 0, sizeof c->heard);
-    if (wire->config.suite != NULL) {
-        if (getrandom(nonce, sizeof nonce, 0) != (ssize_t)sizeof nonce) {
-            close(fd);
-            return false;
-        }
-        secure_shake_init(&c->heard.shake, wire->config.suite, wire->config.key,
-                          !wire->config.listens, nonce);
+    if (wire->config.suite != NULL && !begin_shake(wire, &c->heard.shake)) {
+        close(fd);
+        return false;
     }
     /* A peer that answers no more is a broken connection, in the end. */
     unsigned silent_ms = TCP_SILENT_MS;
@@ -259,9 +282,11 @@ static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
         return wire->config.listens ? hear_first(wire, c, now_us) : 1;
     }
     int status = secure_shake(&c->heard.shake, &pipe);
-    wire->other_key = status < 0 ? secure_shake_other_key(&c->heard.shake)
+    wire->other_key = status < 0 ? c->heard.shake.fault == SECURE_OTHER_KEY
                                  : wire->other_key && status == 0;
-    return status;
+    bool elsewhere =
+        status > 0 && wire->tcp.fd >= 0 && secure_shake_misled(&c->heard.shake);
+    return elsewhere ? -1 : status;
 }
 
 /* The candidate becomes the connection. */
@@ -376,12 +401,20 @@ static void tick(struct tcp_wire *wire)
 
 /* --- the pipe ------------------------------------------------------------ */
 
-/* The connection is over: the next one begins. */
-static int broken(struct tcp_wire *wire)
+static void leave(struct tcp_wire *wire)
 {
     if (wire->tcp.fd >= 0) {
         close(wire->tcp.fd);
         tcp_pipe_init(&wire->tcp, -1);
+        secure_records_end(&wire->records);
+    }
+}
+
+/* The connection is over: the next one begins. */
+static int broken(struct tcp_wire *wire)
+{
+    if (wire->tcp.fd >= 0) {
+        leave(wire);
         wire->proven = false;
         wire->first.begin = wire->first.end = 0;
         pause_calls(wire, clock_us(), TCP_PAUSE_MAX_US);
@@ -468,6 +501,7 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
     memset(wire, 0, sizeof *wire);
     wire->config = *config;
     wire->listener = -1;
+    wire->source.random = system_random;
     wire->answer_us = TCP_CALL_MIN_US;
     wire->prove_us = TCP_PROVE_MIN_US;
     tcp_pipe_init(&wire->tcp, -1);
@@ -486,10 +520,7 @@ void tcp_wire_close(struct tcp_wire *wire)
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         drop(&wire->candidate[i]);
     }
-    if (wire->tcp.fd >= 0) {
-        close(wire->tcp.fd);
-        tcp_pipe_init(&wire->tcp, -1);
-    }
+    leave(wire);
     if (wire->listener >= 0) {
         close(wire->listener);
         wire->listener = -1;

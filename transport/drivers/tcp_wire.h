@@ -9,9 +9,11 @@
  * peer does give way.  Where most of them have, TCP_TURNS_MAX are let in every
  * TCP_CROWD_US, so that the peer has time for its proof however many call, and
  * the others wait in the kernel.  The peer's own new connection, once proven,
- * takes the place of the old one.  Without a key the proof is a link's
- * greeting; who keeps silent is taken while there is no better one.  While a
- * connection is in use, others are looked at every TCP_LOOK_US.
+ * takes the place of the old one; one that has the key and takes this wire for
+ * another is taken only while there is none: the link says then who that is.
+ * Without a key the proof is a link's greeting; who keeps silent is taken while
+ * there is no better one.  While a connection is in use, others are looked at
+ * every TCP_LOOK_US.
  *
  * Memory: struct tcp_wire and in the kernel two buffers of TCP_BUFFER_BYTES a
  * connection.  Work: tcp_wire's pipe accepts at most TCP_ACCEPTS_MAX
@@ -77,6 +79,9 @@ struct tcp_wire_config {
     bool listens;                     /* there; else calls it */
     const struct secure_suite *suite; /* NULL: no key */
     const uint8_t *key;               /* SECURE_KEY_BYTES, stay the caller's */
+    /* Which nodes and ports are at its ends, as far as is known when a
+     * connection is made; stays the caller's.  NULL: not at all. */
+    const struct secure_ends *ends;
 };
 
 /* What an end without a key has said before it was taken. */
@@ -98,12 +103,13 @@ struct tcp_candidate {
 
 struct tcp_wire {
     struct tcp_wire_config config;
-    int listener;        /* -1: none */
-    struct tcp_pipe tcp; /* the connection; fd -1: none */
-    bool proven;         /* it has shown who it is */
-    bool replaced;       /* by a newer one: the link hears of a break */
-    bool quiet;          /* nobody called when it was last waited for */
-    bool other_key;      /* the last one called had another key */
+    int listener;                /* -1: none */
+    struct tcp_pipe tcp;         /* the connection; fd -1: none */
+    bool proven;                 /* it has shown who it is */
+    bool replaced;               /* by a newer one: the link hears of a break */
+    bool quiet;                  /* nobody called when it was last waited for */
+    bool other_key;              /* the last one called had another key */
+    struct secure_source source; /* of what makes each opening another */
     uint64_t call_us, pause_us;
     uint64_t answer_us, prove_us; /* patience with the peer's answer, and with
                                      its proof, of the caller */

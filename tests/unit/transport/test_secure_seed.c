@@ -1,16 +1,6 @@
 /* Seeds never come twice, with or without random bytes, and where neither these
  * nor a number of the start are there, none is given. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include "transport/drivers/secure_sodium.h"
+#include "secure_world.h"
 #include "transport/secure_seed.h"
 
 static const uint8_t key[SECURE_KEY_BYTES] = "the cube's key";
@@ -105,11 +95,23 @@ static void random_bytes_count_and_may_fail(void **unused)
     assert_memory_equal(&other, &none, sizeof none);
     source.boot = 7;
     assert_true(secure_seed_draw(&source, &secure_sodium, key, &other));
-    source = (struct secure_source){.random = secure_system_random};
-    assert_true(secure_seed_draw(&source, &secure_sodium, key, &first));
-    source.draws = 0;
-    assert_true(secure_seed_draw(&source, &secure_sodium, key, &other));
-    assert_memory_not_equal(&first, &other, sizeof first);
+}
+
+/* The vector of PROTOCOL.md. */
+static void the_vector(void **unused)
+{
+    struct secure_source source = {.device = "board 17", .boot = 3};
+    struct secure_seed seed;
+    uint8_t counted[SECURE_KEY_BYTES];
+    (void)unused;
+    for (uint8_t i = 0; i < sizeof counted; i++) {
+        counted[i] = i;
+    }
+    assert_true(secure_seed_draw(&source, &secure_sodium, counted, &seed));
+    expect_bytes(seed.nonce,
+                 "0de4c590b11f45092d9a9d145be683ca585e75bb31deb2d3");
+    expect_bytes(seed.secret, "83e422ca8fb59ec7a3cabad6555ba885"
+                              "bf6357611d7cc7e8a16a6f8ca5b45702");
 }
 
 int main(void)
@@ -118,6 +120,7 @@ int main(void)
         cmocka_unit_test(no_seed_comes_twice),
         cmocka_unit_test(every_byte_of_the_source_counts),
         cmocka_unit_test(random_bytes_count_and_may_fail),
+        cmocka_unit_test(the_vector),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

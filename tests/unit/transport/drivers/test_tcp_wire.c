@@ -198,6 +198,44 @@ static void another_key_never_connects(void **unused)
     close_end(&ends[1]);
 }
 
+/* One who has the key and takes the wire for another, as a cube file may be
+ * wrong, or somebody has led his call elsewhere: while nobody better is there
+ * he is heard, as the link tells then who he is; one who is right takes his
+ * place, and keeps it. */
+static void one_who_is_led_elsewhere_ends_nothing(void **unused)
+{
+    static const struct secure_ends sees[3] = {
+        {{0, 0}, {1, 0}}, {{1, 0}, {0, 0}}, {{2, 0}, {3, 0}}};
+    static struct end ends[2], lost;
+    struct tcp_address at = free_address(AF_INET);
+    (void)unused;
+    open_end(&ends[1], 1, &at, key);
+    ends[1].wire.config.ends = &sees[1];
+    for (unsigned round = 0; round < 2; round++) {
+        open_end(&lost, 0, &at, key);
+        lost.wire.config.ends = &sees[2];
+        uint64_t begin = clock_us(), strangers = ends[1].wire.strangers;
+        while (round == 0 ? ends[1].wire.connections == 0
+                          : ends[1].wire.strangers < strangers + 3) {
+            step(&lost);
+            if (round != 0) {
+                step(&ends[0]);
+            }
+            step(&ends[1]);
+            assert_true(clock_us() - begin < 10000000);
+        }
+        if (round == 0) {
+            open_end(&ends[0], 0, &at, key);
+            ends[0].wire.config.ends = &sees[0];
+        }
+        assert_true(exchange(ends, 100));
+        assert_int_equal(ends[1].wire.connections, 2);
+        close_end(&lost);
+    }
+    close_end(&ends[0]);
+    close_end(&ends[1]);
+}
+
 static int stranger(const struct tcp_address *at)
 {
     int fd = socket(at->to.any.sa_family, SOCK_STREAM, 0);
@@ -457,6 +495,7 @@ int main(void)
         cmocka_unit_test(addresses),
         cmocka_unit_test(wires_that_break_go_on),
         cmocka_unit_test(another_key_never_connects),
+        cmocka_unit_test(one_who_is_led_elsewhere_ends_nothing),
         cmocka_unit_test(strangers_change_nothing),
         cmocka_unit_test(strangers_without_a_key_change_nothing),
         cmocka_unit_test(a_flood_keeps_nobody_out),
