@@ -169,6 +169,15 @@ static void learn(const struct node_board *board, struct linux_options *options)
         learned.self != 0 && links->links_count > learned.dimension;
 }
 
+/* For those who call from now on: which wires these are. */
+static void name_wires(struct linux_board *board,
+                       const struct linux_options *options)
+{
+    struct cube_config cube = {.self = (uint16_t)options->node,
+                               .dimension = (uint8_t)options->dimension};
+    linux_wires_name(board->wire, board->links_count, &cube);
+}
+
 static struct node_identity identity_of(const struct linux_options *options)
 {
     struct node_identity id;
@@ -260,6 +269,7 @@ static int prepare(char **argv, struct linux_options *options,
     if (options->node == LINUX_UNNAMED) {
         learn(board, options);
     }
+    name_wires(linux_board, options);
     board->identity = identity_of(options);
     return 0;
 }

@@ -28,7 +28,8 @@ void linux_wire_inherit(struct linux_wire *wire, int fd)
 static bool open_net(struct linux_wire *wire, const char *address, bool listens,
                      const uint8_t *key, struct linux_fault *fault)
 {
-    struct tcp_wire_config config = {.listens = listens, .key = key};
+    struct tcp_wire_config config = {
+        .listens = listens, .key = key, .ends = &wire->ends};
     if (tcp_address_parse(&config.address, address) != 0) {
         fault->what = "not an address in numbers with a port";
         fault->next = "write 10.0.0.7:7001 or [2001:db8::7]:7001";
@@ -130,6 +131,9 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
     memset(wire, 0, sizeof *wire);
     wire->net = net;
     wire->text = text;
+    wire->ends =
+        (struct secure_ends){{SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN},
+                             {SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN}};
     if (strncmp(text, "listen:", 7) == 0) {
         return open_net(wire, text + 7, true, key, fault);
     }
@@ -141,6 +145,15 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
     }
     fault->what = "not one of listen:, call: and serial:";
     return false;
+}
+
+void linux_wires_name(struct linux_wire *wires, unsigned count,
+                      const struct cube_config *cube)
+{
+    for (unsigned d = 0; d < count; d++) {
+        wires[d].ends.self = (struct link_end){cube->self, (uint8_t)d};
+        wires[d].ends.peer = cube_peer_of(cube, cube->self, d);
+    }
 }
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire)

@@ -21,6 +21,7 @@ enum linux_wire_kind { LINUX_SOCKET, LINUX_TERMINAL, LINUX_NET };
 
 struct linux_wire {
     enum linux_wire_kind kind;
+    struct secure_ends ends;   /* who is at them, as far as is known */
     struct tcp_pipe tcp;       /* a socket from the one who started the node */
     struct serial_pipe serial; /* a terminal */
     struct tcp_wire *net;      /* TCP, by calling and listening, */
@@ -42,6 +43,11 @@ void linux_wire_inherit(struct linux_wire *wire, int fd);
 bool linux_wire_open(struct linux_wire *wire, const char *text,
                      const uint8_t *key, struct tcp_wire *net,
                      struct linux_fault *fault);
+
+/* Once the node knows who it is: that its links are those of this cube; no
+ * longer than CUBE_LINKS_MAX. */
+void linux_wires_name(struct linux_wire *wires, unsigned count,
+                      const struct cube_config *cube);
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 

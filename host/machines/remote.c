@@ -40,6 +40,8 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
 {
     const struct host_cube_file *file = r->file;
     struct host_port *port = &r->port[r->ports];
+    r->ends[r->ports] = (struct secure_ends){
+        {CUBE_HOST, (uint8_t)r->ports}, {wire->node, (uint8_t)file->dimension}};
     if (wire->serial) {
         struct serial_port_settings s = {.baud = wire->baud,
                                          .rts_cts = wire->rts_cts,
@@ -53,6 +55,7 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
         struct tcp_wire_config config = {.address = wire->via};
         config.suite = file->has_key ? &secure_sodium : NULL;
         config.key = file->key;
+        config.ends = &r->ends[r->ports];
         if (host_port_net(port, &config, error) != 0) {
             return error->code;
         }

@@ -23,6 +23,7 @@ struct host_remote {
     const char *program;
     unsigned ports;
     struct host_port port[HOST_PORTS_MAX];
+    struct secure_ends ends[HOST_PORTS_MAX];     /* of their wires */
     struct host_process process[HOST_NODES_MAX]; /* of those started here */
     unsigned restarts;
 };
