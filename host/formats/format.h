@@ -59,6 +59,8 @@ struct host_format {
      * is that of a format that reads points. */
     const char *beside[HOST_BESIDE_MAX + 1];
     bool rows_only; /* a file of tetrahedra holds no points */
+    /* Of a format that is known and not read: "WHY; WHAT TO DO NEXT". */
+    const char *unread;
 };
 
 #endif

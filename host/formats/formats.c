@@ -8,11 +8,16 @@
  * which they are listed.  "-" is the first that has the use. */
 #define FORMATS(ROW)                                                           \
     ROW(xyz)                                                                   \
+    ROW(pts)                                                                   \
     ROW(csv)                                                                   \
     ROW(node)                                                                  \
     ROW(ele)                                                                   \
     ROW(ply)                                                                   \
     ROW(off)                                                                   \
+    ROW(obj)                                                                   \
+    ROW(stl)                                                                   \
+    ROW(las)                                                                   \
+    ROW(laz)                                                                   \
     ROW(vtu)                                                                   \
     ROW(vtk)                                                                   \
     ROW(vtp)                                                                   \

@@ -1,10 +1,10 @@
 #include "read.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "formats.h"
+#include "host/base/progress.h"
 #include "host/base/progress.h"
 
 static const struct host_format *format_of(const char *path, enum host_use use,
@@ -13,7 +13,10 @@ static const struct host_format *format_of(const char *path, enum host_use use,
 {
     char list[HOST_FORMAT_LIST_MAX];
     const struct host_format *format = host_format_of(path, use);
-    if (format == NULL) {
+    const struct host_format *named = host_format_named(path);
+    if (named != NULL && named->unread != NULL) {
+        host_fail(error, HOST_INPUT, "%s: %s", path, named->unread);
+    } else if (format == NULL) {
         host_format_list(use, list, sizeof list);
         host_fail(error, HOST_INPUT,
                   "%s: no format of %s has this extension; use %s, or any of "
@@ -75,10 +78,9 @@ int host_points_read(const char *path, struct host_points *points,
 void host_points_note(const char *path, const struct host_points *points)
 {
     if (points->wide) {
-        (void)fprintf(stderr,
-                      "incode: %s: the first three columns are x, y and z; "
-                      "those after them are passed over\n",
-                      strcmp(path, "-") == 0 ? "stdin" : path);
+        host_note("%s: the first three columns are x, y and z; those after "
+                  "them are passed over",
+                  strcmp(path, "-") == 0 ? "stdin" : path);
     }
 }
 

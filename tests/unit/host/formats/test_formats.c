@@ -45,7 +45,8 @@ static void listed(void **unused)
     assert_non_null(strstr(
         text, ".ele (TetGen; with .node, .neigh and .face beside it), .vtu "));
     host_format_help(HOST_READ_POINTS, text, sizeof text);
-    assert_non_null(strstr(text, ".xyz .txt (text), .csv (comma-separated)"));
+    assert_non_null(
+        strstr(text, ".xyz .txt (text), .pts (Leica), .csv (comma"));
     host_format_help(HOST_READ_POINTS, small, sizeof small);
     assert_memory_equal(small, text, sizeof small - 1);
     assert_int_equal(small[sizeof small - 1], '\0');
@@ -59,8 +60,9 @@ static void found_by_extension(void **unused)
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
         assert_non_null(f->name);
         assert_non_null(f->extensions[0]);
-        assert_true(f->read_points != NULL || f->read_tetrahedra != NULL ||
-                    f->write_points != NULL || f->write_tetrahedra != NULL);
+        assert_true(f->unread != NULL || f->read_points != NULL ||
+                    f->read_tetrahedra != NULL || f->write_points != NULL ||
+                    f->write_tetrahedra != NULL);
         for (unsigned k = 0; f->extensions[k] != NULL; k++) {
             char path[64];
             assert_int_equal(f->extensions[k][0], '.');

@@ -1,0 +1,180 @@
+/* .las of laser scanners, versions 1.0 to 1.4 (ASPRS, LAS Specification 1.4
+ * R15, 2019: Tables 3 and 7 to 17): x, y and z of every point record, also of
+ * those that are marked as withheld, for rows are numbered by records.  What
+ * LASzip has compressed (.laz, or a .las with its mark) is not read. */
+#include <string.h>
+
+#include "format.h"
+#include "numbers.h"
+
+#define COMPRESSED                                                             \
+    "its points are compressed, which is not read; unpack them with laszip "   \
+    "-i IN.laz -o OUT.las (of LAStools) or pdal translate IN.laz OUT.las, "    \
+    "neither of them in Debian 12"
+
+/* Where fields are. */
+enum {
+    AT_MAJOR = 24,
+    AT_MINOR = 25,
+    AT_HEADER_BYTES = 94, /* 2 */
+    AT_OFFSET = 96,       /* of the records; 4 */
+    AT_FORMAT = 104,
+    AT_LENGTH = 105,    /* of a record; 2 */
+    AT_FEW = 107,       /* number of records, up to 2^32 - 1; 4 */
+    AT_SCALE = 131,     /* 8 each, as all that follow */
+    AT_SHIFT = 155,     /* an offset, in the specification's words */
+    AT_MANY = 247,      /* number of records, since 1.4 */
+    HEADER_BYTES = 227, /* up to 1.3 as far as it is read */
+    HEADER_BYTES_4 = 375,
+    MARKS_OF_LASZIP = 0xc0,
+    FORMATS = 11
+};
+
+struct las {
+    unsigned minor, format;
+    uint64_t offset, length, count;
+    double scale[3], shift[3];
+};
+
+static uint64_t field(const struct host_source *source, size_t at,
+                      enum host_number type)
+{
+    return host_whole_at(source->data + at, type, false);
+}
+
+/* What is known of versions and of formats. */
+static int check_known(const struct host_source *source, const struct las *las,
+                       struct host_error *error)
+{
+    if (source->data[AT_MAJOR] != 1 || las->minor > 4) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: LAS %u.%u, where 1.0 to 1.4 are read; convert it "
+                         "to one of these",
+                         source->path, source->data[AT_MAJOR], las->minor);
+    }
+    if ((las->format & MARKS_OF_LASZIP) != 0) {
+        return host_source_fail(source, error, COMPRESSED);
+    }
+    if (las->format >= FORMATS) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: point record format %u, where 0 to 10 are read; "
+                         "convert it to one of these",
+                         source->path, las->format);
+    }
+    return 0;
+}
+
+/* Whether all records are within the file, and behind the header. */
+static int check_bounds(const struct host_source *source, const struct las *las,
+                        struct host_error *error)
+{
+    const unsigned header_bytes =
+        las->minor < 4 ? HEADER_BYTES : HEADER_BYTES_4;
+    static const uint8_t least[FORMATS] = {20, 28, 26, 34, 57, 63,
+                                           30, 36, 38, 59, 67};
+    uint64_t header = field(source, AT_HEADER_BYTES, HOST_U16);
+    if (header < header_bytes || las->offset < header ||
+        las->length < least[las->format]) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: a header of %llu bytes, points from byte %llu "
+                         "on, %llu bytes each: LAS 1.%u with format %u has "
+                         "%u, and %u or more; the file is damaged, get it "
+                         "again",
+                         source->path, (unsigned long long)header,
+                         (unsigned long long)las->offset,
+                         (unsigned long long)las->length, las->minor,
+                         las->format, header_bytes, least[las->format]);
+    }
+    uint64_t room = las->offset > source->bytes
+                        ? 0
+                        : (source->bytes - las->offset) / las->length;
+    if (las->count > room) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %llu points where its header tells of %llu; the "
+                         "file is cut short, get it whole",
+                         source->path, (unsigned long long)room,
+                         (unsigned long long)las->count);
+    }
+    return 0;
+}
+
+/* Points of 1.0 come behind two bytes of a signature, which some writers do not
+ * count in the offset; nothing comes behind the points. */
+static void skip_signature(const struct host_source *source, struct las *las)
+{
+    static const uint8_t signature[] = {0xdd, 0xcc};
+    if (las->minor == 0 && las->offset + 2 <= source->bytes &&
+        source->bytes - las->offset == las->count * las->length + 2 &&
+        memcmp(source->data + las->offset, signature, 2) == 0) {
+        las->offset += 2;
+    }
+}
+
+static int read_header(const struct host_source *source, struct las *las,
+                       struct host_error *error)
+{
+    if (source->bytes < HEADER_BYTES || memcmp(source->data, "LASF", 4) != 0) {
+        return host_source_fail(source, error,
+                                "no LAS file, or less than its header; get it "
+                                "whole, or give one in this format");
+    }
+    las->minor = source->data[AT_MINOR];
+    las->format = source->data[AT_FORMAT];
+    las->offset = field(source, AT_OFFSET, HOST_U32);
+    las->length = field(source, AT_LENGTH, HOST_U16);
+    las->count = field(source, AT_FEW, HOST_U32);
+    if (check_known(source, las, error) != 0) {
+        return error->code;
+    }
+    if (las->minor == 4 && source->bytes >= AT_MANY + 8) {
+        uint64_t few = las->count, many = field(source, AT_MANY, HOST_U64);
+        if (few != 0 && many != 0 && few != many) {
+            return host_fail(error, HOST_INPUT,
+                             "%s: its header tells of %llu points and of %llu; "
+                             "the file is damaged, get it again",
+                             source->path, (unsigned long long)few,
+                             (unsigned long long)many);
+        }
+        las->count = many != 0 ? many : few;
+    }
+    for (size_t d = 0; d < 3; d++) {
+        const uint8_t *of = source->data + 8 * d;
+        las->scale[d] = host_number_at(of + AT_SCALE, HOST_F64, false);
+        las->shift[d] = host_number_at(of + AT_SHIFT, HOST_F64, false);
+    }
+    return check_bounds(source, las, error);
+}
+
+static int read_las(const struct host_source *source, struct host_mesh *mesh,
+                    struct host_error *error)
+{
+    struct las las = {0};
+    if (read_header(source, &las, error) != 0) {
+        return error->code;
+    }
+    skip_signature(source, &las);
+    for (uint64_t i = 0; i < las.count; i++) {
+        const uint8_t *record = source->data + las.offset + i * las.length;
+        double xyz[3];
+        for (size_t d = 0; d < 3; d++) {
+            double whole = host_number_at(record + 4 * d, HOST_I32, false);
+            xyz[d] = whole * las.scale[d] + las.shift[d]; /* both rounded */
+        }
+        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+const struct host_format host_format_las = {
+    .name = "LAS",
+    .extensions = {".las"},
+    .read_points = read_las,
+};
+
+const struct host_format host_format_laz = {
+    .name = "LASzip",
+    .extensions = {".laz"},
+    .unread = COMPRESSED,
+};

@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# The points of a real set in formats that awk makes of it: the digest is the
+# set's, whatever the format, packed or not.
+. tests/system/lib.sh
+
+need_data formats
+set=pdb_3GQP
+read -r _ file _ _ _ digest < <(list_sets | grep "^$set ")
+from=$scratch/$set.xyz
+gzip -cd "$INCODE_DATA/$file" > "$from"
+rows=$(wc -l < "$from")
+
+# made EXTENSION PROGRAM: by awk, from the rows of the set.
+made() { awk -v rows="$rows" "$2" "$from" > "$scratch/a.$1"; }
+same() { # NAME FILE [OPTION...]
+    triangulates "formats/$1" "$set" "$2" "$digest" "${@:3}"
+}
+made pts 'NR == 1 { print rows } { print $0, -1024 + NR % 7, 255, 0, 0 }'
+made obj '{ print "v", $0, 1; print "vn 0 0 1" } END { print "f 1 2 3" }'
+made csv 'BEGIN { print "id,z,y,x" } { print NR "," $3 "," $2 "," $1 }'
+for extension in pts obj csv; do
+    same ".$extension" "$scratch/a.$extension"
+    gzip "$scratch/a.$extension"
+    same ".$extension.gz" "$scratch/a.$extension.gz"
+done
+
+# Three rows are a facet; the last one is said again where they do not suffice.
+awk 'BEGIN { print "solid of three" }
+    { row[NR % 3] = last = $0 }
+    NR % 3 == 0 { facet() }
+    END { for (n = NR; n % 3 != 0;) { row[++n % 3] = last }
+        if (n > NR) facet(); print "endsolid" }
+    function facet() {
+        print "facet normal 0 0 0\nouter loop\nvertex", row[1], "\nvertex", \
+            row[2], "\nvertex", row[0], "\nendloop\nendfacet"
+    }' "$from" > "$scratch/a.stl"
+same '.stl, as text' "$scratch/a.stl"
+
+# Thousandths as whole numbers, as a scanner has them; and what they are as
+# doubles.  awk writes no bytes of zero: the shell does.
+le4() { # a column of whole numbers as bytes, the lowest first
+    awk '{ n = $1 < 0 ? $1 + 4294967296 : $1
+        for (i = 0; i < 4; i++) { printf "\\x%02x", n % 256; n = int(n / 256) }
+    }'
+}
+whole() { awk '{ printf "%.0f\n%.0f\n%.0f\n0\n0\n", 1000 * $1, 1000 * $2, \
+    1000 * $3 }' "$from"; }
+{
+    printf 'LASF%20s\1\2' | tr ' ' '\0'
+    printf '%68s\xe3\0\xe3\0\0\0\0\0\0\0\0\x14\0' | tr ' ' '\0'
+    printf '%b' "$(echo "$rows" | le4)"
+    printf '%20s' | tr ' ' '\0'
+    for _ in x y z; do printf '\xfc\xa9\xf1\xd2\x4d\x62\x50\x3f'; done
+    printf '%72s' | tr ' ' '\0'
+    printf '%b' "$(whole | le4)"
+} > "$scratch/a.las"
+awk '{ for (d = 1; d <= 3; d++) {
+        printf "%.17g%s", sprintf("%.0f", 1000 * $d) * 0.001, d < 3 ? " " : "\n"
+    } }' "$from" > "$scratch/thousandths.xyz"
+incode run "$scratch/thousandths.xyz" -q -o "$scratch/thousandths.npy"
+incode run "$scratch/a.las" -q -o "$scratch/las.npy" 2> "$scratch/errors"
+check 'formats/.las' "exit $?: $(last "$scratch/errors")" \
+    cmp "$scratch/thousandths.npy" "$scratch/las.npy"
