@@ -13,6 +13,7 @@
 #include "host/draw/draw.h"
 #include "host/files/output.h"
 #include "host/formats/convert.h"
+#include "host/formats/formats.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
 #include "host/machines/cube_file.h"
@@ -28,13 +29,14 @@
 
 const char *argp_program_version = "incode 0.1.0";
 
-enum { ARGUMENTS_MAX = 4 };
+enum { ARGUMENTS_MAX = 4, KEY_FORMAT_IN = 256, KEY_FORMAT_OUT };
 
 /* What the small commands take: arguments, and a few options. */
 struct simple {
     const char *argument[ARGUMENTS_MAX];
     unsigned count, least, most;
     const char *output;
+    const char *format;
     uint64_t seed;
     unsigned nodes;
     const char *wanted; /* names of the arguments */
@@ -47,6 +49,10 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
     switch (key) {
     case 'o':
         s->output = value;
+        return 0;
+    case KEY_FORMAT_IN:
+    case KEY_FORMAT_OUT:
+        s->format = value;
         return 0;
     case 's':
         if (host_parse_number(value, 0, UINT64_MAX, &s->seed) != 0) {
@@ -80,13 +86,28 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
     }
 }
 
+/* As argp asks for it: `text` itself, or with the formats behind it, to be
+ * freed. */
+static char *list_formats(int key, const char *text, void *input)
+{
+    char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
+    (void)input;
+    if (key != KEY_FORMAT_IN && key != KEY_FORMAT_OUT) {
+        return (char *)text;
+    }
+    host_format_list(key == KEY_FORMAT_IN ? HOST_READ_POINTS
+                                          : HOST_WRITE_POINTS,
+                     list, sizeof list);
+    return asprintf(&whole, "%s %s", text, list) < 0 ? NULL : whole;
+}
+
 /* Not 0: the command ends with error->code. */
 static int parse(int argc, char **argv, const struct argp_option *options,
                  const char *arguments, const char *about, unsigned count,
                  struct simple *simple, struct host_error *error)
 {
     const struct argp argp = {options, parse_simple, arguments, about,
-                              NULL,    NULL,         NULL};
+                              NULL,    list_formats, NULL};
     simple->least = count;
     simple->most = count;
     simple->wanted = arguments;
@@ -126,6 +147,8 @@ static int command_gen(int argc, char **argv, struct host_error *error)
          "Write to FILE, by its extension; -, the default, is .xyz on standard "
          "output",
          0},
+        {"format", KEY_FORMAT_OUT, "NAME", 0,
+         "What FILE is to be, where no extension tells:", 0},
         {0}};
     struct host_points points = {0};
     struct simple s = {.seed = 1, .output = "-"};
@@ -147,7 +170,7 @@ static int command_gen(int argc, char **argv, struct host_error *error)
     }
     int status = host_gen(s.argument[0], n, s.seed, &points, error);
     if (status == 0) {
-        host_points_write(s.output, &points, error);
+        host_points_write_as(s.output, s.format, &points, error);
     }
     host_points_free(&points);
     return host_output_commit(error);
@@ -155,12 +178,16 @@ static int command_gen(int argc, char **argv, struct host_error *error)
 
 static int command_verify(int argc, char **argv, struct host_error *error)
 {
+    static const struct argp_option options[] = {
+        {"format", KEY_FORMAT_IN, "NAME", 0,
+         "What POINTS holds, where no extension tells:", 0},
+        {0}};
     static struct host_verify_report report;
     struct host_points points = {0};
     struct host_tetrahedra tets = {0};
     struct simple s = {0};
     if (parse(
-            argc, argv, NULL, "POINTS TETS",
+            argc, argv, options, "POINTS TETS",
             "Checks exactly that TETS is the Delaunay triangulation of POINTS: "
             "every tetrahedron positive, no vertex inside the sphere of a "
             "neighbour, facets in pairs or on the convex hull, every distinct "
@@ -168,7 +195,7 @@ static int command_verify(int argc, char **argv, struct host_error *error)
             2, &s, error) != 0) {
         return error->code;
     }
-    int status = host_points_read(s.argument[0], &points, error);
+    int status = host_points_read_as(s.argument[0], s.format, &points, error);
     if (status == 0) {
         host_points_note(s.argument[0], &points);
         status = host_tetrahedra_read(s.argument[1], &tets, NULL, error);
@@ -215,14 +242,18 @@ static int command_digest(int argc, char **argv, struct host_error *error)
 
 static int command_convert(int argc, char **argv, struct host_error *error)
 {
+    static const struct argp_option options[] = {
+        {"format", KEY_FORMAT_IN, "NAME", 0,
+         "IN holds points, and no extension tells of what format:", 0},
+        {0}};
     struct simple s = {0};
-    if (parse(argc, argv, NULL, "IN OUT",
+    if (parse(argc, argv, options, "IN OUT",
               "Converts points to points, or tetrahedra to tetrahedra, by the "
               "files' extensions.",
               2, &s, error) != 0) {
         return error->code;
     }
-    return host_convert(s.argument[0], s.argument[1], error);
+    return host_convert(s.argument[0], s.format, s.argument[1], error);
 }
 
 static int command_draw(int argc, char **argv, struct host_error *error)

@@ -187,9 +187,10 @@ static int unpack(struct host_source *source, struct host_error *error)
     return code;
 }
 
-static int finish(struct host_source *source, struct host_error *error)
+static int finish(struct host_source *source, bool packed,
+                  struct host_error *error)
 {
-    if (error->code == 0 && source->bytes > 0 && host_is_packed(source->path)) {
+    if (error->code == 0 && source->bytes > 0 && packed) {
         unpack(source, error);
     }
     if (error->code == 0 && source->bytes == 0) {
@@ -202,7 +203,7 @@ static int finish(struct host_source *source, struct host_error *error)
     return error->code;
 }
 
-int host_source_open(struct host_source *source, const char *path,
+int host_source_open(struct host_source *source, const char *path, bool packed,
                      struct host_error *error)
 {
     bool standard = strcmp(path, "-") == 0;
@@ -218,7 +219,7 @@ int host_source_open(struct host_source *source, const char *path,
     if (!standard) {
         (void)close(file);
     }
-    return finish(source, error);
+    return finish(source, packed, error);
 }
 
 int host_source_wrap(struct host_source *source, const char *path,
@@ -227,7 +228,7 @@ int host_source_wrap(struct host_source *source, const char *path,
     bool standard = strcmp(path, "-") == 0;
     *source = (struct host_source){
         .path = standard ? "stdin" : path, .data = data, .bytes = bytes};
-    return finish(source, error);
+    return finish(source, host_is_packed(path), error);
 }
 
 void host_source_close(struct host_source *source)

@@ -5,7 +5,7 @@
  * the rest; or 16 MiB, if that is more.  Work: one pass.
  *
  *     struct host_source source;
- *     if (host_source_open(&source, "a.xyz.gz", &error) != 0)
+ *     if (host_source_open(&source, "a.xyz.gz", true, &error) != 0)
  *         return error.code;
  *     host_source_close(&source);
  */
@@ -31,9 +31,10 @@ struct host_source {
 /* Whether a name ends in .gz, in letters of either case. */
 bool host_is_packed(const char *path);
 
-/* Reads it whole ("-": standard input), unpacks .gz.  A missing, unreadable,
- * empty or damaged file, or one too large for the memory: HOST_INPUT. */
-int host_source_open(struct host_source *source, const char *path,
+/* Reads it whole ("-": standard input), unpacks it if it is told to be packed.
+ * A missing, unreadable, empty or damaged file, or one too large for the
+ * memory: HOST_INPUT. */
+int host_source_open(struct host_source *source, const char *path, bool packed,
                      struct host_error *error);
 
 /* Takes bytes of the caller, unpacks them if `path` ends in .gz. */

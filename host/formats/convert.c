@@ -118,7 +118,8 @@ static bool has_tetrahedra(const char *path)
     return any;
 }
 
-static int convert(const char *in, const char *out, struct host_error *error)
+static int convert(const char *in, const char *format, const char *out,
+                   struct host_error *error)
 {
     const struct host_format *to = host_format_named(out);
     bool either =
@@ -126,12 +127,12 @@ static int convert(const char *in, const char *out, struct host_error *error)
     if (check_claims(in, out, error) != 0) {
         return error->code;
     }
-    if (holds_tetrahedra(in) || holds_tetrahedra(out) ||
-        (either && has_tetrahedra(in))) {
+    if (format == NULL && (holds_tetrahedra(in) || holds_tetrahedra(out) ||
+                           (either && has_tetrahedra(in)))) {
         return convert_tetrahedra(in, out, error);
     }
     struct host_points points;
-    if (host_points_read(in, &points, error) == 0) {
+    if (host_points_read_as(in, format, &points, error) == 0) {
         host_points_note(in, &points);
         host_points_write(out, &points, error);
         host_points_free(&points);
@@ -139,8 +140,9 @@ static int convert(const char *in, const char *out, struct host_error *error)
     return error->code;
 }
 
-int host_convert(const char *in, const char *out, struct host_error *error)
+int host_convert(const char *in, const char *format, const char *out,
+                 struct host_error *error)
 {
-    (void)convert(in, out, error);
+    (void)convert(in, format, out, error);
     return host_output_commit(error);
 }

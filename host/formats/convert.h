@@ -4,15 +4,17 @@
  * Memory: the contents once.  Work: reading plus writing.
  *
  *     host_convert("bunny.ply", "bunny.npy", &error);
- *     host_convert("a.ele", "a.vtu", &error);
+ *     host_convert("a.ele", NULL, "a.vtu", &error);
  */
 #ifndef HOST_CONVERT_H
 #define HOST_CONVERT_H
 
 #include "host/base/error.h"
 
-/* A tetrahedra file that holds no points (.ele, .npy) takes them from the
+/* With a `format` (or NULL), `in` holds points in it, as host_format_told has
+ * it.  A tetrahedra file that holds no points (.ele, .npy) takes them from the
  * .node beside it, packed or not, where the target needs them. */
-int host_convert(const char *in, const char *out, struct host_error *error);
+int host_convert(const char *in, const char *format, const char *out,
+                 struct host_error *error);
 
 #endif

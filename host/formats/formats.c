@@ -164,3 +164,26 @@ void host_format_help(enum host_use use, char *text, size_t size)
         between = ", ";
     }
 }
+
+const struct host_format *host_format_told(const char *name, enum host_use use,
+                                           struct host_error *error)
+{
+    char path[64], list[HOST_FORMAT_LIST_MAX];
+    int n =
+        snprintf(path, sizeof path, "a%s%s", name[0] == '.' ? "" : ".", name);
+    bool whole = n > 0 && (size_t)n < sizeof path;
+    const struct host_format *f = whole ? host_format_of(path, use) : NULL;
+    const struct host_format *named = whole ? host_format_named(path) : NULL;
+    if (f != NULL) {
+        return f;
+    }
+    if (named != NULL && named->unread != NULL) {
+        host_fail(error, HOST_USAGE, "--format %s: %s", name, named->unread);
+        return NULL;
+    }
+    host_format_list(use, list, sizeof list);
+    host_fail(error, HOST_USAGE, "--format %s: no such format; allowed: %s%s",
+              name, list,
+              use == HOST_READ_POINTS ? ", and any of them with .gz" : "");
+    return NULL;
+}

@@ -32,6 +32,12 @@ const struct host_format *host_format_named(const char *path);
  * written. */
 const struct host_format *host_format_of(const char *path, enum host_use use);
 
+/* The format that an option --format names, as an extension does, with or
+ * without its dot ("las", ".xyz.gz").  NULL with HOST_USAGE, and what is
+ * allowed, where none that has the use is called so. */
+const struct host_format *host_format_told(const char *name, enum host_use use,
+                                           struct host_error *error);
+
 /* ".ele .vtu .vtk": the extensions that have that use. */
 void host_format_list(enum host_use use, char *text, size_t size);
 

@@ -20,8 +20,10 @@ static const struct host_format *format_of(const char *path, enum host_use use,
         host_format_list(use, list, sizeof list);
         host_fail(error, HOST_INPUT,
                   "%s: no format of %s has this extension; use %s, or any of "
-                  "them with .gz",
-                  path, what, list);
+                  "them with .gz%s",
+                  path, what, list,
+                  use == HOST_READ_POINTS ? ", or say which with --format"
+                                          : "");
     }
     return format;
 }
@@ -62,17 +64,26 @@ static int take_points(struct host_source *source,
     return error->code;
 }
 
-int host_points_read(const char *path, struct host_points *points,
-                     struct host_error *error)
+int host_points_read_as(const char *path, const char *format,
+                        struct host_points *points, struct host_error *error)
 {
     struct host_source source;
     *points = (struct host_points){0};
-    const struct host_format *format =
-        format_of(path, HOST_READ_POINTS, "points", error);
-    if (format != NULL && host_source_open(&source, path, error) == 0) {
-        take_points(&source, format, points, error);
+    const struct host_format *f =
+        format == NULL ? format_of(path, HOST_READ_POINTS, "points", error)
+                       : host_format_told(format, HOST_READ_POINTS, error);
+    bool packed =
+        host_is_packed(path) || (format != NULL && host_is_packed(format));
+    if (f != NULL && host_source_open(&source, path, packed, error) == 0) {
+        take_points(&source, f, points, error);
     }
     return error->code;
+}
+
+int host_points_read(const char *path, struct host_points *points,
+                     struct host_error *error)
+{
+    return host_points_read_as(path, NULL, points, error);
 }
 
 void host_points_note(const char *path, const struct host_points *points)
@@ -131,7 +142,8 @@ int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
 {
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
-    if (format != NULL && host_source_open(&source, path, error) == 0) {
+    if (format != NULL &&
+        host_source_open(&source, path, host_is_packed(path), error) == 0) {
         take_tetrahedra(&source, format, tets, points, error);
     }
     return error->code;

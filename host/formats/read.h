@@ -20,6 +20,11 @@
 int host_points_read(const char *path, struct host_points *points,
                      struct host_error *error);
 
+/* The same of a file whose name does not tell what it holds: `format` does, as
+ * host_format_told has it; NULL: the name does. */
+int host_points_read_as(const char *path, const char *format,
+                        struct host_points *points, struct host_error *error);
+
 /* Says on standard error, once, that there were columns which reading has
  * passed over; nothing where there were none. */
 void host_points_note(const char *path, const struct host_points *points);

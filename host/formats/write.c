@@ -6,13 +6,16 @@
 #include "formats.h"
 #include "host/base/progress.h"
 
-int host_points_write(const char *path, const struct host_points *points,
-                      struct host_error *error)
+int host_points_write_as(const char *path, const char *format,
+                         const struct host_points *points,
+                         struct host_error *error)
 {
     struct host_output out;
     char list[HOST_FORMAT_LIST_MAX];
-    const struct host_format *format = host_format_of(path, HOST_WRITE_POINTS);
-    if (format == NULL) {
+    const struct host_format *f =
+        format == NULL ? host_format_of(path, HOST_WRITE_POINTS)
+                       : host_format_told(format, HOST_WRITE_POINTS, error);
+    if (f == NULL) {
         host_format_list(HOST_WRITE_POINTS, list, sizeof list);
         return host_fail(error, HOST_USAGE,
                          "%s: no format of points to be written has this "
@@ -21,10 +24,16 @@ int host_points_write(const char *path, const struct host_points *points,
     }
     host_progress_phase("writing", "MB");
     if (host_output_open(&out, path, error) == 0) {
-        format->write_points(&out, points);
+        f->write_points(&out, points);
         host_output_close(&out, 1, error);
     }
     return error->code;
+}
+
+int host_points_write(const char *path, const struct host_points *points,
+                      struct host_error *error)
+{
+    return host_points_write_as(path, NULL, points, error);
 }
 
 int host_write_check(const char *path, struct host_error *error)

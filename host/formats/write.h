@@ -24,6 +24,12 @@ enum { HOST_PATH_MAX = 4096 }; /* bytes of a file's name, by the kernel */
 int host_points_write(const char *path, const struct host_points *points,
                       struct host_error *error);
 
+/* The same in the format that host_format_told has for `format`, if not NULL.
+ */
+int host_points_write_as(const char *path, const char *format,
+                         const struct host_points *points,
+                         struct host_error *error);
+
 /* Writes the tetrahedra (sorted, vertices = rows of points), and what belongs
  * beside them; "-" as above. */
 int host_write(const char *path, const struct host_points *points,

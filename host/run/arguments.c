@@ -38,6 +38,7 @@ enum {
     KEY_HOST_UNPLUG,
     KEY_SEED,
     KEY_NODE_PROGRAM,
+    KEY_FORMAT,
     KEY_END
 };
 
@@ -47,6 +48,10 @@ static const struct argp_option options_of_run[] = {
      "Write the tetrahedra to FILE, by its extension: %s; - is .ele on "
      "standard output. May be given several times; all files get their names "
      "at the end of a run that succeeds, or none does",
+     1},
+    {"format", KEY_FORMAT, "NAME", 0,
+     "What POINTS holds, where no extension tells, as with a pipe: that of %s, "
+     "and .gz behind it",
      1},
     {"strategy", KEY_STRATEGY, "NAME", 0, "How the work is shared out:", 1},
     {"partition", KEY_PARTITION, "NAME", 0,
@@ -351,6 +356,10 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     case KEY_PATIENCE:
         (void)number(p, "patience", value, 1, 86400, &p->options->patience_s);
         return 0;
+    case KEY_FORMAT:
+        p->options->format = value;
+        (void)host_format_told(value, HOST_READ_POINTS, p->error);
+        return 0;
     case KEY_CUBE:
         p->options->cube = value;
         return 0;
@@ -435,12 +444,15 @@ static char *list_rows(const char *text, const char *(*name)(unsigned i),
     return whole;
 }
 
-/* `text` with the formats of a use in the place of its %s. */
-static char *list_formats(const char *text, enum host_use use)
+/* `text` with the formats of a use, as `put` has them, in the place of its %s.
+ */
+static char *list_formats(const char *text, enum host_use use,
+                          void (*put)(enum host_use use, char *text,
+                                      size_t size))
 {
     char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
     const char *place = strstr(text, "%s");
-    host_format_help(use, list, sizeof list);
+    put(use, list, sizeof list);
     return asprintf(&whole, "%.*s%s%s", (int)(place - text), text, list,
                     place + strlen("%s")) < 0
                ? NULL
@@ -453,9 +465,11 @@ static char *complete_help(int key, const char *text, void *input)
     (void)input;
     switch (key) {
     case 'o':
-        return list_formats(text, HOST_WRITE_TETRAHEDRA);
+        return list_formats(text, HOST_WRITE_TETRAHEDRA, host_format_help);
+    case KEY_FORMAT:
+        return list_formats(text, HOST_READ_POINTS, host_format_list);
     case ARGP_KEY_HELP_POST_DOC:
-        return list_formats(text, HOST_READ_POINTS);
+        return list_formats(text, HOST_READ_POINTS, host_format_help);
     case KEY_STRATEGY:
         return list_rows(text, host_strategy_name, host_strategy_help, "auto");
     case KEY_LINK:

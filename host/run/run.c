@@ -470,7 +470,8 @@ int host_run(const struct host_run_options *options,
         return error->code;
     }
     host_progress_begin(options->progress && !options->quiet);
-    int status = host_points_read(options->input, &points, error);
+    int status =
+        host_points_read_as(options->input, options->format, &points, error);
     result->time_read_s = seconds_since(start);
     if (status == 0 && !options->quiet) {
         host_points_note(options->input, &points);

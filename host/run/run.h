@@ -28,6 +28,7 @@ struct host_run_result;
 
 struct host_run_options {
     const char *input;
+    const char *format; /* of the input, for host_format_told; NULL: by name */
     const char *output[HOST_OUTPUTS_MAX];
     unsigned outputs;
     const struct host_strategy *strategy; /* NULL: auto */

@@ -61,3 +61,32 @@ incode run "$scratch/thousandths.xyz" -q -o "$scratch/thousandths.npy"
 incode run "$scratch/a.las" -q -o "$scratch/las.npy" 2> "$scratch/errors"
 check 'formats/.las' "exit $?: $(last "$scratch/errors")" \
     cmp "$scratch/thousandths.npy" "$scratch/las.npy"
+
+# What has no extension is told by --format: a pipe, a file, a packed one.
+rm "$scratch/first.$set.npy"
+gzip -c "$scratch/a.stl" > "$scratch/packed"
+mkfifo "$scratch/pipe"
+cat "$scratch/a.stl" > "$scratch/pipe" &
+same '--format, a named pipe' "$scratch/pipe" --format stl
+same '--format, a packed file' "$scratch/packed" --format .stl.gz
+gzip -cd "$scratch/a.obj.gz" |
+    same '--format, standard input' - --format obj --nodes 4
+name='formats/--format of other commands'
+mv "$scratch/first.$set.npy" "$scratch/first.npy"
+# shellcheck disable=SC2016
+succeeds "$name" bash -c 'cd "$1" && "$2" convert packed --format STL.gz p.npy &&
+    "$2" verify --format stl - first.npy < a.stl &&
+    "$2" gen grid 27 -o grid --format las 2> said && exit 1
+    grep -q "^incode: --format las: .*allowed: .xyz .txt .pts" said &&
+    "$2" gen grid 27 --format ply | head -n 1 | grep -qx ply' \
+    - "$scratch" "$(realpath "$INCODE")"
+refuses 'formats/--format of no format' 2 \
+    '^incode: --format frob: no such format; allowed: .xyz .* .las ' \
+    incode run "$scratch/a.stl" --format frob -o "$scratch/left/o.npy"
+refuses 'formats/no format is told' 3 'pipe: .*--format' incode run \
+    "$scratch/pipe" -q -o "$scratch/left/o.npy"
+refuses 'formats/.laz' 3 'a.laz: .*; unpack them with laszip' incode run \
+    "$scratch/a.laz" -q -o "$scratch/left/o.npy"
+help=$(incode run --help | tr -s ' \n' ' ')
+check 'formats/--help lists them' "$help" \
+    grep -qF '.xyz .txt .pts .csv .node .ply .off .obj .stl .las' <<< "$help"

@@ -74,7 +74,7 @@ static void what_unpacks_beyond_the_memory(void **unused)
     struct host_error error = {0};
     pack("large.xyz.gz", 70);
     leave_memory((uint64_t)128 << 20);
-    assert_int_equal(host_source_open(&source, "large.xyz.gz", &error),
+    assert_int_equal(host_source_open(&source, "large.xyz.gz", true, &error),
                      HOST_INPUT);
     assert_null(source.data);
     assert_int_equal(setrlimit(RLIMIT_AS, &before), 0);
@@ -86,7 +86,8 @@ static void what_unpacks_beyond_the_memory(void **unused)
     assert_non_null(strstr(error.text, "large.xyz.gz: 0."));
     assert_non_null(strstr(error.text, "; unpack it"));
     error = (struct host_error){0};
-    assert_int_equal(host_source_open(&source, "large.xyz.gz", &error), 0);
+    assert_int_equal(host_source_open(&source, "large.xyz.gz", true, &error),
+                     0);
     assert_int_equal(source.bytes, 70 << 20);
     host_source_close(&source);
     assert_int_equal(unlink("large.xyz.gz"), 0);
@@ -100,7 +101,8 @@ static void what_is_little(void **unused)
     struct host_error error = {0};
     pack("little.xyz.gz", 12);
     leave_memory((uint64_t)36 << 20);
-    assert_int_equal(host_source_open(&source, "little.xyz.gz", &error), 0);
+    assert_int_equal(host_source_open(&source, "little.xyz.gz", true, &error),
+                     0);
     assert_int_equal(source.bytes, 12 << 20);
     assert_int_equal(setrlimit(RLIMIT_AS, &before), 0);
     host_source_close(&source);
@@ -116,7 +118,8 @@ static void a_plain_file_beyond_the_memory(void **unused)
     assert_true(file >= 0);
     assert_int_equal(ftruncate(file, (off_t)1 << 42), 0); /* all of it a hole */
     (void)close(file);
-    assert_int_equal(host_source_open(&source, "huge.las", &error), HOST_INPUT);
+    assert_int_equal(host_source_open(&source, "huge.las", false, &error),
+                     HOST_INPUT);
     assert_non_null(strstr(error.text, "huge.las: 4398046.5 MB or more"));
     assert_int_equal(unlink("huge.las"), 0);
 }

@@ -93,6 +93,39 @@ static void found_by_extension(void **unused)
     assert_ptr_equal(host_format_of("-", HOST_WRITE_TETRAHEDRA), f);
 }
 
+/* By a name that an option gives, which is that of an extension. */
+static void told_by_name(void **unused)
+{
+    (void)unused;
+    struct host_error error = {0};
+    const struct host_format *f;
+    for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
+        for (unsigned k = 0; f->read_points != NULL && f->extensions[k] != NULL;
+             k++) {
+            char name[32];
+            const char *dotted = f->extensions[k];
+            assert_ptr_equal(host_format_told(dotted, HOST_READ_POINTS, &error),
+                             f);
+            (void)snprintf(name, sizeof name, "%s.GZ", dotted + 1);
+            assert_ptr_equal(host_format_told(name, HOST_READ_POINTS, &error),
+                             f);
+            assert_null(host_format_told(name, HOST_WRITE_POINTS, &error));
+            assert_int_equal(error.code, HOST_USAGE);
+            error = (struct host_error){0};
+        }
+    }
+    static const char *const wrong[] = {"",    ".", "frob",         "gz",
+                                        "ele", "-", "xyz.gz.gz.gz", "a b"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        assert_null(host_format_told(wrong[i], HOST_READ_POINTS, &error));
+        assert_int_equal(error.code, HOST_USAGE);
+        assert_non_null(strstr(error.text, list_of(HOST_READ_POINTS)));
+        error = (struct host_error){0};
+    }
+    assert_null(host_format_told("laz", HOST_READ_POINTS, &error));
+    assert_non_null(strstr(error.text, "--format laz: its points are com"));
+}
+
 static void written_and_read_back(void **unused)
 {
     (void)unused;
@@ -202,6 +235,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(listed),
         cmocka_unit_test(found_by_extension),
+        cmocka_unit_test(told_by_name),
         cmocka_unit_test(written_and_read_back),
         cmocka_unit_test(packed_files),
         cmocka_unit_test(files_that_are_not_there),

@@ -364,7 +364,7 @@ static void conversion(void **unused)
                                         "b.npy"};
     for (size_t i = 0; i < sizeof chain / sizeof *chain; i++) {
         in_folder(&folder, chain[i], b);
-        assert_int_equal(host_convert(a, b, &error), 0);
+        assert_int_equal(host_convert(a, NULL, b, &error), 0);
         strcpy(a, b);
     }
     assert_int_equal(host_tetrahedra_read(b, &again, NULL, &error), 0);
@@ -372,14 +372,15 @@ static void conversion(void **unused)
     assert_memory_equal(again.v, tets.v, 16 * tets.count);
     host_tetrahedra_free(&again);
     /* .npy holds no points and there is no .node beside it */
-    assert_int_equal(host_convert(b, in_folder(&folder, "c.vtu", a), &error),
-                     HOST_INPUT);
+    assert_int_equal(
+        host_convert(b, NULL, in_folder(&folder, "c.vtu", a), &error),
+        HOST_INPUT);
     error = (struct host_error){0};
     in_folder(&folder, "p.xyz", a);
     in_folder(&folder, "p.npy", b);
     assert_int_equal(host_points_write(a, &points, &error), 0);
     assert_int_equal(host_output_commit(&error), 0);
-    assert_int_equal(host_convert(a, b, &error), 0);
+    assert_int_equal(host_convert(a, NULL, b, &error), 0);
     struct host_points read;
     assert_int_equal(host_points_read(b, &read, &error), 0);
     assert_memory_equal(read.xyz, points.xyz, 24 * 200);
