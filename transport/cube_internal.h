@@ -1,6 +1,7 @@
 /* What the parts of a cube share: cube_config.c (what a config means), cube.c
  * (memory, messages), gossip.c (what neighbours tell each other), fault.c
- * (wrong wires in words).  Not for others.
+ * (wrong wires in words).  Not for others, but
+ * for who plays an end of a cube falsely: host/sim/stand_in.c.
  *
  * Memory and work: see cube.h.
  *

@@ -93,7 +93,8 @@ static int check_queues(const struct host_sim_run *r, struct host_error *error)
         const struct host_world_node *node = &r->world.node[i];
         left += s->node[i].pages_count + s->node[i].unspills_count;
         /* A node that was cut off for good keeps what it has. */
-        bool counts = node->state == HOST_WORLD_UP && !s->work.lost[i];
+        bool counts = node->state == HOST_WORLD_UP && node->node != NULL &&
+                      !s->work.lost[i];
         left += counts ? node_held(node->node) : 0;
     }
     if (s->ledger.committed != s->ledger.bricks || left > 0) {

@@ -2,6 +2,7 @@
 
 #include "sim_draw.h"
 #include "sim_run.h"
+#include "sim_stand_ins.h"
 
 enum {
     TRIES_MAX = 50, /* for a kind of fault that is wanted and possible */
@@ -231,6 +232,8 @@ const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
     [HOST_SIM_MISSING_WIRE] = {"missing-wire", .draw = draw_missing,
                                .count = count_missing},
     [HOST_SIM_SECOND_HOST] = {"second-host", .draw = draw_second_host},
+    [HOST_SIM_IDLER] = {"idle-node", .draw = host_sim_draw_idler},
+    [HOST_SIM_FOREIGN] = {"generation", .draw = host_sim_draw_teller},
 };
 
 /* --- when ----------------------------------------------------------------- */
@@ -351,12 +354,23 @@ static void second_host(struct host_sim_run *r)
     r->happened[HOST_SIM_SECOND_HOST] += r->open;
 }
 
+static uint64_t sooner(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* What comes in its time, whatever the weather. */
+static uint64_t arrivals_us(const struct host_sim_run *r)
+{
+    return sooner(r->second_us, host_sim_stand_ins_us(r));
+}
+
 static void calm(struct host_sim_run *r)
 {
     struct host_world *w = &r->world;
     take_back(r, true);
     weather(r, false);
-    w->strike_us = r->second_us;
+    w->strike_us = arrivals_us(r);
     if (w->options.host_us > HOST_US_CALM) {
         w->options.host_us = HOST_US_CALM;
     }
@@ -374,6 +388,7 @@ void host_sim_faults_strike(void *run)
     if (w->now_us >= r->second_us) {
         second_host(r);
     }
+    host_sim_stand_ins_strike(r);
     if (w->now_us >= r->calm_us) {
         calm(r);
         return;
@@ -381,11 +396,9 @@ void host_sim_faults_strike(void *run)
     if (w->now_us >= r->event_us) {
         event(r);
     }
-    w->strike_us = r->calm_us < r->event_us ? r->calm_us : r->event_us;
-    w->strike_us = r->second_us < w->strike_us ? r->second_us : w->strike_us;
+    w->strike_us = sooner(sooner(r->calm_us, r->event_us), arrivals_us(r));
     for (unsigned i = 0; i < r->lasting_count; i++) {
-        uint64_t until = r->lasting[i].until_us;
-        w->strike_us = until < w->strike_us ? until : w->strike_us;
+        w->strike_us = sooner(w->strike_us, r->lasting[i].until_us);
     }
 }
 
@@ -429,7 +442,8 @@ void host_sim_faults_prepare(struct host_sim_run *run)
     uint64_t patience = p->patience_us != 0 ? p->patience_us : HOST_PATIENCE_US;
     run->calm_us = p->calm_us < patience / 2 ? p->calm_us : patience / 2;
     run->event_us = run->second_us = UINT64_MAX;
-    run->world.strike_us = run->calm_us;
+    host_sim_stand_ins_prepare(run);
+    run->world.strike_us = sooner(run->calm_us, arrivals_us(run));
     weather(run, p->early);
     watch_frames(run);
 }
@@ -448,9 +462,9 @@ void host_sim_faults_begin(struct host_sim_run *run)
     for (int k = 0; k < SIM_CHANCES; k++) {
         r->before[k] = host_sim_cube_struck(&r->world.cube, (enum sim_fault)k);
     }
+    host_sim_stand_ins_begin(r);
     weather(r, true);
-    r->world.strike_us =
-        r->event_us < r->second_us ? r->event_us : r->second_us;
+    r->world.strike_us = sooner(r->event_us, arrivals_us(r));
 }
 
 void host_sim_faults_finish(struct host_sim_run *run)
@@ -463,4 +477,5 @@ void host_sim_faults_finish(struct host_sim_run *run)
     }
     run->open = false;
     run->second_us = UINT64_MAX;
+    host_sim_stand_ins_finish(run);
 }

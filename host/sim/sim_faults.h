@@ -32,6 +32,9 @@ enum host_sim_fault {
     HOST_SIM_DEAD_NODE,    /* a node, but for node 0, never comes back */
     HOST_SIM_MISSING_WIRE, /* a wire between two nodes was never there */
     HOST_SIM_SECOND_HOST,  /* comes to the cube while it is at work */
+    HOST_SIM_IDLER,        /* a node, but for node 0, answers and never works */
+    HOST_SIM_FOREIGN,      /* a node tells others of another host's generation,
+                              one far away or at an end of the numbers */
     HOST_SIM_FAULTS
 };
 

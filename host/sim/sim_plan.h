@@ -48,6 +48,15 @@ struct host_sim_plan {
     /* When a second host comes, after the work began, and when it goes by
      * itself. */
     uint64_t second_us, second_lasts_us;
+    /* When something else stands at a node's place, after the work began, and
+     * for how long.  0: from the start. */
+    struct host_sim_stand_in {
+        unsigned node;
+        uint64_t us, lasts_us;
+    } idler, teller;
+    bool idler_ready;   /* it answers its setup, too */
+    uint32_t foreign;   /* generation of which the teller tells, */
+    bool foreign_jumps; /* counted from the present one */
     /* One fault alone, at frame `frame` of all that are sent: what becomes of
      * it, or a restart of the node that sends it.  0: none. */
     uint64_t frame;

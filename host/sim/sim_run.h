@@ -28,6 +28,8 @@ struct host_sim_run {
     uint64_t random;
     /* By the world's clock: no more faults; the next event; a second host. */
     uint64_t calm_us, event_us, second_us;
+    uint64_t idler_us, teller_us; /* one comes, or goes */
+    bool telling;
     unsigned events; /* left */
     bool open, crash_due, broken;
     uint64_t frames;                    /* seen by `decide` */

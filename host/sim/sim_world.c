@@ -177,12 +177,14 @@ static void boot(struct host_world *w, unsigned i)
     n->starts++;
     n->state = HOST_WORLD_UP;
     n->node = NULL;
-    if (n->idles) {
-        n->idler = host_idler_start(&n->board);
-        return;
+    n->stand_in = NULL;
+    if (n->orders.kind != HOST_NO_STAND_IN) {
+        n->stand_in = host_stand_in_start(&n->board, &n->orders);
+        why = "the memory does not hold a stand-in";
+    } else {
+        n->node = node_start(&n->board, &why);
     }
-    n->node = node_start(&n->board, &why);
-    if (n->node == NULL) {
+    if (n->node == NULL && n->stand_in == NULL) {
         give_up(w, i, why);
     }
 }
@@ -220,10 +222,19 @@ void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
     wake_at(world, node, n->busy_until_us);
 }
 
+void host_world_replace(struct host_world *world, unsigned node, uint64_t us,
+                        const struct host_stand_in_orders *orders)
+{
+    const struct host_stand_in_orders none = {.kind = HOST_NO_STAND_IN};
+    world->node[node].orders = orders != NULL ? *orders : none;
+    host_world_crash(world, node, us, false);
+}
+
 void host_world_idle(struct host_world *world, unsigned node)
 {
-    world->node[node].idles = true;
-    host_world_crash(world, node, 0, false);
+    const struct host_stand_in_orders idler = {.kind = HOST_IDLER,
+                                               .ready = true};
+    host_world_replace(world, node, 0, &idler);
 }
 
 void host_world_kill(struct host_world *world, unsigned node)
@@ -254,7 +265,8 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
 /* When an idle node has something to do. */
 static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
 {
-    uint64_t due = w->now_us + (n->idles ? host_idler_wait_us(n->idler)
+    uint64_t due =
+        w->now_us + (n->stand_in != NULL ? host_stand_in_wait_us(n->stand_in)
                                          : node_wait_us(n->node));
     unsigned i = n->board.identity.self;
     for (unsigned d = 0; d < n->links; d++) {
@@ -281,9 +293,9 @@ static void step(struct host_world *w, unsigned i)
     for (unsigned d = 0; d < n->links; d++) {
         host_sim_cube_port(&w->cube, i, d)->end->out->blocked = false;
     }
-    enum node_event event = !n->idles                   ? node_step(n->node)
-                            : host_idler_step(n->idler) ? NODE_BUSY
-                                                        : NODE_IDLE;
+    enum node_event event = n->stand_in != NULL
+                                ? host_stand_in_step(n->stand_in)
+                                : node_step(n->node);
     if (event == NODE_STOPPED) {
         n->board.reset(n, 0);
         w->ended++;

@@ -18,7 +18,7 @@
 #include "host/service/machine.h"
 #include "node/node.h"
 #include "sim_cube.h"
-#include "sim_idler.h"
+#include "stand_in.h"
 
 enum {
     HOST_WORLD_STACK = 64 * 1024, /* of a node's memory, outside its arena */
@@ -59,8 +59,8 @@ struct host_world_node {
     struct host_world *world;
     struct node_board board;
     struct node *node;
-    struct host_idler *idler; /* instead of it, in a node that only idles */
-    bool idles;               /* from its next start on */
+    struct host_stand_in_orders orders; /* of the starts to come */
+    struct host_stand_in *stand_in;     /* instead of the node, or NULL */
     enum host_world_state state;
     bool unplugged; /* its wires were cut while it is off */
     uint64_t wake_us, busy_until_us, busy_us, offset_us;
@@ -109,7 +109,12 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us);
 void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
                       bool unplugged);
 
-/* The same at once, and from then on it answers and does no work. */
+/* The same, and what starts is a stand-in: see stand_in.h.  NULL: the node
+ * again.  Of a node that is off, its next start. */
+void host_world_replace(struct host_world *world, unsigned node, uint64_t us,
+                        const struct host_stand_in_orders *orders);
+
+/* The node forgets all at once, and answers and never works from then on. */
 void host_world_idle(struct host_world *world, unsigned node);
 
 /* The node never comes back. */

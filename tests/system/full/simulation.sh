@@ -22,7 +22,7 @@ while read -r kind strikes _; do
     check "simulation/strikes $kind" "only $strikes times" [ "$strikes" -ge 100 ]
 done < "$scratch/kinds"
 check simulation/kinds "a kind of fault is not in the table" \
-    [ "$(wc -l < "$scratch/kinds")" -ge 18 ]
+    [ "$(wc -l < "$scratch/kinds")" -ge 20 ]
 seeds 1001 5000
 
 # 90 s, 550 MB.
