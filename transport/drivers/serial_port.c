@@ -17,37 +17,71 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { PSEUDO_FIRST = 136, PSEUDO_LAST = 143 }; /* major numbers, for ever */
+/* Device numbers, for ever: of the slaves, wherever they are mounted, and of
+ * what every master is opened by. */
+enum { PSEUDO_FIRST = 136, PSEUDO_LAST = 143, PTMX_MAJOR = 5, PTMX_MINOR = 2 };
 
 /* --- who has it ---------------------------------------------------------- */
+
+static bool is_pseudo_terminal(dev_t device)
+{
+    return major(device) >= PSEUDO_FIRST && major(device) <= PSEUDO_LAST;
+}
 
 /* Pseudo-terminals have numbers of their own in every container, where another
  * file system makes them. */
 static bool is_same(const struct stat *a, const struct stat *b)
 {
-    unsigned kind = major(a->st_rdev);
-    bool pseudo = kind >= PSEUDO_FIRST && kind <= PSEUDO_LAST;
     return S_ISCHR(a->st_mode) && a->st_rdev == b->st_rdev &&
-           (!pseudo || a->st_dev == b->st_dev);
+           (!is_pseudo_terminal(a->st_rdev) || a->st_dev == b->st_dev);
 }
 
+/* Whether an open file is the master of the pseudo-terminal of that number. */
+static bool is_master(const char *pid, const char *fd, int number)
+{
+    char path[PATH_MAX], line[64];
+    int index = -1;
+    snprintf(path, sizeof path, "/proc/%s/fdinfo/%s", pid, fd);
+    FILE *file = fopen(path, "re");
+    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+        (void)sscanf(line, "tty-index: %d", &index);
+    }
+    if (file != NULL) {
+        fclose(file);
+    }
+    return index == number;
+}
+
+/* A process that has made a pseudo-terminal and holds its master stands in the
+ * place of the cable: it may keep the slave open as well, as socat does, so
+ * that the master is not hung up before somebody comes. */
 static bool has_open(const char *pid, const struct stat *device)
 {
     char path[PATH_MAX];
     struct dirent *entry;
     struct stat about;
-    bool found = false;
+    bool found = false, made = false;
+    int number = is_pseudo_terminal(device->st_rdev)
+                     ? (int)((major(device->st_rdev) - PSEUDO_FIRST) << 8 |
+                             minor(device->st_rdev))
+                     : -1;
     snprintf(path, sizeof path, "/proc/%s/fd", pid);
     DIR *fds = opendir(path);
-    while (fds != NULL && !found && (entry = readdir(fds)) != NULL) {
-        found = entry->d_name[0] != '.' &&
-                fstatat(dirfd(fds), entry->d_name, &about, 0) == 0 &&
-                is_same(&about, device);
+    while (fds != NULL && !made && (entry = readdir(fds)) != NULL) {
+        if (entry->d_name[0] == '.' ||
+            fstatat(dirfd(fds), entry->d_name, &about, 0) != 0 ||
+            !S_ISCHR(about.st_mode)) {
+            continue;
+        }
+        found = found || is_same(&about, device);
+        made = number >= 0 &&
+               about.st_rdev == makedev(PTMX_MAJOR, PTMX_MINOR) &&
+               is_master(pid, entry->d_name, number);
     }
     if (fds != NULL) {
         closedir(fds);
     }
-    return found;
+    return found && !made;
 }
 
 static void read_name(const char *pid, char *name, size_t size)
@@ -252,13 +286,6 @@ static int open_terminal(struct serial_port *port, const char *path)
         return refuse_used(port);
     }
     return fd;
-}
-
-/* By number, wherever they are mounted: Linux numbers the drivers of
- * pseudo-terminals' slaves 136 to 143. */
-static bool is_pseudo_terminal(dev_t device)
-{
-    return major(device) >= 136 && major(device) <= 143;
 }
 
 /* The name may be a link, which may lead elsewhere the next time; the library

@@ -47,7 +47,8 @@ int serial_port_open(struct serial_port *port,
 void serial_port_close(struct serial_port *port);
 
 /* The process other than this that has a device open: its number and its name,
- * as far as /proc tells; 0: none that it tells of. */
+ * as far as /proc tells; 0: none that it tells of.  Whoever has the master of a
+ * pseudo-terminal does not count. */
 int serial_port_holder(const char *device, char *name, size_t size);
 
 #endif

@@ -131,6 +131,7 @@ static void a_port_in_use_says_by_whom(void **unused)
     pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
+        close(fds[0]);
         (void)!write(ready[1], "x", 1);
         pause();
         _exit(0);
@@ -160,6 +161,44 @@ static void a_port_in_use_says_by_whom(void **unused)
     serial_port_close(&port);
     close(ready[0]);
     close(ready[1]);
+}
+
+/* Another process has made the pseudo-terminal and keeps both its ends open, as
+ * socat does; it passes on what is sent. */
+static void who_made_a_terminal_is_no_user(void **unused)
+{
+    int fds[2], ready[2];
+    struct serial_port port;
+    struct serial_port_settings settings = {.baud = 115200};
+    uint8_t byte = 7;
+    (void)unused;
+    make_pair(fds);
+    assert_int_equal(ttyname_r(fds[1], settings.name, sizeof settings.name), 0);
+    assert_int_equal(pipe(ready), 0);
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        close(ready[0]);
+        do {
+            wait_for(fds[0]);
+        } while (read(fds[0], &byte, 1) == 1 && write(ready[1], &byte, 1) == 1);
+        _exit(0);
+    }
+    close(fds[0]);
+    close(fds[1]);
+    close(ready[1]);
+    if (serial_port_open(&port, &settings) != 0) {
+        fail_msg("%s", port.fault);
+    }
+    struct link_pipe pipe = serial_link_pipe(&port.pipe);
+    assert_int_equal(pipe.send(pipe.context, &byte, 1), 1);
+    byte = 0;
+    assert_int_equal(read(ready[0], &byte, 1), 1);
+    assert_int_equal(byte, 7);
+    assert_int_equal(kill(child, SIGKILL), 0);
+    assert_int_equal(waitpid(child, NULL, 0), child);
+    serial_port_close(&port);
+    close(ready[0]);
 }
 
 /* A pseudo-terminal has no lasting name but that of a link, which leads to
@@ -497,6 +536,7 @@ int main(void)
         cmocka_unit_test(a_wire_that_breaks_comes_back),
         cmocka_unit_test(rates_and_modes),
         cmocka_unit_test(a_port_in_use_says_by_whom),
+        cmocka_unit_test(who_made_a_terminal_is_no_user),
         cmocka_unit_test(a_link_is_followed_each_time),
         cmocka_unit_test(ports_that_are_not_there),
         cmocka_unit_test(a_clean_wire_resends_nothing),
