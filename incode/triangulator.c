@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <string.h>
 
+#include "incode/pages/sound.h"
 #include "incode/predicates/check.h"
 #include "state.h"
 
@@ -161,7 +162,14 @@ void incode_triangulator_start(struct incode_triangulator *t,
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes)
 {
-    return incode_pager_deliver(&t->maker.pager, page, data, bytes);
+    const struct incode_maker *m = &t->maker;
+    if (!incode_pager_loading(&m->pager, page))
+        return INCODE_PAGE_UNASKED;
+    if (!incode_page_is_sound(&m->tree, m->lo, m->hi, page, data, bytes))
+        return INCODE_PAGE_UNSOUND;
+    return incode_pager_deliver(&t->maker.pager, page, data, bytes) == 0
+               ? 0
+               : INCODE_PAGE_UNASKED;
 }
 
 uint32_t incode_triangulator_awaited(const struct incode_triangulator *t)
@@ -395,5 +403,7 @@ incode_triangulator_map(const struct incode_triangulator *t)
 
 const char *incode_triangulator_fault(const struct incode_triangulator *t)
 {
+    if (t->front.afl.fault != NULL)
+        return t->front.afl.fault;
     return t->front.fault != NULL ? t->front.fault : t->maker.fault;
 }

@@ -14,6 +14,7 @@
 
 struct node_counted {
     struct cube *cube;
+    uint16_t self;           /* the node's number */
     uint32_t received, sent; /* from and to the host, in this generation */
 };
 

@@ -25,8 +25,10 @@ static inline uint32_t node_keeper_place(uint32_t page, uint32_t holders)
     return page / holders;
 }
 
-/* Whether the cube has as many holders as the setup says; false: *fault. */
-bool node_keepers_fit(const struct node_setup_message *setup,
-                      struct node_fault *fault);
+/* Whether the cube has as many holders as the setup says, and node `self` is
+ * one of them where it is to be, and else none: it would ask itself for pages.
+ * False: *fault. */
+bool node_keepers_fit(const struct node_setup_message *setup, unsigned self,
+                      bool keeps, struct node_fault *fault);
 
 #endif

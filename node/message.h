@@ -87,7 +87,8 @@ struct node_setup_message {
     uint16_t nodes;
 
     /* Nodes that keep pages: nodes 1 .. holders do, in turn (keepers.h); less
-     * than `nodes`.  0: the host sends all pages. */
+     * than `nodes`.  0: the host sends all pages.  A holder is one of them, and
+     * a worker is none. */
     uint16_t holders;
 
     /* NODE_RESULT messages that the node may send before the first NODE_CREDIT,
@@ -109,7 +110,7 @@ struct node_job_message {
      * epoch are not counted. */
     uint32_t epoch;
 
-    uint32_t reserved;
+    uint32_t reserved; /* 0 */
 
     /* Bricks [first, last), first <= last <= bricks of the setup, and the box
      * of their points in the points' unit; an empty one is done at once. */

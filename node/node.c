@@ -118,6 +118,7 @@ struct node *node_start(const struct node_board *board, const char **why)
     node->cube = cube_init(memory + own, cube, &config);
     INCODE_ASSERT(node->cube != NULL);
     node->counted.cube = node->cube;
+    node->counted.self = board->identity.self;
     return node;
 }
 
@@ -213,7 +214,29 @@ static void take_ping(struct node *n, const struct cube_message *message)
     n->owes_pong = true;
 }
 
-static void take_message(struct node *n, const struct cube_message *message)
+/* What comes from the host alone, and what has no content. */
+static bool is_expected(struct node *n, const struct cube_message *message)
+{
+    uint8_t type = message->type;
+    bool host_only = type == NODE_SETUP || type == NODE_JOB ||
+                     type == NODE_CREDIT || type == NODE_UNSPILL ||
+                     type == NODE_REPORT || type == NODE_STOP ||
+                     type == NODE_PING;
+    if (host_only && message->source != CUBE_HOST) {
+        node_fault_set(&n->fault,
+                       "message of type # from node #, expected the host", type,
+                       message->source);
+        return false;
+    }
+    if ((type == NODE_REPORT || type == NODE_STOP) && message->size != 0) {
+        node_fault_set(&n->fault, "message of type # in # bytes, expected none",
+                       type, message->size);
+        return false;
+    }
+    return true;
+}
+
+static void serve_message(struct node *n, const struct cube_message *message)
 {
     switch (message->type) {
     case NODE_SETUP:
@@ -230,10 +253,18 @@ static void take_message(struct node *n, const struct cube_message *message)
         n->stop_us = n->now_us;
         break;
     default:
-        /* After a fresh start: a message that was sent to the one before. */
-        if (n->role != NULL) {
+        /* After a fresh start: a message that was sent to the one before.  And
+         * who has a fault does not go on with what he has. */
+        if (n->role != NULL && !node_fault_is_set(&n->fault)) {
             n->role->message(n->role_arena, message, n->now_us);
         }
+    }
+}
+
+static void take_message(struct node *n, const struct cube_message *message)
+{
+    if (is_expected(n, message)) {
+        serve_message(n, message);
     }
     n->counted.received +=
         message->source == CUBE_HOST && message->type != NODE_STOP;

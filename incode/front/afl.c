@@ -5,6 +5,10 @@
 #include "incode/predicates/check.h"
 #include "incode/pages/bricks.h"
 
+/* Points that are not the same in every page, or false boxes. */
+static const char *const INCONSISTENT =
+    "a face is open twice: pages contradict each other, or spilled faces";
+
 static uint32_t power_below(uint32_t n)
 {
     uint32_t power = 1;
@@ -51,6 +55,7 @@ void incode_afl_clear(struct incode_afl *afl)
     afl->unused = afl->touched_free = 0;
     afl->count = afl->touched_count = 0;
     afl->crowded = INCODE_NONE;
+    afl->fault = NULL;
 }
 
 static uint32_t *touched_head(const struct incode_afl *afl, uint32_t brick)
@@ -74,7 +79,11 @@ struct incode_touched *incode_afl_touch(struct incode_afl *afl, uint32_t brick)
     if (entry != NULL)
         return entry;
     uint32_t i = afl->touched_free;
-    INCODE_ASSERT(i != INCODE_AFL_NIL);
+    if (i == INCODE_AFL_NIL) {
+        afl->fault = INCONSISTENT;
+        memset(&afl->spare, 0, sizeof afl->spare);
+        return &afl->spare;
+    }
     entry = &afl->touched[i];
     afl->touched_free = entry->next;
     memset(entry, 0, sizeof *entry);
@@ -96,7 +105,10 @@ void incode_afl_drop(struct incode_afl *afl, uint32_t brick)
     if (*link == INCODE_AFL_NIL)
         return;
     uint32_t i = *link;
-    INCODE_ASSERT(afl->touched[i].faces == 0);
+    if (afl->touched[i].faces > 0) {
+        afl->fault = INCONSISTENT;
+        return;
+    }
     *link = afl->touched[i].next;
     afl->touched[i].brick = INCODE_NONE;
     afl->touched[i].next = afl->touched_free;
@@ -136,11 +148,17 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
     while (*link != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[*link];
         if (node->key == key && node->b == c && node->c == b) {
+            struct incode_touched *entry =
+                incode_afl_find(afl, key / INCODE_BRICK_POINTS);
             unlink_node(afl, link);
-            incode_afl_find(afl, key / INCODE_BRICK_POINTS)->faces--;
+            if (entry != NULL)
+                entry->faces--;
             return true;
         }
-        INCODE_ASSERT(node->key != key || node->b != b || node->c != c);
+        if (node->key == key && node->b == b && node->c == c) {
+            afl->fault = INCONSISTENT;
+            return true;
+        }
         passed += node->key == key;
         link = &node->next;
     }

@@ -40,6 +40,9 @@ struct incode_afl {
     uint32_t touched_capacity, touched_mask, touched_free, touched_count;
     uint32_t touched_max; /* at a time; entries from here on were never used */
     uint32_t crowded;     /* a vertex with a long list, or INCODE_NONE */
+    const char *fault;    /* NULL, or a static string: what the faces that it
+                             was given cannot be */
+    struct incode_touched spare; /* the entry of a brick too many */
 };
 
 #define INCODE_AFL_NIL UINT32_MAX
@@ -57,8 +60,9 @@ void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
                      uint32_t bricks);
 void incode_afl_clear(struct incode_afl *afl);
 
-/* The entry of a brick, made where there is none; asserts that there is room
- * (the caller keeps enough free). */
+/* The entry of a brick, made where there is none.  The caller keeps enough free
+ * for faces of one triangulation; where others came there may be none left:
+ * afl->fault, and an entry of no use. */
 struct incode_touched *incode_afl_touch(struct incode_afl *afl, uint32_t brick);
 /* The entry of a brick, or NULL. */
 struct incode_touched *incode_afl_find(const struct incode_afl *afl,
@@ -67,7 +71,8 @@ struct incode_touched *incode_afl_find(const struct incode_afl *afl,
 void incode_afl_drop(struct incode_afl *afl, uint32_t brick);
 
 /* Opens the face (key, b, c), whose unknown side is where orient3d(key, b, c,
- * p) > 0; or closes it where its twin (key, c, b) is open. */
+ * p) > 0; or closes it where its twin (key, c, b) is open.  One that is open
+ * already is afl->fault. */
 void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
                        uint32_t c);
 

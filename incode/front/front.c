@@ -220,7 +220,8 @@ bool incode_front_drain(struct incode_front *front)
         else
             list_again(front, f[0], f[1], f[2]);
     }
-    INCODE_ASSERT(stay < FACES);
+    if (stay == FACES)
+        front->fault = "too many faces among hubs";
     for (uint32_t i = 0; i < stay; i++)
         list_again(front, v, pairs[i][0], pairs[i][1]);
     if (!more)
@@ -328,6 +329,17 @@ bool incode_front_room(struct incode_front *front)
     return false;
 }
 
+/* A face or a mark that can have been spilled. */
+static bool may_return(const struct incode_front *front, uint32_t brick,
+                       const uint32_t f[3])
+{
+    bool face = f[1] / INCODE_BRICK_POINTS < front->bricks &&
+                f[2] / INCODE_BRICK_POINTS < front->bricks && f[0] != f[1] &&
+                f[0] != f[2] && f[1] != f[2];
+    bool mark = f[1] == INCODE_NONE && f[2] == INCODE_NONE;
+    return f[0] / INCODE_BRICK_POINTS == brick && (face || mark);
+}
+
 int incode_front_unspill(struct incode_front *front, uint32_t brick,
                          const struct incode_face *faces, size_t count,
                          bool last)
@@ -337,7 +349,7 @@ int incode_front_unspill(struct incode_front *front, uint32_t brick,
     struct incode_touched *entry = NULL;
     for (size_t i = 0; i < count; i++) {
         const uint32_t *f = faces[i].v;
-        if (f[0] / INCODE_BRICK_POINTS != brick)
+        if (!may_return(front, brick, f))
             return -1;
         if (front->afl.count + 1 >= front->afl.capacity ||
             front->afl.touched_count + 1 >= front->afl.touched_capacity) {

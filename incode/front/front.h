@@ -145,7 +145,8 @@ void incode_front_init(struct incode_front *front, void *memory,
 void incode_front_start(struct incode_front *front,
                         const struct incode_job *job);
 
-/* Spilled toggles of the brick that was asked for come back; -1: it was not. */
+/* Spilled toggles of the brick that was asked for come back; -1: it was not, or
+ * what came is no face of it. */
 int incode_front_unspill(struct incode_front *front, uint32_t brick,
                          const struct incode_face *faces, size_t count,
                          bool last);

@@ -218,8 +218,7 @@ static enum incode_turn finish(struct incode_front *front)
     for (uint32_t i = 0; i < front->afl.touched_max; i++)
         if (incode_touched_used(&front->afl.touched[i]))
             incode_afl_drop(&front->afl, front->afl.touched[i].brick);
-    INCODE_ASSERT(front->afl.count == 0 && front->afl.touched_count == 0);
-    front->finished = true;
+    front->finished = front->afl.fault == NULL;
     return INCODE_TURN_END;
 }
 
@@ -243,7 +242,10 @@ enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
         return begin_task(front, v, false, which);
     if (front->busy != 0 || front->unspill_pending)
         return INCODE_TURN_WAIT;
-    INCODE_ASSERT(front->afl.count == 0);
+    if (front->afl.count > 0) {
+        front->fault = "faces are left whose vertices are none";
+        return INCODE_TURN_WAIT;
+    }
     if (!front->spilled_any)
         return finish(front);
     fetch_spilled(front);

@@ -204,8 +204,10 @@ void incode_front_use(struct incode_front *front, const uint32_t v[4],
                       const double *const p[4])
 {
     unsigned turn;
-    if (!incode_front_key(front, v, p, &turn))
-        INCODE_ASSERT(false);
+    if (!incode_front_key(front, v, p, &turn)) {
+        front->fault = "a vertex has moved while its face was under search";
+        return;
+    }
     uint32_t key = v[turn], b = v[(turn + 1) % 3], c = v[(turn + 2) % 3];
     if (incode_position(front, key / INCODE_BRICK_POINTS) >=
             front->spill_from ||

@@ -80,6 +80,17 @@ struct batch {
     unsigned count;
 };
 
+/* Vertex i of the list; false: page *missing is. */
+static bool listed(const struct incode_grid *g, uint32_t i, uint32_t *id,
+                   uint32_t *missing)
+{
+    if (!incode_cells_word(g, g->tree->list_base, i, id, missing))
+        return false;
+    /* What a page may hold at most is one too many for a vertex. */
+    *id = *id / INCODE_BRICK_POINTS < g->tree->bricks ? *id : 0;
+    return true;
+}
+
 /* Up to 8 points of the list from c->list on; false: a page is missing after
  * those. */
 static bool fill_batch(const struct incode_cell_search *c,
@@ -92,8 +103,7 @@ static bool fill_batch(const struct incode_cell_search *c,
     batch->count = 0;
     while (batch->count < LANES && c->list + batch->count < c->end) {
         uint32_t id;
-        if (!incode_cells_word(g, g->tree->list_base, c->list + batch->count,
-                               &id, missing))
+        if (!listed(g, c->list + batch->count, &id, missing))
             return false;
         if (f == NULL || id / INCODE_BRICK_POINTS != brick) {
             brick = id / INCODE_BRICK_POINTS;
@@ -140,7 +150,7 @@ static void ask_ahead(const struct incode_cell_search *c,
 {
     uint32_t id, page;
     for (uint32_t i = c->list; i < c->end && i < c->list + ASK_AHEAD; i++) {
-        if (!incode_cells_word(g, g->tree->list_base, i, &id, &page))
+        if (!listed(g, i, &id, &page))
             return;
         (void)incode_pager_get(g->pager, id / INCODE_BRICK_POINTS);
     }

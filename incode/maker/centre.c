@@ -122,6 +122,10 @@ enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
     s->page = brick;
     if (f == NULL)
         return INCODE_WAIT;
+    if (slot >= f->count) {
+        m->fault = INCODE_NO_VERTEX;
+        return INCODE_WAIT;
+    }
     if (m->neighbours.centre != brick &&
         list_bricks(m, s, brick, f) == INCODE_WAIT)
         return INCODE_WAIT;

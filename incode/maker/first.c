@@ -1,6 +1,5 @@
 #include <string.h>
 
-#include "incode/predicates/check.h"
 #include "search.h"
 
 /* A first tetrahedron at a vertex v that none has reached (MakeFirstTetra).
@@ -10,6 +9,12 @@
  * (the paper's smallest circle), looking to and fro, a from w and w from a,
  * ends at one of them: each look settles one side exactly, and both agree only
  * on a true edge. */
+
+/* Of points that are not the same in every page. */
+static const char *const INCONSISTENT =
+    "no first tetrahedron: pages contradict each other";
+
+enum { LOOKS = 16 /* a call, at most */ };
 
 static void begin_walk(struct incode_maker *m, struct incode_search *search,
                        uint32_t v, enum incode_question question,
@@ -100,8 +105,10 @@ static void settle(struct incode_maker *m, struct incode_search *search,
     const struct incode_first *s = &search->first;
     const uint32_t f[4] = {search->query.v, s->u, s->w, s->a};
     const double *const p[4] = {pv, s->pu, s->pw, s->pa};
-    INCODE_ASSERT(incode_orient3d(&m->counts.tally, pv, s->pu, s->pw, s->pa) >
-                  0);
+    if (incode_orient3d(&m->counts.tally, pv, s->pu, s->pw, s->pa) <= 0) {
+        m->fault = INCONSISTENT;
+        return;
+    }
     memcpy(a->f, f, sizeof a->f);
     for (int i = 0; i < 4; i++) {
         memcpy(a->p[i], p[i], sizeof a->p[i]);
@@ -147,6 +154,7 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
     struct incode_first *s = &search->first;
     struct incode_query *q = &search->query;
     double p[3];
+    unsigned looks = 0;
     if (!incode_fetch_point(m, v, p, &search->page))
         return INCODE_WAIT;
     const struct incode_frame *frame =
@@ -172,6 +180,11 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
             settle(m, search, p, a);
         else
             look(m, search, p);
+        if (search->stage == INCODE_SEARCH_FIRST && ++looks == LOOKS) {
+            search->page = INCODE_NONE;
+            search->advanced = true;
+            return INCODE_MORE;
+        }
     }
     return INCODE_OK;
 }

@@ -222,7 +222,7 @@ enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
                                       struct incode_answer *a);
 
 /* A first tetrahedron at v (MakeFirstTetra): INCODE_OK, with m->fault set where
- * there is none, or INCODE_WAIT. */
+ * there is none, INCODE_WAIT, or INCODE_MORE: ask again. */
 enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
                                        uint32_t v, struct incode_answer *a);
 

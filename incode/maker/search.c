@@ -3,8 +3,6 @@
 #include <float.h>
 #include <string.h>
 
-#include "incode/predicates/check.h"
-
 bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],
                         uint32_t *page)
 {
@@ -13,7 +11,10 @@ bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],
     *page = brick;
     if (f == NULL)
         return false;
-    INCODE_ASSERT(slot < f->count);
+    if (slot >= f->count) {
+        m->fault = INCODE_NO_VERTEX;
+        return false;
+    }
     p[0] = f->page.brick.x[slot];
     p[1] = f->page.brick.y[slot];
     p[2] = f->page.brick.z[slot];

@@ -12,6 +12,9 @@
 
 #include "maker.h"
 
+/* The fault of one who names a slot that its brick has not. */
+#define INCODE_NO_VERTEX "a face has a vertex that its brick has not"
+
 /* Begins the search of the apex of (v, b, c). */
 void incode_search_begin(struct incode_maker *m, struct incode_search *s,
                          const uint32_t f[3], const double pv[3],

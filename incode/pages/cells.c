@@ -69,5 +69,6 @@ bool incode_cells_word(const struct incode_grid *g, uint32_t base, uint32_t i,
     if (f == NULL)
         return false;
     *word = f->page.words.word[i % INCODE_PAGE_WORDS];
+    *word = *word == INCODE_NONE ? 0 : *word;
     return true;
 }

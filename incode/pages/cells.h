@@ -37,7 +37,8 @@ double incode_cells_lowest(const struct incode_grid *g, int d, uint32_t cell);
 /* The same from above, for the cells up to `cell`. */
 double incode_cells_highest(const struct incode_grid *g, int d, uint32_t cell);
 
-/* Word i of the list whose pages begin at `base`; false: page *missing is. */
+/* Word i of the list whose pages begin at `base`; false: page *missing is.
+ * Beyond the end of a list, where who made it erred, it is 0. */
 bool incode_cells_word(const struct incode_grid *g, uint32_t base, uint32_t i,
                        uint32_t *word, uint32_t *missing);
 

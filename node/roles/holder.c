@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "incode/pages/sound.h"
 #include "incode/predicates/check.h"
 #include "node/keepers.h"
 
@@ -19,6 +20,8 @@ struct holder {
     struct node_counted *counted;
     struct node_fault *fault;
     uint32_t holders;
+    struct incode_tree tree; /* of the points, */
+    double lo[3], hi[3];     /* and their box */
     struct frame *frames;
     uint32_t frame_count, frames_used;
     /* Requests that wait: for this page, by that node. */
@@ -45,17 +48,27 @@ static bool holder_start(void *self, size_t bytes,
         node_fault_set(fault, "the node's memory does not hold a page", 0, 0);
         return false;
     }
+    const struct incode_setup *points = &setup->setup;
+    const char *why = incode_setup_fault(points);
+    if (why != NULL) {
+        node_fault_set(fault, why, 0, 0);
+        return false;
+    }
     if (setup->holders == 0) {
         node_fault_set(fault, "invalid setup: a holder among # holders", 0, 0);
         return false;
     }
-    if (!node_keepers_fit(setup, fault)) {
+    if (!node_keepers_fit(setup, counted->self, true, fault)) {
         return false;
     }
     memset(h, 0, sizeof *h);
     h->counted = counted;
     h->fault = fault;
     h->holders = setup->holders;
+    incode_tree_init(&h->tree, points->bricks,
+                     points->cells[0] * points->cells[1] * points->cells[2]);
+    memcpy(h->lo, points->lo, sizeof h->lo);
+    memcpy(h->hi, points->hi, sizeof h->hi);
     h->frames = (void *)((uint8_t *)self + own);
     h->frame_count = (uint32_t)((bytes - own) / sizeof h->frames[0]);
     memset(h->frames, 0, h->frame_count * sizeof h->frames[0]);
@@ -69,18 +82,27 @@ static struct frame *frame_of(const struct holder *h, uint32_t page)
 
 static void take_request(struct holder *h, const struct cube_message *message)
 {
-    if (message->size % sizeof h->page[0] != 0) {
+    const uint32_t bytes = sizeof h->page[0];
+    if (message->size % bytes != 0) {
         node_fault_set(h->fault, "request in # bytes, expected # a page",
-                       message->size, sizeof h->page[0]);
+                       message->size, bytes);
         return;
     }
-    for (size_t at = 0; at < message->size; at += sizeof h->page[0]) {
+    for (size_t at = 0; at < message->size; at += bytes) {
+        uint32_t page;
+        memcpy(&page, message->data + at, sizeof page);
+        if (page >= h->tree.pages ||
+            node_keeper(page, h->holders) != h->counted->self) {
+            node_fault_set(h->fault, "request for page #, which node # has not",
+                           page, h->counted->self);
+            return;
+        }
         if (h->queued == NODE_PAGES_IN_FLIGHT_MAX) {
             node_fault_set(h->fault, "more than # pages requested at a time",
                            NODE_PAGES_IN_FLIGHT_MAX, 0);
             return;
         }
-        memcpy(&h->page[h->queued], message->data + at, sizeof h->page[0]);
+        h->page[h->queued] = page;
         h->source[h->queued] = message->source;
         h->queued++;
     }
@@ -98,6 +120,13 @@ static void take_page(struct holder *h, const uint8_t *data, size_t size)
     struct frame *frame = frame_of(h, page);
     if (!frame->loading || frame->page != page) {
         node_fault_set(h->fault, "page # was not requested", page, 0);
+        return;
+    }
+    if (!incode_page_is_sound(&h->tree, h->lo, h->hi, page, data + sizeof page,
+                              size - sizeof page)) {
+        node_fault_set(h->fault,
+                       "content of page # in # bytes is out of its limits",
+                       page, (uint32_t)(size - sizeof page));
         return;
     }
     memcpy(frame->data, data + sizeof page, size - sizeof page);

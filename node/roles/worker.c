@@ -227,7 +227,7 @@ static bool worker_start(void *self, size_t bytes,
                        0);
         return false;
     }
-    if (!node_keepers_fit(setup, fault)) {
+    if (!node_keepers_fit(setup, counted->self, false, fault)) {
         return false;
     }
     memset(w, 0, sizeof *w);
@@ -250,6 +250,37 @@ static bool worker_start(void *self, size_t bytes,
     return w->triangulator != NULL;
 }
 
+/* Its bricks are the setup's, its box is one of numbers, if it has points. */
+static bool job_is_sound(const struct worker *w,
+                         const struct node_job_message *job)
+{
+    const struct incode_job *j = &job->job;
+    if (j->first > j->last || j->last > w->bricks) {
+        node_fault_set(w->fault, "invalid job: bricks #..#", j->first, j->last);
+        return false;
+    }
+    if (job->epoch == 0) {
+        node_fault_set(w->fault, "invalid job: epoch 0", 0, 0);
+        return false;
+    }
+    if (job->reserved != 0) {
+        node_fault_set(w->fault, "invalid job: what is reserved is #",
+                       job->reserved, 0);
+        return false;
+    }
+    for (int d = 0; d < 3 && j->first < j->last; d++) {
+        if (!__builtin_isfinite(j->lo[d]) || !__builtin_isfinite(j->hi[d]) ||
+            j->lo[d] > j->hi[d]) {
+            node_fault_set(w->fault,
+                           "invalid job: the box of bricks #..# is empty or "
+                           "infinite",
+                           j->first, j->last);
+            return false;
+        }
+    }
+    return true;
+}
+
 static void take_job(struct worker *w, const struct cube_message *message,
                      uint64_t now_us)
 {
@@ -265,13 +296,7 @@ static void take_job(struct worker *w, const struct cube_message *message,
                        w->epoch);
         return;
     }
-    if (job.job.first > job.job.last || job.job.last > w->bricks) {
-        node_fault_set(w->fault, "invalid job: bricks #..#", job.job.first,
-                       job.job.last);
-        return;
-    }
-    if (job.epoch == 0) {
-        node_fault_set(w->fault, "invalid job: epoch 0", 0, 0);
+    if (!job_is_sound(w, &job)) {
         return;
     }
     w->epoch = job.epoch;
@@ -298,10 +323,14 @@ static void take_page(struct worker *w, const uint8_t *data, size_t size)
         return;
     }
     w->in_flight--;
-    if (incode_triangulator_page(w->triangulator, page, data + sizeof page,
-                                 size - sizeof page) != 0) {
-        node_fault_set(w->fault, "page # of # bytes was not requested", page,
-                       (uint32_t)(size - sizeof page));
+    int status = incode_triangulator_page(
+        w->triangulator, page, data + sizeof page, size - sizeof page);
+    if (status != 0) {
+        node_fault_set(w->fault,
+                       status == INCODE_PAGE_UNSOUND
+                           ? "content of page # in # bytes is out of its limits"
+                           : "page # of # bytes was not requested",
+                       page, (uint32_t)(size - sizeof page));
     }
 }
 
@@ -327,7 +356,8 @@ static void take_unspill(struct worker *w, const uint8_t *data, size_t size)
     memcpy(faces, data + sizeof header, header.count * sizeof faces[0]);
     if (incode_triangulator_unspill(w->triangulator, header.brick, faces,
                                     header.count, header.last != 0) != 0) {
-        node_fault_set(w->fault, "spilled faces of brick # not requested",
+        node_fault_set(w->fault,
+                       "spilled faces of brick # not requested, or none of it",
                        header.brick, 0);
     }
 }
@@ -339,7 +369,13 @@ static void take_credit(struct worker *w, const uint8_t *data, size_t size)
                        (uint32_t)size, sizeof w->credit);
         return;
     }
-    memcpy(&w->credit, data, sizeof w->credit);
+    uint32_t credit;
+    memcpy(&credit, data, sizeof credit);
+    if ((int32_t)(credit - w->credit) < 0) {
+        node_fault_set(w->fault, "credit # after credit #", credit, w->credit);
+        return;
+    }
+    w->credit = credit;
 }
 
 static void worker_message(void *self, const struct cube_message *message,

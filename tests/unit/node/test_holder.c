@@ -57,9 +57,13 @@ static const struct node_role *const role = &node_holder_role;
 
 static void begin(size_t bytes)
 {
-    const struct node_setup_message setup = {.nodes = 2, .holders = 1};
+    const struct node_setup_message setup = {
+        .nodes = 2,
+        .holders = 1,
+        .setup = {.bricks = 50, .index = INCODE_KD, .hi = {1, 1, 1}}};
     memset(&world, 0, sizeof world);
     world.counted.cube = &world.cube;
+    world.counted.self = 1;
     assert_true(bytes <= sizeof world.arena);
     assert_true(
         role->start(world.arena, bytes, &setup, &world.counted, &world.fault));
@@ -80,7 +84,8 @@ static void asks(uint16_t source, uint32_t page)
 
 static void page_comes(uint32_t page)
 {
-    uint32_t body[] = {page, ~page};
+    /* A point, whose first coordinate is about a half. */
+    uint32_t body[7] = {page, ~page, 0x3fe00000};
     say(CUBE_HOST, NODE_PAGE, body, sizeof body);
 }
 

@@ -2,6 +2,7 @@
  * has a third one here, that echoes.  The node knows each by its functions
  * alone, says in figures what keeps it from going on, and goes on with the next
  * setup. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -384,12 +385,25 @@ static void invalid_setups(void **unused)
     setup.holders = 3;
     refuses(NODE_SETUP, &setup, sizeof setup,
             "invalid setup: 3 holders of 2 nodes");
+    setup = setup_of(NODE_WORKER);
+    setup.holders = 1; /* it would ask itself for pages */
+    refuses(NODE_SETUP, &setup, sizeof setup,
+            "invalid setup: node 1 works, and is one of 1 holders");
+    setup = setup_of(NODE_HOLDER);
+    setup.setup.bricks = 0;
+    refuses(NODE_SETUP, &setup, sizeof setup, "there are no points");
     setup = setup_of(ECHO_ROLE);
     setup.reserved[1] = 9;
     refuses(NODE_SETUP, &setup, sizeof setup,
             "invalid setup: reserved byte 1 is 9");
     (void)begin(ECHO_ROLE);
     refuses(NODE_PING, &setup, 3, "ping in 3 bytes, expected 4");
+    (void)begin(ECHO_ROLE);
+    refuses(NODE_REPORT, &setup, 3,
+            "message of type 6 in 3 bytes, expected none");
+    (void)begin(ECHO_ROLE);
+    refuses(NODE_STOP, &setup, 3,
+            "message of type 7 in 3 bytes, expected none");
 }
 
 static void what_a_worker_refuses(void **unused)
@@ -437,7 +451,53 @@ static void what_a_worker_refuses(void **unused)
     (void)begin(NODE_WORKER);
     refuses(NODE_CREDIT, &header, 3, "credit in 3 bytes, expected 4");
     (void)begin(NODE_WORKER);
+    header.count = 3; /* of 4 credits */
+    refuses(NODE_CREDIT, &header.count, 4, "credit 3 after credit 4");
+    (void)begin(NODE_WORKER);
     refuses(ECHO_ASKS, NULL, 0, "message of type 77 for a worker");
+    (void)begin(NODE_WORKER);
+    job.reserved = 3;
+    refuses(NODE_JOB, &job, sizeof job, "invalid job: what is reserved is 3");
+    (void)begin(NODE_WORKER);
+    job.reserved = 0;
+    job.job.hi[1] = -1;
+    refuses(NODE_JOB, &job, sizeof job,
+            "invalid job: the box of bricks 5..7 is empty or infinite");
+}
+
+/* What it says to a page that it has asked for. */
+static void takes_no_page(const void *data, size_t bytes)
+{
+    struct {
+        uint32_t page;
+        uint8_t data[INCODE_PAGE_BYTES];
+    } page;
+    struct node_job_message job = {.epoch = 1, .job = {.last = 7}};
+    char text[80];
+    (void)begin(NODE_WORKER);
+    say(NODE_JOB, &job, sizeof job);
+    memcpy(&page.page, hear(NODE_PAGE_REQUEST), sizeof page.page);
+    assert_int_equal(page.page, 0);
+    memcpy(page.data, data, bytes);
+    snprintf(text, sizeof text,
+             "content of page 0 in %zu bytes is out of its limits", bytes);
+    refuses(NODE_PAGE, &page, sizeof page.page + bytes, text);
+}
+
+static void pages_that_a_worker_refuses(void **unused)
+{
+    double points[3][INCODE_BRICK_POINTS + 1] = {{0}};
+    double *last = &points[2][INCODE_BRICK_POINTS - 3];
+    (void)unused;
+    takes_no_page(points, 0);
+    takes_no_page(points, 23);
+    takes_no_page(points, 25);
+    *last = NAN;
+    takes_no_page(points, INCODE_PAGE_BYTES);
+    *last = INFINITY;
+    takes_no_page(points, INCODE_PAGE_BYTES);
+    *last = 1.5; /* outside the box of all points */
+    takes_no_page(points, INCODE_PAGE_BYTES);
 }
 
 static void what_a_holder_refuses(void **unused)
@@ -466,6 +526,16 @@ static void what_a_holder_refuses(void **unused)
     (void)begin(NODE_HOLDER);
     refuses(NODE_UNSPILL, &page, 20,
             "message of type 5 for a node that holds pages");
+    (void)begin(NODE_HOLDER);
+    pages[0] = 8; /* 7 bricks and their boxes */
+    refuses(NODE_PAGE_REQUEST, pages, 4,
+            "request for page 8, which node 1 has not");
+    (void)begin(NODE_HOLDER);
+    page.page = pages[0] = 7;
+    say(NODE_PAGE_REQUEST, pages, 4);
+    (void)hear(NODE_PAGE_REQUEST);
+    refuses(NODE_PAGE, &page, sizeof page - 4,
+            "content of page 7 in 1536 bytes is out of its limits");
 }
 
 /* Nothing moves when a role finds it, and the board would sleep. */
@@ -540,6 +610,8 @@ int main(void)
                                         tear_down),
         cmocka_unit_test_setup_teardown(invalid_setups, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_a_worker_refuses, set_up,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(pages_that_a_worker_refuses, set_up,
                                         tear_down),
         cmocka_unit_test_setup_teardown(what_a_holder_refuses, set_up,
                                         tear_down),

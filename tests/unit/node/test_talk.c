@@ -1,0 +1,43 @@
+/* A node whose host and neighbour say what they like: drawn at random here,
+ * sought by the fuzzer (tests/fuzz/fuzz_node.c). */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "node_talk.h"
+
+static uint64_t state = 88172645463325252u;
+
+static uint8_t draw(void)
+{
+    return (uint8_t)(sim_draw(&state) >> 40);
+}
+
+/* TALKS for more than a few. */
+static void random_talks(void **unused)
+{
+    const char *wanted = getenv("TALKS");
+    uint8_t bytes[300];
+    (void)unused;
+    for (long talks = wanted == NULL ? 150 : atol(wanted); talks > 0; talks--) {
+        bytes[0] = 0; /* a right setup, */
+        bytes[1] = bytes[2] = 0;
+        bytes[3] = 20;
+        bytes[4] = 1; /* and a right job first, as a rule */
+        for (size_t i = talks % 4 == 0 ? 0 : 7; i < sizeof bytes; i++) {
+            bytes[i] = draw();
+        }
+        talk_run(bytes, sizeof bytes);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(random_talks),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
