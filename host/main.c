@@ -17,6 +17,7 @@
 #include "host/formats/read.h"
 #include "host/formats/write.h"
 #include "host/machines/cube_file.h"
+#include "host/machines/cube_key.h"
 #include "host/mesh/gen.h"
 #include "host/mesh/tetrahedra.h"
 #include "host/run/arguments.h"
@@ -277,6 +278,20 @@ static int command_cube(int argc, char **argv, struct host_error *error)
     return host_cube_print(s.argument[0], error);
 }
 
+static int command_key(int argc, char **argv, struct host_error *error)
+{
+    struct simple s = {0};
+    if (parse(
+            argc, argv, NULL, "FILE",
+            "Makes the key of a cube, 64 random hexadecimal digits, in a new "
+            "file that its owner alone can read.  Whoever has a copy can join "
+            "the cube: give one to each machine of it, and to nobody else.",
+            1, &s, error) != 0) {
+        return error->code;
+    }
+    return host_key_make(s.argument[0], error);
+}
+
 static int command_bench(int argc, char **argv, struct host_error *error)
 {
     static const struct argp_option options[] = {
@@ -334,6 +349,7 @@ static const struct command commands[] = {
     {"draw", "POINTS TETS -o FILE", "a section, as SVG or PNG", command_draw},
     {"cube", "FILE", "check a cube file, print what starts its nodes",
      command_cube},
+    {"key", "FILE", "make a cube's key", command_key},
     {"bench", "paper|links", "the paper's tables on this machine; its links",
      command_bench},
     {"sim", "--seeds A..B", "whole cubes in virtual time, with faults",

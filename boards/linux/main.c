@@ -11,7 +11,7 @@
  * itself to its memory, and begins anew when a run is over; see wire.h:
  *
  *     incode-node --node 3 --dimension 2 --key cube.key \
- *                 --wire 0=listen:10.0.0.3:7001 --wire 1=call:10.0.0.1:7001
+ *                 --wire 0=listen:10.0.0.3:7001 --wire 1=unix-call:/run/cube/13
  *
  * Without --node and --dimension it waits until a neighbour says who it is.
  */
@@ -71,8 +71,8 @@ static void reset(void *context, int status)
 {
     const struct linux_board *board = context;
     if (status == 0 && board->again != NULL) {
-        char *no_environment[] = {NULL};
-        execve("/proc/self/exe", board->again, no_environment);
+        char *environment[] = {(char[]){LINUX_AGAIN "=1"}, NULL};
+        execve("/proc/self/exe", board->again, environment);
     }
     _exit(status);
 }
@@ -96,20 +96,25 @@ static bool open_wires(struct linux_board *linux_board,
                        const struct linux_options *options,
                        struct tcp_wire *net, struct linux_fault *fault)
 {
-    const uint8_t *key = options->key == NULL ? NULL : linux_board->key;
-    if (key != NULL && !read_key(options->key, linux_board->key, fault)) {
-        return false;
+    struct linux_guard guard = {NULL, false};
+    if (options->key != NULL) {
+        if (!read_key(options->key, linux_board->key, fault)) {
+            return false;
+        }
+        guard.key = linux_board->key;
     }
     for (unsigned i = 0; i < options->wires_count; i++) {
         *fault = (struct linux_fault){.where = "--wire",
                                       .value = options->wire[i],
                                       .next = "see incode-node --help"};
+        guard.insecure = (options->insecure >> i & 1) != 0;
         if (!linux_wire_open(&linux_board->wire[i],
-                             strchr(options->wire[i], '=') + 1, key, &net[i],
+                             strchr(options->wire[i], '=') + 1, &guard, &net[i],
                              fault)) {
             return false;
         }
     }
+    linux_wires_end_with(linux_board->wire, options->wires_count);
     return true;
 }
 

@@ -20,13 +20,21 @@ static const char help[] =
     "  --host-port 0|1    besides node 0, this node has a host port\n"
     "  --dead US          microseconds of silence after which a link is given "
     "up; 0: never\n"
-    "  --key FILE         64 hexadecimal digits: the key of the cube\n"
+    "  --key FILE         64 hexadecimal digits, as incode key FILE makes "
+    "them: the key\n"
+    "                     of the cube, without which no wire goes over TCP\n"
+    "  --insecure [LINKS] these (as in 0,2), or all, go over TCP without a "
+    "key: whoever\n"
+    "                     reaches their addresses can take them over\n"
     "  --board linux      what this program is for: on another it does not "
     "start\n"
     "  --wire LINK=WIRE   opens the wire of that link, 0 to dimension (the "
     "host's):\n"
     "                     listen:ADDRESS:PORT, call:ADDRESS:PORT (in "
     "numbers),\n"
+    "                     unix-listen:PATH, unix-call:PATH (of this machine "
+    "and "
+    "user),\n"
     "                     serial:DEVICE:BAUD or serial:DEVICE:BAUD:rtscts\n"
     "\n"
     "Of the host that starts nodes itself:\n"
@@ -90,6 +98,28 @@ static const char *read_wire(const char *text, struct linux_options *options)
     return NULL;
 }
 
+static const char *read_insecure(const char *text,
+                                 struct linux_options *options)
+{
+    uint64_t link;
+    while (*text != '\0') {
+        if (!read_number(&text, &link) || link >= CUBE_LINKS_MAX ||
+            (*text != ',' && *text != '\0')) {
+            return "not links as in 0,2";
+        }
+        options->insecure |= 1u << link;
+        text += *text == ',';
+    }
+    return NULL;
+}
+
+/* Whether an argument stands alone: --insecure without links. */
+static bool is_alone(const char *name, const char *next)
+{
+    return strcmp(name, "--insecure") == 0 &&
+           (next == NULL || strncmp(next, "--", 2) == 0);
+}
+
 /* An argument and its value; what is wrong with it, or NULL. */
 static const char *read_one(const char *name, const char *text,
                             struct linux_options *options)
@@ -124,6 +154,9 @@ static const char *read_one(const char *name, const char *text,
     if (strcmp(name, "--board") == 0) {
         return strcmp(text, "linux") == 0 ? NULL
                                           : "another board's program starts it";
+    }
+    if (strcmp(name, "--insecure") == 0) {
+        return read_insecure(text, options);
     }
     if (strcmp(name, "--key") == 0) {
         options->key = text;
@@ -161,6 +194,11 @@ bool linux_options_read(char **argv, struct linux_options *options,
     fault->next = see_help;
     for (; argv[0] != NULL; argv += 2) {
         fault->where = argv[0];
+        if (is_alone(argv[0], argv[1])) {
+            options->insecure = UINT32_MAX;
+            argv--;
+            continue;
+        }
         fault->what = "wants a value";
         if (argv[1] == NULL) {
             return false;

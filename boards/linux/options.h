@@ -32,7 +32,8 @@ struct linux_options {
     /* Wires that it opens itself: the arguments, as "2=call:10.0.0.1:7001". */
     const char *wire[CUBE_LINKS_MAX];
     unsigned wires_count;
-    const char *key; /* a file, or NULL */
+    const char *key;   /* a file, or NULL */
+    uint32_t insecure; /* a bit for each link that goes over TCP without it */
 };
 
 /* False: *fault says which argument is wrong. */

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <poll.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -25,37 +26,73 @@ void linux_wire_inherit(struct linux_wire *wire, int fd)
 
 /* --- wires that the node opens itself ------------------------------------- */
 
-static bool open_net(struct linux_wire *wire, const char *address, bool listens,
-                     const uint8_t *key, struct linux_fault *fault)
+static bool open_socket(struct linux_wire *wire,
+                        const struct tcp_wire_config *config,
+                        struct linux_fault *fault)
 {
-    struct tcp_wire_config config = {
-        .listens = listens, .key = key, .ends = &wire->ends};
+    wire->kind = LINUX_NET;
+    if (tcp_wire_open(wire->net, config) == 0) {
+        return true;
+    }
+    bool file = tcp_address_path(&config->address) != NULL;
+    fault->what = "cannot listen there";
+    fault->reason = errno;
+    fault->next = !file ? "end what has that port, or give an address of this "
+                          "machine"
+                  : errno == EEXIST ? "that file is no socket; give another "
+                                      "path"
+                                    : "end who listens there, or give a path "
+                                      "in a folder of your own";
+    return false;
+}
+
+/* The user who must do without a key is told what that means. */
+static bool guard_net(const struct linux_guard *guard,
+                      struct tcp_wire_config *config, struct linux_fault *fault)
+{
+    config->insecure = guard->insecure;
+    config->key = guard->insecure ? NULL : guard->key;
+    config->suite = config->key == NULL ? NULL : &secure_sodium;
+    if (!guard->insecure && guard->key == NULL) {
+        fault->what = "a wire over TCP wants a key";
+        fault->next = "make one with: incode key FILE, and give it with --key "
+                      "(or give --insecure)";
+        return false;
+    }
+    if (guard->insecure && getenv(LINUX_AGAIN) == NULL) {
+        fault_print(&(struct linux_fault){
+            .where = "--wire",
+            .value = fault->value,
+            .what = "insecure: whoever reaches that address can take the wire "
+                    "over, and send false results",
+            .next = "make a key with: incode key FILE"});
+    }
+    return true;
+}
+
+static bool open_net(struct linux_wire *wire, const char *address, bool listens,
+                     const struct linux_guard *guard, struct linux_fault *fault)
+{
+    struct tcp_wire_config config = {.listens = listens, .ends = &wire->ends};
     if (tcp_address_parse(&config.address, address) != 0) {
         fault->what = "not an address in numbers with a port";
         fault->next = "write 10.0.0.7:7001 or [2001:db8::7]:7001";
         return false;
     }
-    config.suite = key == NULL ? NULL : &secure_sodium;
-    if (key == NULL && !tcp_address_is_loopback(&config.address)) {
-        if (!listens) {
-            fault->what = "calls another machine without a key";
-            fault->next = "give --key";
-            return false;
-        }
-        fault_print(&(struct linux_fault){
-            .where = "no --key",
-            .what = "listens for this machine's own programs only"});
-        tcp_address_to_loopback(&config.address);
-    }
-    wire->kind = LINUX_NET;
-    if (tcp_wire_open(wire->net, &config) != 0) {
-        fault->what = "cannot listen there";
-        fault->reason = errno;
-        fault->next = "end what has that port, or give an address of this "
-                      "machine";
+    return guard_net(guard, &config, fault) &&
+           open_socket(wire, &config, fault);
+}
+
+static bool open_path(struct linux_wire *wire, const char *path, bool listens,
+                      struct linux_fault *fault)
+{
+    struct tcp_wire_config config = {.listens = listens};
+    if (tcp_address_set_path(&config.address, path) != 0) {
+        fault->what = "not a path of 1 to 107 bytes";
+        fault->next = "give a shorter one";
         return false;
     }
-    return true;
+    return open_socket(wire, &config, fault);
 }
 
 /* A device that is not there, or vanished, is looked for from time to time. */
@@ -124,26 +161,41 @@ static bool open_serial(struct linux_wire *wire, const char *text,
     return true;
 }
 
+/* What is behind a word that the text begins with; NULL: it does not. */
+static const char *behind(const char *text, const char *word)
+{
+    size_t size = strlen(word);
+    return strncmp(text, word, size) == 0 ? text + size : NULL;
+}
+
 bool linux_wire_open(struct linux_wire *wire, const char *text,
-                     const uint8_t *key, struct tcp_wire *net,
+                     const struct linux_guard *guard, struct tcp_wire *net,
                      struct linux_fault *fault)
 {
+    const char *at;
     memset(wire, 0, sizeof *wire);
     wire->net = net;
     wire->text = text;
     wire->ends =
         (struct secure_ends){{SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN},
                              {SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN}};
-    if (strncmp(text, "listen:", 7) == 0) {
-        return open_net(wire, text + 7, true, key, fault);
+    if ((at = behind(text, "listen:")) != NULL) {
+        return open_net(wire, at, true, guard, fault);
     }
-    if (strncmp(text, "call:", 5) == 0) {
-        return open_net(wire, text + 5, false, key, fault);
+    if ((at = behind(text, "call:")) != NULL) {
+        return open_net(wire, at, false, guard, fault);
     }
-    if (strncmp(text, "serial:", 7) == 0) {
-        return open_serial(wire, text + 7, fault);
+    if ((at = behind(text, "unix-listen:")) != NULL) {
+        return open_path(wire, at, true, fault);
     }
-    fault->what = "not one of listen:, call: and serial:";
+    if ((at = behind(text, "unix-call:")) != NULL) {
+        return open_path(wire, at, false, fault);
+    }
+    if ((at = behind(text, "serial:")) != NULL) {
+        return open_serial(wire, at, fault);
+    }
+    fault->what =
+        "not one of listen:, call:, unix-listen:, unix-call: and serial:";
     return false;
 }
 
@@ -153,6 +205,32 @@ void linux_wires_name(struct linux_wire *wires, unsigned count,
     for (unsigned d = 0; d < count; d++) {
         wires[d].ends.self = (struct link_end){cube->self, (uint8_t)d};
         wires[d].ends.peer = cube_peer_of(cube, cube->self, d);
+    }
+}
+
+static const struct linux_wire *ending;
+static unsigned ending_count;
+
+/* What is called here may be called in a handler. */
+static void end(int signal_number)
+{
+    for (unsigned i = 0; i < ending_count; i++) {
+        if (ending[i].kind == LINUX_NET) {
+            tcp_wire_close(ending[i].net);
+        }
+    }
+    (void)raise(signal_number);
+}
+
+void linux_wires_end_with(const struct linux_wire *wires, unsigned count)
+{
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    struct sigaction action = {.sa_handler = end,
+                               .sa_flags = (int)SA_RESETHAND};
+    ending = wires;
+    ending_count = count;
+    for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++) {
+        (void)sigaction(signals[i], &action, NULL);
     }
 }
 
@@ -190,15 +268,19 @@ static void hear(struct linux_wire *wire, const struct pollfd *fds,
  */
 static void tell_of_key(struct linux_wire *wire)
 {
-    if (wire->kind == LINUX_NET && !wire->told && wire->net->other_key &&
-        wire->net->pause_us > 2 * TCP_PAUSE_MIN_US &&
-        !wire->net->config.listens) {
+    bool calls = wire->kind == LINUX_NET && !wire->net->config.listens;
+    if (!calls || wire->told || wire->net->pause_us <= 2 * TCP_PAUSE_MIN_US) {
+        return;
+    }
+    if (wire->net->other_key || wire->net->other_user) {
         wire->told = true;
-        fault_print(
-            &(struct linux_fault){.where = "--wire",
-                                  .value = wire->text,
-                                  .what = "answers, but with another key",
-                                  .next = "give both ends the same key file"});
+        fault_print(&(struct linux_fault){
+            .where = "--wire",
+            .value = wire->text,
+            .what = wire->net->other_key ? "answers, but with another key"
+                                         : "answers, but is another user's",
+            .next = wire->net->other_key ? "give both ends the same key file"
+                                         : "start both as the same user"});
     }
 }
 

@@ -1,10 +1,11 @@
-/* The wires of a node on Linux: connected sockets, or terminals.
+/* The wires of a node on Linux: sockets, or terminals.
  *
- * Memory: struct linux_wire, and for a wire over TCP to other machines struct
+ * Memory: struct linux_wire, and for a wire over TCP or at a path struct
  * tcp_wire, in memory that is given.  Work: as the drivers'.
  *
  *     linux_wire_inherit(&wire[0], fd);
- *     if (!linux_wire_open(&wire[1], "call:10.0.0.7:7001", key, &net, &fault))
+ *     if (!linux_wire_open(&wire[1], "call:10.0.0.7:7001", &guard, &net,
+ *                          &fault))
  *         return 1;
  *     board.pipes[0] = linux_wire_pipe(&wire[0]);
  *     linux_wires_idle(wire, 2, wait_us, 0);
@@ -17,6 +18,10 @@
 #include "transport/drivers/serial.h"
 #include "transport/drivers/tcp_wire.h"
 
+/* In the environment of a node that begins anew: what a user has to know once
+ * was said. */
+#define LINUX_AGAIN "INCODE_AGAIN"
+
 enum linux_wire_kind { LINUX_SOCKET, LINUX_TERMINAL, LINUX_NET };
 
 struct linux_wire {
@@ -24,7 +29,7 @@ struct linux_wire {
     struct secure_ends ends;   /* who is at them, as far as is known */
     struct tcp_pipe tcp;       /* a socket from the one who started the node */
     struct serial_pipe serial; /* a terminal */
-    struct tcp_wire *net;      /* TCP, by calling and listening, */
+    struct tcp_wire *net;      /* a socket, by calling and listening, */
     const char *text;          /* as it was asked for; */
     bool told;                 /* its trouble was told */
     char device[128];          /* of a terminal that was opened here */
@@ -37,17 +42,29 @@ struct linux_wire {
 /* An open file that the one who started the node gave it. */
 void linux_wire_inherit(struct linux_wire *wire, int fd);
 
+/* What a wire of TCP may do: with the key of the cube (NULL: it has none), or
+ * without. */
+struct linux_guard {
+    const uint8_t *key;
+    bool insecure;
+};
+
 /* "listen:ADDRESS:PORT", "call:ADDRESS:PORT" (addresses in numbers),
- * "serial:DEVICE:BAUD" or "serial:DEVICE:BAUD:rtscts".  key: of
- * the cube, or NULL.  False: *fault says what is wrong, and not where. */
+ * "unix-listen:PATH", "unix-call:PATH", "serial:DEVICE:BAUD" or
+ * "serial:DEVICE:BAUD:rtscts".  False: *fault says what is wrong, and not
+ * where. */
 bool linux_wire_open(struct linux_wire *wire, const char *text,
-                     const uint8_t *key, struct tcp_wire *net,
+                     const struct linux_guard *guard, struct tcp_wire *net,
                      struct linux_fault *fault);
 
 /* Once the node knows who it is: that its links are those of this cube; no
  * longer than CUBE_LINKS_MAX. */
 void linux_wires_name(struct linux_wire *wires, unsigned count,
                       const struct cube_config *cube);
+
+/* Removes the files of sockets that were made here, when a signal ends the
+ * process.  At most once, with all wires, which stay the caller's. */
+void linux_wires_end_with(const struct linux_wire *wires, unsigned count);
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 

@@ -18,20 +18,17 @@ enum { TEXT_MAX = 4 << 20 }; /* that of 1,024 nodes has half a MiB */
 static int read_key(struct host_cube_file *file, const config_setting_t *where,
                     struct host_error *error)
 {
-    const char *name = config_setting_get_string(where);
-    const char *slash = strrchr(file->path, '/');
     char message[HOST_NODE_OPTION_BYTES + 200];
-    if (name == NULL) {
+    if (config_setting_get_string(where) == NULL) {
         return host_cube_wrong(file, where, error,
                                "key: not a file's name; write it in "
                                "quotes");
     }
-    int beside =
-        name[0] == '/' || slash == NULL ? 0 : (int)(slash - file->path) + 1;
-    if (snprintf(file->key_path, sizeof file->key_path, "%.*s%s", beside,
-                 file->path, name) >= (int)sizeof file->key_path) {
+    if (host_cube_beside(file, where, file->key_path, sizeof file->key_path) !=
+        0) {
         return host_cube_wrong(file, where, error,
-                               "key: too long a path; move the file");
+                               "key: none, or too long a path; make one with: "
+                               "incode key FILE");
     }
     enum key_file_state state = key_file_read(file->key_path, file->key);
     int reason = state == KEY_FILE_UNREADABLE ? errno : 0;

@@ -24,7 +24,8 @@ enum { HOST_NODE_OPTIONS_MAX = 64, HOST_NODE_OPTION_BYTES = 256 };
 struct host_cube_wire {
     uint16_t node, to;
     unsigned line; /* of the file */
-    bool serial;   /* else TCP: `node` listens, `to` calls */
+    bool serial;   /* else a socket: `node` listens, `to` calls */
+    bool insecure; /* over TCP without a key */
     struct tcp_address at, via;
     char device[2][SERIAL_NAME_MAX]; /* at either end */
     uint32_t baud;
@@ -55,6 +56,13 @@ int host_cube_file_read(struct host_cube_file *file, const char *path,
 int host_cube_file_parse(struct host_cube_file *file, const char *path,
                          const char *text, struct host_error *error);
 void host_cube_file_free(struct host_cube_file *file);
+
+/* What its wires are, as statistics name it. */
+const struct host_link *host_cube_link(const struct host_cube_file *file);
+
+/* "FILE:LINE: the wire between node 0 and the host" */
+void host_cube_name_wire(const struct host_cube_file *file,
+                         const struct host_cube_wire *wire, char text[160]);
 
 /* The k-th wire of the host, 0 or 1; NULL: none. */
 const struct host_cube_wire *

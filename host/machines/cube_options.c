@@ -18,7 +18,8 @@ static void print_wire(const struct host_cube_wire *wire, unsigned link,
     }
     host_cube_print_address(first ? &wire->at : &wire->via, address,
                             sizeof address);
-    snprintf(text, HOST_NODE_OPTION_BYTES, "%u=%s:%s", link,
+    snprintf(text, HOST_NODE_OPTION_BYTES, "%u=%s%s:%s", link,
+             tcp_address_path(&wire->at) != NULL ? "unix-" : "",
              first ? "listen" : "call", address);
 }
 
@@ -55,15 +56,27 @@ unsigned host_cube_node_options(
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%.*s",
                  HOST_NODE_OPTION_BYTES - 1, file->key_path);
     }
+    char *insecure = NULL;
     for (unsigned d = 0; d <= file->dimension; d++) {
         const struct host_cube_wire *wire =
             d == file->dimension
                 ? host
                 : host_cube_between(file, node, node ^ 1u << d, &count);
-        if (wire != NULL) {
-            snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--wire");
-            print_wire(wire, d, wire->node == node, options[n++]);
+        if (wire == NULL) {
+            continue;
         }
+        if (wire->insecure && insecure == NULL) {
+            snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--insecure");
+            insecure = options[n++];
+            insecure[0] = '\0';
+        }
+        if (wire->insecure) {
+            size_t used = strlen(insecure);
+            snprintf(insecure + used, HOST_NODE_OPTION_BYTES - used, "%s%u",
+                     used == 0 ? "" : ",", d);
+        }
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--wire");
+        print_wire(wire, d, wire->node == node, options[n++]);
     }
     if (file->board != host_board_row(0)) {
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--board");

@@ -44,7 +44,12 @@ int host_cube_resolve(const struct host_cube_file *file,
                       const config_setting_t *where,
                       struct tcp_address *address, struct host_error *error);
 
-/* As it is written, in numbers. */
+/* A file's name as it is to be opened, beside the cube file unless it begins
+ * with a slash: 0, or -1 where it is none, or does not fit. */
+int host_cube_beside(const struct host_cube_file *file,
+                     const config_setting_t *where, char *path, size_t size);
+
+/* As it is written, in numbers; a path as it is. */
 void host_cube_print_address(const struct tcp_address *address, char *text,
                              size_t size);
 

@@ -94,9 +94,27 @@ int host_cube_resolve(const struct host_cube_file *file,
     return 0;
 }
 
+int host_cube_beside(const struct host_cube_file *file,
+                     const config_setting_t *where, char *path, size_t size)
+{
+    const char *name = config_setting_get_string(where);
+    const char *slash = strrchr(file->path, '/');
+    if (name == NULL || name[0] == '\0') {
+        return -1;
+    }
+    int folder =
+        name[0] == '/' || slash == NULL ? 0 : (int)(slash - file->path) + 1;
+    int length = snprintf(path, size, "%.*s%s", folder, file->path, name);
+    return length < (int)size ? 0 : -1;
+}
+
 void host_cube_print_address(const struct tcp_address *address, char *text,
                              size_t size)
 {
+    if (tcp_address_path(address) != NULL) {
+        snprintf(text, size, "%s", tcp_address_path(address));
+        return;
+    }
     char host[NI_MAXHOST], port[NI_MAXSERV];
     if (getnameinfo(&address->to.any, address->size, host, sizeof host, port,
                     sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0) {

@@ -51,6 +51,30 @@ static int read_line(const struct host_cube_file *file,
                : 0;
 }
 
+/* A wire over TCP is guarded by the cube's key, unless the user says that it
+ * is not. */
+static int read_guard(const struct host_cube_file *file,
+                      const config_setting_t *group,
+                      struct host_cube_wire *wire, struct host_error *error)
+{
+    const config_setting_t *insecure =
+        config_setting_get_member(group, "insecure");
+    if (insecure != NULL && config_setting_type(insecure) != CONFIG_TYPE_BOOL) {
+        return host_cube_wrong(
+            file, insecure, error,
+            "insecure: neither true nor false; give one of them");
+    }
+    wire->insecure = insecure != NULL && config_setting_get_bool(insecure) != 0;
+    if (!file->has_key && !wire->insecure) {
+        return host_cube_wrong(
+            file, config_setting_get_member(group, "tcp"), error,
+            "tcp without a key; make one with: incode key FILE, and add key = "
+            "\"FILE\"; at the top (or unix = \"PATH\"; on one machine, or "
+            "insecure = true; here)");
+    }
+    return 0;
+}
+
 static int read_net(const struct host_cube_file *file,
                     const config_setting_t *group, struct host_cube_wire *wire,
                     struct host_error *error)
@@ -64,13 +88,24 @@ static int read_net(const struct host_cube_file *file,
     if (via != NULL && host_cube_resolve(file, via, &wire->via, error) != 0) {
         return error->code;
     }
-    if (!file->has_key && !(tcp_address_is_loopback(&wire->at) &&
-                            tcp_address_is_loopback(&wire->via))) {
-        return host_cube_wrong(
-            file, at, error,
-            "tcp between machines without a key; add key = \"FILE\" "
-            "at the top");
+    return read_guard(file, group, wire, error);
+}
+
+static int read_path(const struct host_cube_file *file,
+                     const config_setting_t *group, struct host_cube_wire *wire,
+                     struct host_error *error)
+{
+    const config_setting_t *unix_path =
+        config_setting_get_member(group, "unix");
+    char path[TCP_PATH_MAX + 1];
+    if (host_cube_beside(file, unix_path, path, sizeof path) != 0 ||
+        tcp_address_set_path(&wire->at, path) != 0) {
+        return host_cube_wrong(file, unix_path, error,
+                               "unix: not a path of 1 to 107 bytes, that of "
+                               "this file's folder included; write "
+                               "\"/run/cube/01\"");
     }
+    wire->via = wire->at;
     return 0;
 }
 
@@ -102,8 +137,9 @@ static int read_end(const struct host_cube_file *file,
 int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
                         struct host_error *error)
 {
-    static const char *const names[] = {"node",   "to",   "tcp",    "via",
-                                        "serial", "baud", "rtscts", NULL};
+    static const char *const names[] = {"node",     "to",     "tcp",  "via",
+                                        "unix",     "serial", "baud", "rtscts",
+                                        "insecure", NULL};
     struct host_cube_wire *wire = &file->wire[file->wires];
     memset(wire, 0, sizeof *wire);
     wire->line = config_setting_source_line(group);
@@ -120,14 +156,16 @@ int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
             "one binary digit");
     }
     bool tcp = config_setting_get_member(group, "tcp") != NULL;
+    bool local = config_setting_get_member(group, "unix") != NULL;
     bool serial = config_setting_get_member(group, "serial") != NULL;
-    if (tcp == serial) {
+    if (tcp + local + serial != 1) {
         return host_cube_wrong(
             file, group, error,
-            "neither or both of tcp and serial; give one of them");
+            "none or several of tcp, unix and serial; give one of them");
     }
-    int status = serial ? read_line(file, group, wire, error)
-                        : read_net(file, group, wire, error);
+    int status = serial  ? read_line(file, group, wire, error)
+                 : local ? read_path(file, group, wire, error)
+                         : read_net(file, group, wire, error);
     if (serial && (file->serial_baud == 0 || wire->baud < file->serial_baud)) {
         file->serial_baud = wire->baud;
     }
@@ -171,15 +209,29 @@ static unsigned owner(const struct host_cube_file *file, unsigned node)
 /* --- all of them -----------------------------------------------------------
  */
 
+/* Whether both have an end on one machine, as far as that is known. */
+static bool meet(const struct host_cube_file *file,
+                 const struct host_cube_wire *a, const struct host_cube_wire *b)
+{
+    return owner(file, a->node) == owner(file, b->node) ||
+           owner(file, a->node) == owner(file, b->to) ||
+           owner(file, a->to) == owner(file, b->node) ||
+           owner(file, a->to) == owner(file, b->to);
+}
+
 /* Two that listen at one address: on one machine, or at one address of all. */
 static bool same_address(const struct host_cube_file *file,
                          const struct host_cube_wire *a,
                          const struct host_cube_wire *b)
 {
-    return !a->serial && !b->serial && a->at.size == b->at.size &&
-           memcmp(&a->at.to, &b->at.to, a->at.size) == 0 &&
-           (!tcp_address_is_any(&a->at) ||
-            owner(file, a->node) == owner(file, b->node));
+    if (a->serial || b->serial || a->at.size != b->at.size ||
+        memcmp(&a->at.to, &b->at.to, a->at.size) != 0) {
+        return false;
+    }
+    return tcp_address_path(&a->at) != NULL ? meet(file, a, b)
+           : tcp_address_is_any(&a->at)
+               ? owner(file, a->node) == owner(file, b->node)
+               : true;
 }
 
 /* The device at the ends of both that is the same one; NULL: none. */
@@ -207,6 +259,31 @@ static void name_wire(const struct host_cube_wire *wire, char text[40])
     } else {
         snprintf(text, 40, "nodes %u and %u", wire->node, wire->to);
     }
+}
+
+void host_cube_name_wire(const struct host_cube_file *file,
+                         const struct host_cube_wire *wire, char text[160])
+{
+    char ends[40];
+    name_wire(wire, ends);
+    snprintf(text, 160, "%.80s:%u: the wire between %s", file->path, wire->line,
+             ends);
+}
+
+const struct host_link *host_cube_link(const struct host_cube_file *file)
+{
+    const char *first = NULL;
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        const char *name = w->serial                          ? "serial"
+                           : tcp_address_path(&w->at) != NULL ? "unix"
+                                                              : "tcp";
+        if (first != NULL && strcmp(first, name) != 0) {
+            return host_link_named("mixed");
+        }
+        first = name;
+    }
+    return host_link_named(first);
 }
 
 int host_cube_check_ends(const struct host_cube_file *file,

@@ -21,6 +21,12 @@ static const struct host_link rows[] = {
      .ranks = true},
 };
 
+/* What cube files have besides. */
+static const struct host_link of_files[] = {
+    {.name = "unix", .help = "sockets with a path"},
+    {.name = "mixed", .help = "wires of several kinds"},
+};
+
 const struct host_link *host_link_row(unsigned i)
 {
     return i < sizeof rows / sizeof rows[0] ? &rows[i] : NULL;
@@ -35,10 +41,16 @@ const char *host_link_name(unsigned i)
 const struct host_link *host_link_named(const char *name)
 {
     const struct host_link *link;
-    for (unsigned i = 0; (link = host_link_row(i)) != NULL; i++) {
+    unsigned i;
+    for (i = 0; (link = host_link_row(i)) != NULL; i++) {
         if (strcmp(name, link->name) == 0) {
-            break;
+            return link;
         }
     }
-    return link;
+    for (i = 0; i < sizeof of_files / sizeof of_files[0]; i++) {
+        if (strcmp(name, of_files[i].name) == 0) {
+            return &of_files[i];
+        }
+    }
+    return NULL;
 }

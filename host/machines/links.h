@@ -23,11 +23,13 @@ struct host_link {
     bool ranks;        /* the nodes are ranks, which mpirun starts */
 };
 
-/* Row i, the first being the default; NULL past the last. */
+/* Row i of those that --link knows, the first being the default; NULL past the
+ * last. */
 const struct host_link *host_link_row(unsigned i);
 const char *host_link_name(unsigned i);
 
-/* NULL: there is none of that name. */
+/* Of those, or of those that only a cube file has (`unix`, `mixed`); NULL:
+ * there is none of that name. */
 const struct host_link *host_link_named(const char *name);
 
 #endif

@@ -33,8 +33,7 @@ int host_port_net(struct host_port *port, const struct tcp_wire_config *config,
     memset(port, 0, sizeof *port);
     if (tcp_wire_open(&port->net, config) != 0) {
         return host_fail(error, HOST_CUBE,
-                         "the host's wire: %s; give the cube a key, or a "
-                         "loopback address",
+                         "the host's wire: %s; see incode cube FILE",
                          strerror(errno));
     }
     port->kind = HOST_PORT_NET;
@@ -112,6 +111,11 @@ void host_port_rest(struct host_port *port, uint64_t rest_us)
 bool host_port_other_key(const struct host_port *port)
 {
     return port->kind == HOST_PORT_NET && port->net.other_key;
+}
+
+bool host_port_other_user(const struct host_port *port)
+{
+    return port->kind == HOST_PORT_NET && port->net.other_user;
 }
 
 void host_port_close(struct host_port *port)

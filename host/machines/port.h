@@ -61,6 +61,9 @@ void host_port_rest(struct host_port *port, uint64_t rest_us);
 /* Whether what was last reached by it could not prove that it has our key. */
 bool host_port_other_key(const struct host_port *port);
 
+/* Whether it is run by another user, where the kernel says so. */
+bool host_port_other_user(const struct host_port *port);
+
 void host_port_close(struct host_port *port);
 
 #endif

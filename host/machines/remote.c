@@ -8,7 +8,9 @@
 #include <unistd.h>
 
 #include "host/base/clock.h"
+#include "host/base/progress.h"
 #include "transport/drivers/secure_sodium.h"
+#include "transport/drivers/unix_file.h"
 
 /* In the child: becomes the node. */
 static void become_node(const void *context, unsigned node)
@@ -53,9 +55,18 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
         }
     } else {
         struct tcp_wire_config config = {.address = wire->via};
-        config.suite = file->has_key ? &secure_sodium : NULL;
-        config.key = file->key;
         config.ends = &r->ends[r->ports];
+        config.insecure = wire->insecure;
+        config.key = wire->insecure ? NULL : file->key;
+        config.suite = wire->insecure ? NULL : &secure_sodium;
+        if (wire->insecure) {
+            char name[160];
+            host_cube_name_wire(file, wire, name);
+            host_note("%s is insecure: whoever reaches its address can take it "
+                      "over, and send false results; make a key with: incode "
+                      "key FILE",
+                      name);
+        }
         if (host_port_net(port, &config, error) != 0) {
             return error->code;
         }
@@ -98,6 +109,13 @@ void host_remote_stop(struct host_remote *remote)
     for (unsigned i = 0; i < remote->file->nodes; i++) {
         (void)host_child_kill(&remote->process[i]);
         host_child_wait(&remote->process[i]);
+    }
+    for (unsigned i = 0; i < remote->file->wires; i++) {
+        const struct host_cube_wire *wire = &remote->file->wire[i];
+        if (remote->file->local[wire->node] &&
+            tcp_address_path(&wire->at) != NULL) {
+            unix_file_remove(&wire->at);
+        }
     }
     while (remote->ports > 0) {
         host_port_close(&remote->port[--remote->ports]);
@@ -159,6 +177,9 @@ static const char *machine_doubt(void *context, unsigned node)
             host_port_other_key(&r->port[i])) {
             doubt = "answers, but with another key; give both ends the same "
                     "key file";
+        } else if (host_cube_host_wire(r->file, i)->node == node &&
+                   host_port_other_user(&r->port[i])) {
+            doubt = "answers, but is another user's; start it as the same user";
         }
     }
     return doubt;

@@ -58,8 +58,7 @@ int host_run_on_cube(struct host_run_options *options, struct host_error *error)
     options->nodes = the_file.nodes;
     options->memory = the_file.memory;
     options->board = the_file.board;
-    options->link =
-        host_link_named(the_file.serial_baud != 0 ? "serial" : "tcp");
+    options->link = host_cube_link(&the_file);
     options->begin = begin;
     return 0;
 }

@@ -235,9 +235,8 @@ check adding/board/statistics 'another board' \
     [ "$(stat_of "$scratch/toy.json" board)" = toy ]
 printf 'dimension = 0; board = "z80"; links = ();' > "$scratch/z80.cube"
 says adding/board/cube-file '"linux" or "toy"' "$new" cube "$scratch/z80.cube"
-take_ports
 printf '%s\n' 'dimension = 0; board = "toy"; start = [0];' \
-    "links = ({ node = 0; to = \"host\"; tcp = \"127.0.0.1:$base\"; });" \
+    'links = ({ node = 0; to = "host"; unix = "toy.socket"; });' \
     > "$scratch/toy.cube"
 says adding/board/cube-line 'incode-node-toy --node 0' \
     "$new" cube "$scratch/toy.cube"

@@ -2,7 +2,6 @@
 # The same bytes over every kind of wire, also where the wire suffers.  What
 # waits more than it works goes on beside the rest.
 . tests/system/lib.sh
-umask 077 # for keys
 
 points=$scratch/points.npy
 "$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null
@@ -44,7 +43,7 @@ connected() {
 sides=
 beside() {
     mkdir "$scratch/$1"
-    openssl rand -hex 32 > "$scratch/$1/cube.key"
+    "$INCODE" key "$scratch/$1/cube.key"
     (scratch=$scratch/$1; "$1"; echo 'done') \
         > "$scratch/$1.said" 2> "$scratch/$1.errors" &
     sides="$sides $1:$!"
@@ -77,9 +76,10 @@ end_nodes() {
 }
 
 # make_cube FILE [KEY]: 8 nodes on TCP, started by the host, each wire through
-# the relay; $through its ports.
+# the relay, insecure without a key; $through its ports.
 make_cube() {
-    local node to wire=0
+    local node to wire=0 insecure='insecure = true;'
+    [ -z "${2:-}" ] || insecure=
     through=
     {
         printf 'dimension = 3;\nstart = [0, 1, 2, 3, 4, 5, 6, 7];\n'
@@ -92,7 +92,8 @@ make_cube() {
                 [ $wire = 0 ] || printf ',\n'
                 printf '{ node = %d; to = %s; tcp = "127.0.0.1:%d"; ' $node \
                     "$to" $((base + wire))
-                printf 'via = "127.0.0.1:%d"; }' $((base + 100 + wire))
+                printf 'via = "127.0.0.1:%d"; %s }' $((base + 100 + wire)) \
+                    "$insecure"
                 through="$through $((base + 100 + wire)):$((base + wire))"
                 wire=$((wire + 1))
             done
@@ -109,7 +110,7 @@ wrong_keys() {
 	links = ( { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 50))"; } );
 END
     "$INCODE" cube "$scratch/one.cube" > "$scratch/options"
-    openssl rand -hex 32 > "$scratch/other.key"
+    "$INCODE" key "$scratch/other.key"
     refused() { # NAME SED
         local began=$SECONDS
         # shellcheck disable=SC2046
@@ -129,9 +130,14 @@ END
     refused 'another key: exit 4' 's/cube.key/other.key/'
     check 'links/another key: it says so' "$(last "$scratch/errors")" \
         grep -q 'link 0: answers, but with another key; ' "$scratch/errors"
-    refused 'no key: exit 4' 's/--key [^ ]*//'
+    refused 'no key: exit 4' 's/--key [^ ]*/--insecure/'
+    check 'links/no key: the node says what that means' \
+        "$(last "$scratch/said")" grep -q \
+        "^incode-node: --wire 0=listen:.*$((base + 50)): insecure: .*; make a key" \
+        "$scratch/said"
     check 'links/no output without a key' 'it left one' \
         test ! -e "$scratch/out.npy"
+    rm "$scratch/said"
     # Between nodes it is the one that calls who hears of it.
     printf 'dimension = 1; key = "cube.key"; links = (
         { node = 0; to = "host"; tcp = "127.0.0.1:%d"; },
@@ -148,21 +154,21 @@ END
         grep -q "^incode-node: --wire .*$((base + 52)): answers, but with" \
         "$scratch/said"
     rm "$scratch/said"
-    sed -i 's/--key [^ ]*//; s/127.0.0.1/0.0.0.0/' "$scratch/options"
+    sed -i 's/--key [^ ]*//' "$scratch/options"
     # shellcheck disable=SC2046
-    "$BUILD/"$(cat "$scratch/options") 2> "$scratch/said" &
-    node=$!
-    await test -s "$scratch/said"
-    kill $node
-    wait $node 2> /dev/null
-    check 'links/without a key on loopback only' "$(cat "$scratch/said")" \
-        grep -q 'no --key: listens for this machine' "$scratch/said"
+    within "$BUILD/"$(cat "$scratch/options") 2> "$scratch/said"
+    status=$?
+    check 'links/without a key it does not listen' \
+        "exit $status: $(cat "$scratch/said")" test $status = 2 -a -n "$(
+            grep ': a wire over TCP wants a key; make one with: incode key FILE' \
+                "$scratch/said")"
 }
 
 # A wire that was never put in: where its end calls, nobody listens.
 missing_wire() {
     cat > "$scratch/missing.cube" <<-END
 	dimension = 2;
+	key = "cube.key";
 	start = [0, 1, 2];
 	links = (
 	    { node = 0; to = "host"; tcp = "127.0.0.1:$((base + 60))"; },
@@ -185,12 +191,12 @@ END
 # One that no node needs to reach node 0 or to be reached by it.
 unneeded_wire() {
     base=$((base + 200))
-    make_cube "$scratch/unneeded.cube"
+    make_cube "$scratch/unneeded.cube" cube.key
     sed -i 's/ via = "[^"]*";//' "$scratch/unneeded.cube"
     same 'no wire is missing' --cube "$scratch/unneeded.cube"
     check 'links/no false alarm' "$(last "$scratch/errors")" \
         test ! -s "$scratch/errors"
-    sed -i '/node = 5; to = 7;/s/; }/; via = "127.0.0.1:1"; }/' \
+    sed -i '/node = 5; to = 7;/s/;  }/; via = "127.0.0.1:1"; }/' \
         "$scratch/unneeded.cube"
     same 'a wire that nothing needs' --cube "$scratch/unneeded.cube" \
         --stats "$scratch/stats.json"
@@ -201,6 +207,62 @@ unneeded_wire() {
     check 'links/a wire that nothing needs is counted' 'it is not' \
         test "$(stat_of "$scratch/stats.json" missing_wires)" = 1 -a \
         "$(stat_of "$scratch/stats.json" generations)" = 1
+}
+
+# On one machine a path does, without a key: nodes that a user started, and over
+# what they leave when they are killed those that the host starts.
+at_paths() {
+    local points=$scratch/points.npy first=$scratch/first.npy
+    cat > "$scratch/paths.cube" <<-END
+	dimension = 1;
+	links = ( { node = 0; to = "host"; unix = "h"; },
+	          { node = 1; to = 0; unix = "10"; } );
+END
+    "$INCODE" gen uniform 2000 -o "$points" 2> /dev/null
+    "$INCODE" run "$points" -q --nodes 1 -o "$first" 2> "$scratch/errors"
+    start_nodes "$scratch/paths.cube"
+    same 'nodes at paths' --cube "$scratch/paths.cube" \
+        --stats "$scratch/stats.json"
+    check 'links/nodes at paths: said so' "$(last "$scratch/errors")" \
+        test "$(stat_of "$scratch/stats.json" link)" = unix -a \
+        ! -s "$scratch/errors"
+    end_nodes
+    check 'links/nodes that are killed leave their sockets' 'they do not' \
+        test -S "$scratch/h" -a -S "$scratch/10"
+    sed -i '1s/$/ start = [0, 1];/' "$scratch/paths.cube"
+    same 'nodes that the host starts, at paths' --cube "$scratch/paths.cube"
+    check 'links/the host leaves no sockets' "$(ls "$scratch")" \
+        test ! -e "$scratch/h" -a ! -e "$scratch/10"
+    sed -i '1s/start.*//' "$scratch/paths.cube"
+    start_nodes "$scratch/paths.cube"
+    await test -S "$scratch/h" -a -S "$scratch/10"
+    # shellcheck disable=SC2086
+    kill $nodes
+    # shellcheck disable=SC2086
+    wait $nodes 2> /dev/null
+    check 'links/nodes that are ended leave no sockets' "$(ls "$scratch")" \
+        test ! -e "$scratch/h" -a ! -e "$scratch/10"
+    sed -i '1s/$/ start = [0, 1];/; s/unix = "h";/tcp = "127.0.0.1:'$((base + 55
+        ))'"; insecure = true;/' "$scratch/paths.cube"
+    same 'a wire that is insecure' --cube "$scratch/paths.cube" \
+        --stats "$scratch/stats.json"
+    check 'links/a wire that is insecure: the host says so' \
+        "$(cat "$scratch/errors")" grep -q \
+        '^incode: .*:2: the wire between node 0 and the host is insecure: .*; ' \
+        "$scratch/errors"
+    check 'links/a wire that is insecure: and the node' \
+        "$(cat "$scratch/errors")" test "$(grep -c \
+            '^incode-node: --wire 1=listen:.*: insecure: ' \
+            "$scratch/errors")" = 1
+    check 'links/wires of two kinds' 'not so' \
+        test "$(stat_of "$scratch/stats.json" link)" = mixed
+    cp boards/linux/examples/*.cube "$scratch"
+    for file in local mixed network serial; do
+        "$INCODE" cube "$scratch/$file.cube" \
+            > "$scratch/output" 2> "$scratch/errors"
+        check "links/the example $file.cube" "$(last "$scratch/errors")" \
+            test $? = 0 -a -s "$scratch/output"
+    done
 }
 
 # A second host is sent away and does no harm; one that comes after a host was
@@ -260,14 +322,14 @@ END
     end_nodes
 }
 
-for part in wrong_keys missing_wire two_hosts; do
+for part in wrong_keys missing_wire at_paths two_hosts; do
     beside $part
 done
 
 # --- a cube file, and a bad network -----------------------------------------
 
 RELAY=${RELAY:-$BUILD/tests/relay}
-openssl rand -hex 32 > "$scratch/cube.key"
+"$INCODE" key "$scratch/cube.key"
 
 # relayed NAME SEED BYTES_A_FAULT MS_A_CLOSE DELAY_MS CUBE [WAS]: the same bytes,
 # and what the relay must have done.

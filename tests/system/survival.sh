@@ -156,12 +156,10 @@ printf '#!/bin/sh\nexec sleep 600\n' > "$scratch/mute"
 chmod +x "$scratch/dies" "$scratch/mute"
 hopeless 'a node program that a signal ends' "$scratch/dies"
 hopeless 'a node program that says nothing' "$scratch/mute"
-take_ports
 cat > "$scratch/one.cube" <<-END
 	dimension = 0;
 	start = [0];
-	links = ( { node = 0; to = "host";
-	            tcp = "127.0.0.1:$base"; } );
+	links = ( { node = 0; to = "host"; unix = "one.socket"; } );
 END
 refuses 'survival/a node of a cube file that a signal ends' 4 \
     '^incode: node 0 link 0: ended 3 times, the last by signal 11 ' \

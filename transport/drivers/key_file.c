@@ -66,9 +66,9 @@ struct key_file_text key_file_text(enum key_file_state state)
         [KEY_FILE_WRITABLE] = {"can be written by others",
                                "chmod 600 it, and see that it is still yours"},
         [KEY_FILE_UNREADABLE] = {"cannot be read",
-                                 "give the key's file, or make one: openssl "
-                                 "rand -hex 32 > FILE"},
+                                 "give the key's file, or make one with: "
+                                 "incode key FILE"},
         [KEY_FILE_NO_KEY] = {"not a file of 64 hexadecimal digits",
-                             "make one: openssl rand -hex 32 > FILE"}};
+                             "make one with: incode key FILE"}};
     return texts[state];
 }

@@ -1,16 +1,15 @@
 #include "tcp_wire.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "transport/secure_wipe.h"
+#include "unix_file.h"
 
 static uint64_t clock_us(void)
 {
@@ -19,68 +18,10 @@ static uint64_t clock_us(void)
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
-/* --- addresses ----------------------------------------------------------- */
-
-int tcp_address_parse(struct tcp_address *address, const char *text)
+/* Whether the kernel says who is at the other end. */
+static bool is_local(const struct tcp_wire *wire)
 {
-    struct sockaddr_in *v4 = (struct sockaddr_in *)&address->to;
-    struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)&address->to;
-    char host[INET6_ADDRSTRLEN + 2], *end;
-    const char *colon = strrchr(text, ':');
-    memset(address, 0, sizeof *address);
-    if (colon == NULL || colon[1] < '0' || colon[1] > '9' ||
-        (size_t)(colon - text) >= sizeof host) {
-        return -1;
-    }
-    unsigned long port = strtoul(colon + 1, &end, 10);
-    if (*end != '\0' || port == 0 || port > 65535) {
-        return -1;
-    }
-    size_t length = (size_t)(colon - text);
-    memcpy(host, text, length);
-    host[length] = '\0';
-    if (length > 2 && host[0] == '[' && host[length - 1] == ']') {
-        host[length - 1] = '\0';
-        v6->sin6_family = AF_INET6;
-        v6->sin6_port = htons((uint16_t)port);
-        address->size = sizeof *v6;
-        return inet_pton(AF_INET6, host + 1, &v6->sin6_addr) == 1 ? 0 : -1;
-    }
-    v4->sin_family = AF_INET;
-    v4->sin_port = htons((uint16_t)port);
-    address->size = sizeof *v4;
-    return inet_pton(AF_INET, host, &v4->sin_addr) == 1 ? 0 : -1;
-}
-
-bool tcp_address_is_loopback(const struct tcp_address *address)
-{
-    const struct sockaddr_in *v4 = (const struct sockaddr_in *)&address->to;
-    const struct sockaddr_in6 *v6 = (const struct sockaddr_in6 *)&address->to;
-    if (address->to.any.sa_family == AF_INET6) {
-        return IN6_IS_ADDR_LOOPBACK(&v6->sin6_addr);
-    }
-    return address->to.any.sa_family == AF_INET &&
-           ntohl(v4->sin_addr.s_addr) >> 24 == 127;
-}
-
-bool tcp_address_is_any(const struct tcp_address *address)
-{
-    const struct sockaddr_in *v4 = (const struct sockaddr_in *)&address->to;
-    const struct sockaddr_in6 *v6 = (const struct sockaddr_in6 *)&address->to;
-    return address->to.any.sa_family == AF_INET6
-               ? IN6_IS_ADDR_UNSPECIFIED(&v6->sin6_addr)
-               : v4->sin_addr.s_addr == htonl(INADDR_ANY);
-}
-
-void tcp_address_to_loopback(struct tcp_address *address)
-{
-    struct sockaddr_in *v4 = (struct sockaddr_in *)&address->to;
-    struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)&address->to;
-    if (address->to.any.sa_family == AF_INET6) {
-        v6->sin6_addr = in6addr_loopback;
-    } else {
-        v4->sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    }
+    return tcp_address_path(&wire->config.address) != NULL;
 }
 
 /* --- connections that are not proven ------------------------------------- */
@@ -164,8 +105,10 @@ static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
     }
     /* A peer that answers no more is a broken connection, in the end. */
     unsigned silent_ms = TCP_SILENT_MS;
-    (void)setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &silent_ms,
-                     sizeof silent_ms);
+    if (!is_local(wire)) {
+        (void)setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &silent_ms,
+                         sizeof silent_ms);
+    }
     c->fd = fd;
     c->connected = connected;
     c->since_us = now_us;
@@ -278,6 +221,10 @@ static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
                  uint64_t now_us)
 {
     struct link_pipe pipe = tcp_link_pipe(&c->pipe);
+    wire->other_user = is_local(wire) && !unix_file_peer_is_ours(c->fd);
+    if (wire->other_user) {
+        return -1;
+    }
     if (wire->config.suite == NULL) {
         return wire->config.listens ? hear_first(wire, c, now_us) : 1;
     }
@@ -327,7 +274,9 @@ static uint64_t patience(const struct tcp_wire *wire,
 static void call_again(struct tcp_wire *wire, const struct tcp_candidate *c,
                        bool late, uint64_t now_us)
 {
-    bool crowded_out = late ? !c->connected : c->connected && !wire->other_key;
+    bool crowded_out =
+        late ? !c->connected
+             : c->connected && !wire->other_key && !wire->other_user;
     uint64_t *again = c->connected ? &wire->prove_us : &wire->answer_us;
     if (late) {
         *again = within(0, 2 * *again);
@@ -475,17 +424,25 @@ struct link_pipe tcp_wire_pipe(struct tcp_wire *wire)
 
 /* --- opening ------------------------------------------------------------- */
 
-static int listen_there(struct tcp_wire *wire)
+static int bind_there(const struct tcp_wire *wire, int fd)
 {
     const struct tcp_address *at = &wire->config.address;
     int on = 1;
-    int fd = socket(at->to.any.sa_family,
+    if (is_local(wire)) {
+        return unix_file_bind(fd, at);
+    }
+    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    return bind(fd, &at->to.any, at->size);
+}
+
+static int listen_there(struct tcp_wire *wire)
+{
+    int fd = socket(wire->config.address.to.any.sa_family,
                     SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0) {
         return -1;
     }
-    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (tcp_prepare(fd) != 0 || bind(fd, &at->to.any, at->size) != 0 ||
+    if (tcp_prepare(fd) != 0 || bind_there(wire, fd) != 0 ||
         listen(fd, TCP_QUEUE_MAX) != 0) {
         int reason = errno;
         close(fd);
@@ -508,7 +465,9 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         wire->candidate[i].fd = -1;
     }
-    if (config->suite == NULL && !tcp_address_is_loopback(&config->address)) {
+    if (is_local(wire)) {
+        wire->config.suite = NULL;
+    } else if (config->suite == NULL && !config->insecure) {
         errno = EACCES;
         return -1;
     }
@@ -524,6 +483,9 @@ void tcp_wire_close(struct tcp_wire *wire)
     if (wire->listener >= 0) {
         close(wire->listener);
         wire->listener = -1;
+        if (is_local(wire)) {
+            unix_file_remove(&wire->config.address);
+        }
     }
 }
 

@@ -1,8 +1,11 @@
-/* A wire over TCP between machines: one end listens, the other calls, and calls
- * again when the connection breaks, with growing pauses, while the wire's pipe
- * never waits.  With a key both ends prove that they know it before a byte
- * passes, and every record is authenticated (secure.h); without, an end
- * listens on and calls loopback addresses only.
+/* A wire over TCP between machines, or over a socket with a path on one (which
+ * is the same, but for unix_file.h): one end listens, the other calls, and
+ * calls again when the connection breaks, with growing pauses, while the wire's
+ * pipe never waits.  With a key both ends prove that they know it before a byte
+ * passes, and every record is authenticated (secure.h).  Without one, it is
+ * open only if that is asked for, as `insecure`: whoever reaches the address
+ * can take the wire over.  At a path the kernel says who calls, and no key is
+ * needed.
  *
  * Strangers: at most TCP_CANDIDATES_MAX connections are being proven at a time,
  * each for TCP_PROVE_US at most; the oldest of those that have not begun as the
@@ -30,10 +33,10 @@
 #define TRANSPORT_DRIVERS_TCP_WIRE_H
 
 #include <poll.h>
-#include <sys/socket.h>
 
 #include "transport/secure.h"
 #include "tcp.h"
+#include "tcp_address.h"
 
 enum {
     TCP_CANDIDATES_MAX = 16,
@@ -54,29 +57,10 @@ enum {
     TCP_PAUSE_MAX_US = 1000000, /* else up to this */
 };
 
-struct tcp_address {
-    union {
-        struct sockaddr any;
-        struct sockaddr_storage storage;
-    } to;
-    socklen_t size;
-};
-
-/* "127.0.0.1:7000", "[::1]:7000": numbers alone, no names.  0, or -1. */
-int tcp_address_parse(struct tcp_address *address, const char *text);
-
-/* Of this machine only: 127.0.0.0/8 or ::1. */
-bool tcp_address_is_loopback(const struct tcp_address *address);
-
-/* All addresses of a machine: 0.0.0.0 or ::. */
-bool tcp_address_is_any(const struct tcp_address *address);
-
-/* Makes a loopback address of it, with the same port. */
-void tcp_address_to_loopback(struct tcp_address *address);
-
 struct tcp_wire_config {
     struct tcp_address address;
     bool listens;                     /* there; else calls it */
+    bool insecure;                    /* over TCP without a key */
     const struct secure_suite *suite; /* NULL: no key */
     const uint8_t *key;               /* SECURE_KEY_BYTES, stay the caller's */
     /* Which nodes and ports are at its ends, as far as is known when a
@@ -109,6 +93,7 @@ struct tcp_wire {
     bool replaced;               /* by a newer one: the link hears of a break */
     bool quiet;                  /* nobody called when it was last waited for */
     bool other_key;              /* the last one called had another key */
+    bool other_user;             /* or is run by another user */
     struct secure_source source; /* of what makes each opening another */
     uint64_t call_us, pause_us;
     uint64_t answer_us, prove_us; /* patience with the peer's answer, and with
@@ -122,8 +107,8 @@ struct tcp_wire {
     int fault;                       /* errno of the last call, 0: none */
 };
 
-/* 0, or -1 and errno: EACCES for an address that a wire without a key must not
- * use, or why it cannot listen.  A peer that is not there yet is no fault. */
+/* 0, or -1 and errno: EACCES without a key over TCP, if that is not meant, or
+ * why it cannot listen.  A peer that is not there yet is no fault. */
 int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config);
 void tcp_wire_close(struct tcp_wire *wire);
 

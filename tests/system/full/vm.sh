@@ -51,8 +51,6 @@ check 'vm/the host program for arm64' "$(last "$scratch/said")" \
 
 # --- the machine --------------------------------------------------------------
 
-take_ports
-port=$base
 disk=$scratch/disk
 mkdir -p "$disk/bin" "$disk/proc" "$disk/sys" "$disk/dev"
 cp "$vm/root/bin/busybox" "$vm/build/incode" "$disk/bin/"
@@ -63,7 +61,7 @@ make_cube() { # HOST'S-DEVICE NODE'S-DEVICE
 		dimension = 1;
 		links = (
 		    { node = 0; to = "host"; serial = ["$2", "$1"]; rtscts = false; },
-		    { node = 0; to = 1; tcp = "127.0.0.1:$port"; }
+		    { node = 0; to = 1; unix = "$scratch/01.socket"; }
 		);
 	END
 }

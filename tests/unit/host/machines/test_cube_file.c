@@ -86,6 +86,7 @@ static void nodes_are_started_as_it_says(void **unused)
     assert_true(file.has_key && file.serial_baud == 921600);
     assert_int_equal(file.key[0], 0);
     assert_int_equal(file.key[31], 0x1f);
+    assert_string_equal(host_cube_link(&file)->name, "mixed");
     assert_true(file.local[1] && !file.local[0]);
     assert_int_equal(host_cube_host_wire(&file, 0)->node, 0);
     assert_int_equal(host_cube_host_wire(&file, 1)->node, 1);
@@ -108,6 +109,54 @@ static void nodes_are_started_as_it_says(void **unused)
     assert_true(has(options, count, "--wire", "1=listen:127.0.0.1:7001") ||
                 has(options, count, "--wire", "1=listen:[::1]:7001"));
     host_cube_file_free(&file);
+}
+
+static const char *const local =
+    "dimension = 1; start = [1];\n"
+    "links = (\n"
+    "  { node = 0; to = \"host\"; unix = \"h\"; },\n"
+    "  { node = 1; to = 0; %s; },\n"
+    "  { node = 1; to = \"host\"; %s; }\n"
+    ");\n";
+
+/* Paths beside the file or from the root, wires that are insecure, and what
+ * the statistics call them all. */
+static void wires_without_a_key(void **unused)
+{
+    static const struct {
+        const char *one, *two, *first, *second, *insecure, *link;
+    } cases[] = {
+        {"unix = \"/run/01\"", "unix = \"b\"", "0=unix-listen:/run/01",
+         "1=unix-listen:%s/b", NULL, "unix"},
+        {"tcp = \"127.0.0.1:5\"; insecure = true", "unix = \"b\"",
+         "0=listen:127.0.0.1:5", "1=unix-listen:%s/b", "0", "mixed"},
+        {"tcp = \"127.0.0.1:5\"; insecure = true",
+         "tcp = \"127.0.0.1:6\"; insecure = true", "0=listen:127.0.0.1:5",
+         "1=listen:127.0.0.1:6", "0,1", "mixed"},
+    };
+    static struct host_cube_file file;
+    static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
+    struct host_error error = {0};
+    char text[1024], second[HOST_NODE_OPTION_BYTES];
+    (void)unused;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        snprintf(text, sizeof text, local, cases[i].one, cases[i].two);
+        write_file(path, text);
+        assert_int_equal(host_cube_file_read(&file, path, &error), 0);
+        assert_string_equal(host_cube_link(&file)->name, cases[i].link);
+        unsigned count = host_cube_node_options(&file, 1, options);
+        snprintf(second, sizeof second, cases[i].second, directory);
+        assert_true(has(options, count, "--wire", cases[i].first));
+        assert_true(has(options, count, "--wire", second));
+        assert_true(cases[i].insecure == NULL ||
+                    has(options, count, "--insecure", cases[i].insecure));
+        host_cube_file_free(&file);
+    }
+    /* one path twice */
+    snprintf(text, sizeof text, local, "unix = \"b\"", "unix = \"b\"");
+    write_file(path, text);
+    assert_int_equal(host_cube_file_read(&file, path, &error), 3);
+    assert_non_null(strstr(error.text, "give each end of a link its own"));
 }
 
 /* Writes the good file with another text in place of one of it. */
@@ -150,7 +199,8 @@ static void mistakes_are_named(void **unused)
          ":5: ", "/dev/ttyS1", 3},
         {"tcp = \"127.0.0.1:7001\"", "serial = [\"/dev/ttyUSB0\", \"/dev/a\"]",
          ":0: ", "", 0},
-        {"key = \"lab.key\";", "", ":3: ", "without a key", 3},
+        {"key = \"lab.key\";", "",
+         ":3: ", "without a key; make one with: incode key FILE", 3},
         {"start = [1]", "start = [2]", ":1: ", "start", 3},
         {"node = 1; to = 0;", "node = 1; to = 1;", ":5: ", "no neighbours", 3},
         {"node = 1; to = 0;", "node = 7; to = 0;", ":5: ", "not a node", 3},
@@ -163,7 +213,17 @@ static void mistakes_are_named(void **unused)
         {"[\"/dev/ttyS1\", \"/dev/ttyUSB0\"]", "[\"/dev/ttyS1\"]",
          ":5: ", "two devices", 3},
         {"tcp = \"10.0.0.1:7000\"", "tcp = \"10.0.0.1\"", ":3: ", "port", 3},
-        {"tcp = \"10.0.0.1:7000\";", "", ":3: ", "neither or both", 3},
+        {"tcp = \"10.0.0.1:7000\";", "", ":3: ", "none or several", 3},
+        {"tcp = \"10.0.0.1:7000\";", "tcp = \"10.0.0.1:7\"; unix = \"/a\";",
+         ":3: ", "none or several", 3},
+        {"tcp = \"127.0.0.1:7001\"", "unix = \"/run/h\"", ":0: ", "", 0},
+        {"tcp = \"127.0.0.1:7001\"", "unix = \"\"", ":4: ", "unix: not a path",
+         3},
+        {"tcp = \"127.0.0.1:7001\"",
+         "unix = \"/run/a/path/that/is/far/longer/than/what/the/kernel/has/"
+         "room/for/in/an/address/of/a/socket/which/is/107/bytes\"",
+         ":4: ", "unix: not a path", 3},
+        {"key = \"lab.key\";", "key = \"\";", ":1: ", "incode key FILE", 3},
         {"127.0.0.1:7001", "no.such.host.invalid:7001",
          ":4: ", "no.such.host.invalid", 4},
     };
@@ -229,6 +289,10 @@ static void other_types_are_no_values(void **unused)
         {"baud = 921600", "baud = 9600.0", ":6: baud: "},
         {"baud = 921600", "baud = 4294976896L", ":6: baud: "},
         {"rtscts = true", "rtscts = 1", ":6: rtscts: "},
+        {"7000\";", "7000\"; insecure = 1;", ":3: insecure: "},
+        {"7000\";", "7000\"; insecure = \"true\";", ":3: insecure: "},
+        {"tcp = \"10.0.0.1:7000\"", "unix = 7", ":3: unix: "},
+        {"tcp = \"10.0.0.1:7000\"", "unix = [\"/a\", \"/b\"]", ":3: unix: "},
         {"rtscts = true", "rtscts = \"true\"", ":6: rtscts: "},
     };
     static struct host_cube_file file;
@@ -324,6 +388,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nodes_are_started_as_it_says),
+        cmocka_unit_test(wires_without_a_key),
         cmocka_unit_test(mistakes_are_named),
         cmocka_unit_test(other_types_are_no_values),
         cmocka_unit_test(what_the_library_is_not_given),

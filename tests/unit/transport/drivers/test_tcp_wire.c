@@ -1,32 +1,8 @@
 /* Wires over TCP between machines: addresses, calls before anybody listens,
  * connections that break, and strangers. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
+#include "wire_ends.h"
 
-#include <arpa/inet.h>
-#include <errno.h>
-#include <netinet/in.h>
-#include <stdio.h>
-#include <sys/random.h>
-#include <sys/socket.h>
-#include <time.h>
-#include <unistd.h>
-
-#include <cmocka.h>
-
-#include "transport/drivers/secure_sodium.h"
-#include "transport/drivers/tcp_wire.h"
-
-static uint64_t clock_us(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
-}
+static const uint8_t other_key[SECURE_KEY_BYTES] = "another key";
 
 static void addresses(void **unused)
 {
@@ -40,105 +16,32 @@ static void addresses(void **unused)
     (void)unused;
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
         assert_int_equal(tcp_address_parse(&a, good[i]), 0);
-        assert_true(tcp_address_is_loopback(&a));
+        assert_null(tcp_address_path(&a));
     }
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         assert_int_equal(tcp_address_parse(&a, bad[i]), -1);
     }
     assert_int_equal(tcp_address_parse(&a, "[2001:db8::7]:7000"), 0);
-    assert_false(tcp_address_is_loopback(&a));
-    tcp_address_to_loopback(&a);
-    assert_true(tcp_address_is_loopback(&a));
-    assert_int_equal(tcp_address_parse(&a, "10.1.2.3:7000"), 0);
-    assert_false(tcp_address_is_loopback(&a));
-    tcp_address_to_loopback(&a);
-    assert_true(tcp_address_is_loopback(&a));
+    assert_false(tcp_address_is_any(&a));
+    assert_int_equal(tcp_address_parse(&a, "[::]:7000"), 0);
+    assert_true(tcp_address_is_any(&a));
+    assert_int_equal(tcp_address_parse(&a, "0.0.0.0:7000"), 0);
+    assert_true(tcp_address_is_any(&a));
 }
 
-static const uint8_t key[SECURE_KEY_BYTES] = "the cube's key, 32 bytes of it ";
-static const uint8_t other_key[SECURE_KEY_BYTES] = "another key";
-
-struct end {
-    struct tcp_wire wire;
-    struct link *link;
-    void *memory;
-    uint32_t written, read;
-};
-
-/* A port that was free a moment ago. */
-static struct tcp_address free_address(int family)
+static void paths(void **unused)
 {
+    char path[TCP_PATH_MAX + 2];
     struct tcp_address a;
-    assert_int_equal(
-        tcp_address_parse(&a, family == AF_INET ? "127.0.0.1:1" : "[::1]:1"),
-        0);
-    if (family == AF_INET) {
-        ((struct sockaddr_in *)&a.to)->sin_port = 0;
-    } else {
-        ((struct sockaddr_in6 *)&a.to)->sin6_port = 0;
-    }
-    int fd = socket(family, SOCK_STREAM, 0);
-    assert_true(fd >= 0);
-    assert_int_equal(bind(fd, &a.to.any, a.size), 0);
-    assert_int_equal(getsockname(fd, &a.to.any, &a.size), 0);
-    close(fd);
-    return a;
-}
-
-static void open_end(struct end *end, unsigned who,
-                     const struct tcp_address *address, const uint8_t *with)
-{
-    struct tcp_wire_config wire = {.address = *address, .listens = who == 1};
-    struct link_config c = {.epoch = 5 + who,
-                            .node = (uint16_t)who,
-                            .peer_node = (uint16_t)(1 - who),
-                            .window = 8};
-    memset(end, 0, sizeof *end);
-    wire.suite = with == NULL ? NULL : &secure_sodium;
-    wire.key = with;
-    assert_int_equal(tcp_wire_open(&end->wire, &wire), 0);
-    c.pipe = tcp_wire_pipe(&end->wire);
-    end->memory = malloc(link_bytes(&c));
-    end->link = link_init(end->memory, link_bytes(&c), &c);
-    assert_non_null(end->link);
-}
-
-static void close_end(struct end *end)
-{
-    tcp_wire_close(&end->wire);
-    free(end->memory);
-}
-
-static void step(struct end *end)
-{
-    static uint8_t bytes[1500];
-    struct link_message message;
-    link_poll(end->link, clock_us());
-    while (link_read(end->link, &message)) {
-        uint32_t number;
-        memcpy(&number, message.data, sizeof number);
-        assert_int_equal(number, end->read);
-        end->read++;
-        link_release(end->link);
-    }
-    while (link_write(end->link, &end->written, 4, bytes, sizeof bytes) == 0) {
-        end->written++;
-    }
-}
-
-/* Steps until both have read so many more; no longer than 10 s. */
-static bool exchange(struct end *ends, uint32_t messages)
-{
-    uint32_t want[2] = {ends[0].read + messages, ends[1].read + messages};
-    uint64_t begin = clock_us();
-    while (ends[0].read < want[0] || ends[1].read < want[1]) {
-        step(&ends[0]);
-        step(&ends[1]);
-        if (clock_us() - begin > 10000000) {
-            return false;
-        }
-    }
-    return true;
+    (void)unused;
+    memset(path, 'a', sizeof path);
+    path[TCP_PATH_MAX + 1] = '\0';
+    assert_int_equal(tcp_address_set_path(&a, path), -1);
+    path[TCP_PATH_MAX] = '\0';
+    assert_int_equal(tcp_address_set_path(&a, path), 0);
+    assert_string_equal(tcp_address_path(&a), path);
+    assert_false(tcp_address_is_any(&a));
+    assert_int_equal(tcp_address_set_path(&a, ""), -1);
 }
 
 static void wires_that_break_go_on(void **unused)
@@ -234,15 +137,6 @@ static void one_who_is_led_elsewhere_ends_nothing(void **unused)
     }
     close_end(&ends[0]);
     close_end(&ends[1]);
-}
-
-static int stranger(const struct tcp_address *at)
-{
-    int fd = socket(at->to.any.sa_family, SOCK_STREAM, 0);
-    assert_true(fd >= 0);
-    assert_int_equal(tcp_prepare(fd), 0);
-    (void)connect(fd, &at->to.any, at->size);
-    return fd;
 }
 
 /* Strangers who say nothing, or noise, while two talk and lose their connection
@@ -475,24 +369,27 @@ static void a_lost_proof_is_asked_for_again(void **unused)
     close_end(&end);
 }
 
-static void without_a_key_on_loopback_only(void **unused)
+static void without_a_key_only_if_it_is_meant(void **unused)
 {
     static struct tcp_wire wire;
     struct tcp_wire_config c = {.listens = true};
     (void)unused;
-    assert_int_equal(tcp_address_parse(&c.address, "0.0.0.0:7001"), 0);
-    assert_int_equal(tcp_wire_open(&wire, &c), -1);
-    assert_int_equal(errno, EACCES);
-    c.listens = false;
-    assert_int_equal(tcp_address_parse(&c.address, "192.0.2.1:7001"), 0);
-    assert_int_equal(tcp_wire_open(&wire, &c), -1);
-    assert_int_equal(errno, EACCES);
+    c.address = free_address(AF_INET);
+    for (unsigned i = 0; i < 2; i++) {
+        c.listens = i == 0;
+        assert_int_equal(tcp_wire_open(&wire, &c), -1);
+        assert_int_equal(errno, EACCES);
+    }
+    c.insecure = true;
+    assert_int_equal(tcp_wire_open(&wire, &c), 0);
+    tcp_wire_close(&wire);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(addresses),
+        cmocka_unit_test(paths),
         cmocka_unit_test(wires_that_break_go_on),
         cmocka_unit_test(another_key_never_connects),
         cmocka_unit_test(one_who_is_led_elsewhere_ends_nothing),
@@ -501,7 +398,7 @@ int main(void)
         cmocka_unit_test(a_flood_keeps_nobody_out),
         cmocka_unit_test(a_silent_caller_is_taken_for_want_of_a_better),
         cmocka_unit_test(a_lost_proof_is_asked_for_again),
-        cmocka_unit_test(without_a_key_on_loopback_only),
+        cmocka_unit_test(without_a_key_only_if_it_is_meant),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

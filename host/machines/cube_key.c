@@ -1,0 +1,82 @@
+#include "cube_key.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "transport/secure.h"
+#include "transport/secure_wipe.h"
+
+enum { TEXT_BYTES = 2 * SECURE_KEY_BYTES + 1 };
+
+static bool draw_digits(char text[TEXT_BYTES])
+{
+    static const char digits[] = "0123456789abcdef";
+    uint8_t key[SECURE_KEY_BYTES];
+    if (getrandom(key, sizeof key, 0) != (ssize_t)sizeof key) {
+        return false;
+    }
+    for (unsigned i = 0; i < SECURE_KEY_BYTES; i++) {
+        text[2 * i] = digits[key[i] >> 4];
+        text[2 * i + 1] = digits[key[i] & 15];
+    }
+    text[TEXT_BYTES - 1] = '\n';
+    secure_wipe(key, sizeof key);
+    return true;
+}
+
+static bool write_all(int fd, const char *text, size_t size)
+{
+    while (size > 0) {
+        ssize_t written = write(fd, text, size);
+        if (written < 0 && errno != EINTR) {
+            return false;
+        }
+        text += written > 0 ? written : 0;
+        size -= written > 0 ? (size_t)written : 0;
+    }
+    return true;
+}
+
+/* False: errno says why. */
+static bool fill(int fd)
+{
+    char text[TEXT_BYTES];
+    bool good = fchmod(fd, 0600) == 0 && draw_digits(text) &&
+                write_all(fd, text, sizeof text) && fsync(fd) == 0;
+    int reason = errno;
+    secure_wipe(text, sizeof text);
+    errno = reason;
+    return good;
+}
+
+int host_key_make(const char *path, struct host_error *error)
+{
+    int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (fd < 0 && errno == EEXIST) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: is there already, and may be a key in use; give "
+                         "another name",
+                         path);
+    }
+    bool good = fd >= 0 && fill(fd);
+    int reason = errno;
+    if (fd >= 0 && close(fd) != 0 && good) {
+        reason = errno;
+        good = false;
+    }
+    if (good) {
+        return 0;
+    }
+    if (fd >= 0) {
+        (void)unlink(path);
+    }
+    return host_fail(error, HOST_INPUT,
+                     "%s: %s; give a name where a file can be written", path,
+                     strerror(reason));
+}

@@ -1,0 +1,70 @@
+#include "unix_file.h"
+
+#include <errno.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* Whether the file is a socket without a listener: 0, or what it is instead. */
+static int left_over(const struct tcp_address *address)
+{
+    struct stat about;
+    if (lstat(tcp_address_path(address), &about) != 0) {
+        return errno;
+    }
+    if (!S_ISSOCK(about.st_mode)) {
+        return EEXIST;
+    }
+    int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd < 0) {
+        return errno;
+    }
+    int reason = connect(fd, &address->to.any, address->size) == 0 ? 0 : errno;
+    close(fd);
+    return reason == ECONNREFUSED ? 0 : EADDRINUSE;
+}
+
+static int bind_for_owner(int fd, const struct tcp_address *address)
+{
+    mode_t before = umask(0177);
+    int status = bind(fd, &address->to.any, address->size);
+    int reason = errno;
+    umask(before);
+    errno = reason;
+    return status;
+}
+
+int unix_file_bind(int fd, const struct tcp_address *address)
+{
+    if (bind_for_owner(fd, address) == 0) {
+        return 0;
+    }
+    if (errno != EADDRINUSE) {
+        return -1;
+    }
+    int reason = left_over(address);
+    if (reason == 0 && unlink(tcp_address_path(address)) != 0) {
+        reason = errno;
+    }
+    if (reason != 0) {
+        errno = reason;
+        return -1;
+    }
+    return bind_for_owner(fd, address);
+}
+
+bool unix_file_peer_is_ours(int fd)
+{
+    struct ucred peer;
+    socklen_t size = sizeof peer;
+    return getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+           (peer.uid == geteuid() || peer.uid == 0);
+}
+
+void unix_file_remove(const struct tcp_address *address)
+{
+    int before = errno;
+    if (left_over(address) == 0) {
+        (void)unlink(tcp_address_path(address));
+    }
+    errno = before;
+}

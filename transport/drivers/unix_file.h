@@ -1,0 +1,31 @@
+/* What a socket with a path has and one of TCP has not: a file, and a kernel
+ * that says who is at the other end.  Such a wire needs no key: the file is for
+ * its owner alone, and each end asks whether the other is the same user, or
+ * root.
+ *
+ * Memory: none.  Work: a few system calls.  unix_file_remove may be called in a
+ * signal's handler.
+ *
+ *     tcp_address_set_path(&address, "/run/cube/01");
+ *     if (unix_file_bind(fd, &address) != 0)
+ *         return -1;
+ *     bool ours = unix_file_peer_is_ours(connected);
+ *     unix_file_remove(&address);
+ */
+#ifndef TRANSPORT_DRIVERS_UNIX_FILE_H
+#define TRANSPORT_DRIVERS_UNIX_FILE_H
+
+#include "tcp_address.h"
+
+/* Binds a socket to its path, with rights for this user alone (mode 0600).  A
+ * socket that nobody listens on any more is replaced.  0, or -1 and errno:
+ * EADDRINUSE if somebody does, EEXIST if the file is none of a socket. */
+int unix_file_bind(int fd, const struct tcp_address *address);
+
+/* Whether who is at the other end of a connection is this user, or root. */
+bool unix_file_peer_is_ours(int fd);
+
+/* Removes the file, if it is a socket that nobody listens on. */
+void unix_file_remove(const struct tcp_address *address);
+
+#endif
