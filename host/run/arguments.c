@@ -196,7 +196,7 @@ static void parse_memory(struct parse *p, const char *value)
 {
     uint64_t *bytes = &p->options->memory;
     if (host_parse_bytes(value, bytes) != 0 || *bytes < HOST_MEMORY_MIN ||
-        *bytes > UINT64_C(1) << 30) {
+        *bytes > HOST_MEMORY_MAX) {
         host_fail(p->error, HOST_USAGE,
                   "--memory %s: not a size of memory that is allowed; give "
                   "640K to 1G, as in 4M, or less to a small cube",

@@ -218,6 +218,8 @@ int host_triangulate_on(const struct host_run_options *options,
     }
     service.strategy = result->strategy;
     service.window = options->window;
+    service.memory = options->quiet ? 0 : result->memory;
+    service.memory_of = options->cube;
     service.patience_us = options->patience_s * UINT64_C(1000000);
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);

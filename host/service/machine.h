@@ -18,7 +18,10 @@
 #include "host/base/error.h"
 #include "transport/cube.h"
 
-enum { HOST_NODES_MAX = 1024 }; /* of any machine: 2^CUBE_DIMENSION_MAX */
+enum {
+    HOST_NODES_MAX = 1024,    /* of any machine: 2^CUBE_DIMENSION_MAX */
+    HOST_MEMORY_MAX = 1 << 30 /* bytes of a node that can be asked for */
+};
 
 struct host_machine {
     void *context;

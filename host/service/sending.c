@@ -4,6 +4,7 @@
 
 #include "failure_detector.h"
 #include "idle_nodes.h"
+#include "paging.h"
 
 static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
                          const void *data, size_t size)
@@ -38,6 +39,7 @@ static bool send_page(struct host_service *s, uint16_t to)
     node->pages_count--;
     s->report[to].pages++;
     s->report[to].page_bytes += size;
+    host_paging_sent(s);
     return true;
 }
 

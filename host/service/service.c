@@ -8,6 +8,7 @@
 #include "handlers.h"
 #include "host/base/progress.h"
 #include "missing_links.h"
+#include "paging.h"
 #include "sending.h"
 
 enum {
@@ -221,6 +222,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
                            s->tets->count);
     }
     host_detector_end(s);
+    host_paging_end(s);
     for (unsigned d = 0; d < cube_links(s->cube); d++) {
         s->retransmitted += cube_link_statistics(s->cube, d)->retransmitted;
     }

@@ -92,6 +92,10 @@ struct host_service {
     struct node_setup_message setup;
     unsigned window;      /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
+    /* Of a node, and the cube file that says so (NULL: an option does), for
+     * what paging.h tells; 0: it tells nothing. */
+    uint64_t memory;
+    const char *memory_of;
     /* Results. */
     struct host_node_report *report; /* [nodes], until the end */
     uint64_t pages_us;               /* time spent on serving pages */
@@ -107,6 +111,8 @@ struct host_service {
     struct host_ledger ledger;
     struct host_spill spill;
     bool started, finished;
+    uint64_t pages_sent;
+    bool paging_told;
     bool reporting;      /* statistics are asked for: nothing else is left */
     bool dealt;          /* the first jobs of this generation are out */
     bool over;           /* all is here that is needed */

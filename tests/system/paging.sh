@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# A run that spends its time on pages says so, and what would help; others do
+# not.
+. tests/system/lib.sh
+
+# matches FILE PATTERN: all that it holds.
+matches() { [[ $(cat "$1") =~ ^$2$ ]]; }
+
+# says NAME PATTERN POINTS OPTION...: what a run says on standard error.
+says() {
+    local name=$1 pattern=$2
+    shift 2
+    incode run "$@" > "$scratch/output" 2> "$scratch/errors"
+    check "paging/$name" "it says: $(cat "$scratch/errors")" \
+        matches "$scratch/errors" "$pattern"
+}
+incode gen sphere 20000 -o "$scratch/sphere.npy"
+incode gen uniform 20000 -o "$scratch/uniform.npy"
+asks='a node holds 7[0-9] % of these points at a time, and much of the time'
+says told "incode: --memory 1M: $asks .*; --memory 2M would hold all of them" \
+    "$scratch/sphere.npy" --memory 1M --nodes 2
+says advice '' "$scratch/sphere.npy" --memory 2M --nodes 2
+says quiet '' "$scratch/sphere.npy" --memory 1M --nodes 2 -q
+says uniform '' "$scratch/uniform.npy" --memory 640K --nodes 2

@@ -1,0 +1,137 @@
+/* When the user is told that a run spends its time on pages, and what then. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/service/paging.h"
+
+/* Of 200,000 points on a sphere, two nodes of 4M. */
+enum { NODES = 2, PAGES = 3226, FRAMES = 1105 };
+
+static char told[256];
+static unsigned lines;
+
+static void on_line(void *context, const char *line)
+{
+    (void)context;
+    snprintf(told, sizeof told, "%s", line);
+    lines++;
+}
+
+static struct host_service service;
+static struct host_machine machine = {.nodes = NODES, .told = on_line};
+static struct host_order order;
+static struct host_tetrahedra tets;
+static struct host_node_report reports[NODES];
+
+static void begin(uint64_t memory, uint64_t tetrahedra)
+{
+    memset(&service, 0, sizeof service);
+    memset(reports, 0, sizeof reports);
+    order.tree.pages = PAGES;
+    tets.count = tetrahedra;
+    reports[1].map.map.pages = FRAMES;
+    service.machine = &machine;
+    service.order = &order;
+    service.tets = &tets;
+    service.report = reports;
+    service.generations = 1;
+    service.memory = memory;
+    lines = 0;
+}
+
+static void send(uint64_t pages)
+{
+    while (pages-- > 0) {
+        host_paging_sent(&service);
+    }
+}
+
+static void test_told_once(void **unused)
+{
+    (void)unused;
+    begin(4 << 20, 1000);
+    send(NODES * PAGES + HOST_PAGING_AGAIN_MIN - 1);
+    assert_int_equal(lines, 0);
+    send(1000000);
+    host_paging_end(&service);
+    assert_int_equal(lines, 1);
+    assert_string_equal(
+        told, "--memory 4M: a node holds 34 % of these points at a time, and "
+              "much of the time goes into pages that it asks for again; "
+              "--memory 16M would hold all of them");
+}
+
+static void test_not_told(void **unused)
+{
+    (void)unused;
+    begin(4 << 20, 1200000); /* more came of it than it cost */
+    send(NODES * PAGES + 199999);
+    host_paging_end(&service);
+    assert_int_equal(lines, 0);
+    send(1);
+    assert_int_equal(lines, 1);
+    begin(0, 1000); /* nobody wants to know */
+    send(1000000);
+    assert_int_equal(lines, 0);
+    begin(4 << 20, 1000); /* each generation needs them anew */
+    service.generations = 100;
+    send(100 * NODES * PAGES);
+    assert_int_equal(lines, 0);
+}
+
+/* What nodes have from each other shows at the end. */
+static void test_other_nodes(void **unused)
+{
+    (void)unused;
+    begin(4 << 20, 1000);
+    reports[0].statistics.statistics.page_requests = 1000000;
+    host_paging_end(&service);
+    assert_int_equal(lines, 1);
+}
+
+static void test_cube(void **unused)
+{
+    (void)unused;
+    begin(4 << 20, 1000);
+    service.memory_of = "boxes.cube";
+    send(1000000);
+    assert_int_equal(lines, 1);
+    assert_null(strstr(told, "--memory"));
+    assert_string_equal(
+        told, "boxes.cube: memory 4M: a node holds 34 % of these points at a "
+              "time, and much of the time goes into pages that it asks for "
+              "again; nodes with 16M would hold all of them");
+}
+
+static void test_advice(void **unused)
+{
+    (void)unused;
+    assert_int_equal(host_paging_memory(4 << 20, 1105, 1106), 8 << 20);
+    assert_int_equal(host_paging_memory(4 << 20, 1105, 4420), 16 << 20);
+    assert_int_equal(host_paging_memory(1433600, 335, 336), 2 << 20);
+    assert_int_equal(host_paging_memory(4 << 20, 1105, 1 << 30),
+                     HOST_MEMORY_MAX);
+    begin(HOST_MEMORY_MAX, 1000);
+    send(1000000);
+    assert_non_null(strstr(told, "; more nodes would share them"));
+    begin(512 << 20, 1000);
+    order.tree.pages = 100000;
+    send(1000000);
+    assert_non_null(strstr(told, "; --memory 1G would hold more of them"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_told_once),   cmocka_unit_test(test_not_told),
+        cmocka_unit_test(test_other_nodes), cmocka_unit_test(test_cube),
+        cmocka_unit_test(test_advice),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
