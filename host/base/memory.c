@@ -200,20 +200,26 @@ uint64_t host_memory_in_groups(const char *list, const char *mount)
     return left;
 }
 
-static uint64_t left_by_limit(int resource, const char *used)
+/* used: the line of this process's status that the limit is of. */
+static uint64_t left_by(const struct rlimit *limit, const char *used)
 {
-    struct rlimit limit;
-    return getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY
+    return limit->rlim_cur == RLIM_INFINITY
                ? UINT64_MAX
-               : left_of(limit.rlim_cur, status_bytes(used), 0);
+               : left_of(limit->rlim_cur, status_bytes(used), 0);
 }
 
 uint64_t host_memory_available(void)
 {
     uint64_t kib = number_in("/proc/meminfo", "MemAvailable:", UINT64_MAX);
     uint64_t left = kib == UINT64_MAX ? kib : kib * 1024;
+    struct rlimit limit;
     left = least(left,
                  host_memory_in_groups("/proc/self/cgroup", "/sys/fs/cgroup"));
-    left = least(left, left_by_limit(RLIMIT_AS, "VmSize:"));
-    return least(left, left_by_limit(RLIMIT_DATA, "VmData:"));
+    if (getrlimit(RLIMIT_AS, &limit) == 0) {
+        left = least(left, left_by(&limit, "VmSize:"));
+    }
+    if (getrlimit(RLIMIT_DATA, &limit) == 0) {
+        left = least(left, left_by(&limit, "VmData:"));
+    }
+    return left;
 }

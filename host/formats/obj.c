@@ -47,7 +47,7 @@ static int take_number(struct host_scan *s, double *value,
  * may well end in the name of a folder, is not continued. */
 static void pass_line(struct host_scan *s)
 {
-    const char *begin = s->at, *c;
+    const char *begin, *c;
     do {
         begin = s->at;
         host_scan_next_line(s);

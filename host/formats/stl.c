@@ -109,6 +109,7 @@ static int read_stl(const struct host_source *source, struct host_mesh *mesh,
     }
     struct host_scan s =
         host_scan_start(source->path, source->data, source->bytes);
+    const uint64_t due = START_BYTES + FACET_BYTES * facets;
     struct host_scan first = s;
     if (host_scan_skip_blank_lines(&first) && host_scan_take(&first, "solid")) {
         return read_text(s, mesh->points, error);
@@ -118,7 +119,7 @@ static int read_stl(const struct host_source *source, struct host_mesh *mesh,
                      "%zu bytes where %llu facets take %llu; get the file "
                      "whole, or give one in this format",
                      source->path, source->bytes, (unsigned long long)facets,
-                     (unsigned long long)(START_BYTES + FACET_BYTES * facets));
+                     (unsigned long long)due);
 }
 
 const struct host_format host_format_stl = {

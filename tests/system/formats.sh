@@ -43,15 +43,16 @@ le4() { # a column of whole numbers as bytes, the lowest first
         for (i = 0; i < 4; i++) { printf "\\x%02x", n % 256; n = int(n / 256) }
     }'
 }
+zeros() { head -c "$1" /dev/zero; }
 whole() { awk '{ printf "%.0f\n%.0f\n%.0f\n0\n0\n", 1000 * $1, 1000 * $2, \
     1000 * $3 }' "$from"; }
 {
-    printf 'LASF%20s\1\2' | tr ' ' '\0'
-    printf '%68s\xe3\0\xe3\0\0\0\0\0\0\0\0\x14\0' | tr ' ' '\0'
+    printf 'LASF' && zeros 20 && printf '\1\2' && zeros 68
+    printf '\xe3\0\xe3\0\0\0\0\0\0\0\0\x14\0'
     printf '%b' "$(echo "$rows" | le4)"
-    printf '%20s' | tr ' ' '\0'
+    zeros 20
     for _ in x y z; do printf '\xfc\xa9\xf1\xd2\x4d\x62\x50\x3f'; done
-    printf '%72s' | tr ' ' '\0'
+    zeros 72
     printf '%b' "$(whole | le4)"
 } > "$scratch/a.las"
 awk '{ for (d = 1; d <= 3; d++) {

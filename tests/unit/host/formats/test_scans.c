@@ -33,8 +33,8 @@ static void obj_of_every_habit(void **unused)
 {
     (void)unused;
     static const char *const two[] = {
-        "# made here\nmtllib a.mtl\no v 1\nv -3 -2.5 -2\nv -1.5 -1 -.5\n"
-        "vn 0 0 1\nvt 0 1\nvp 7 7 7\nf 1//1 2//1 1//1\n",
+        ("# made here\nmtllib a.mtl\no v 1\nv -3 -2.5 -2\nv -1.5 -1 -.5\n"
+         "vn 0 0 1\nvt 0 1\nvp 7 7 7\nf 1//1 2//1 1//1\n"),
         "v -3 -2.5 -2 1.0\r\nv -1.5 -1 -.5 0.5 0.25 1 # colours\r\n",
         "v \\\n-3 -2.5\\\n \\\r\n -2\nv\t-1.5 -1 -.5 \\\n 1.0\n",
         "f 1 2 \\\nv 7 7 7\nv -3 -2.5 -2\ng a \\\n\\\nv 8 8 8\nv -1.5 -1 -.5",
