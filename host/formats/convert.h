@@ -3,7 +3,7 @@
  *
  * Memory: the contents once.  Work: reading plus writing.
  *
- *     host_convert("bunny.ply", "bunny.npy", &error);
+ *     host_convert("bunny.ply", NULL, "b.npy", &error);
  *     host_convert("a.ele", NULL, "a.vtu", &error);
  */
 #ifndef HOST_CONVERT_H
