@@ -12,6 +12,7 @@
 #include "host/base/parse.h"
 #include "host/base/progress.h"
 #include "transport/drivers/key_file.h"
+#include "transport/secure_wipe.h"
 
 enum { TEXT_MAX = 4 << 20 }; /* that of 1,024 nodes has half a MiB */
 
@@ -280,5 +281,5 @@ void host_cube_file_free(struct host_cube_file *file)
 {
     free(file->wire);
     file->wire = NULL;
-    memset(file->key, 0, sizeof file->key);
+    secure_wipe(file->key, sizeof file->key);
 }

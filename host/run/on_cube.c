@@ -1,9 +1,18 @@
 #include "on_cube.h"
 
 #include "host/machines/remote.h"
+#include "transport/secure_wipe.h"
 
 /* One run a program. */
 static struct host_cube_file the_file;
+static void (*stop_remote)(void *context);
+
+/* Its wires are closed: nothing needs the key. */
+static void stop(void *context)
+{
+    stop_remote(context);
+    secure_wipe(the_file.key, sizeof the_file.key);
+}
 
 /* Whether there are nodes that the host starts. */
 static bool starts_some(const struct host_cube_file *file)
@@ -29,6 +38,8 @@ static int begin(const struct host_run_options *options,
         return error->code;
     }
     *machine = host_remote_machine(&remote);
+    stop_remote = machine->stop;
+    machine->stop = stop;
     return 0;
 }
 

@@ -3,8 +3,12 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "transport/secure_wipe.h"
 
 enum { DIGITS = 2 * SECURE_KEY_BYTES };
 
@@ -33,29 +37,58 @@ static bool read_digits(const char text[DIGITS], uint8_t *key)
     return true;
 }
 
+/* A key that is in memory is not to come to a disk with a core, nor to another
+ * program of the user's. */
+static void forbid_dumps(void)
+{
+    const struct rlimit none = {0, 0};
+    (void)setrlimit(RLIMIT_CORE, &none);
+    (void)prctl(PR_SET_DUMPABLE, 0);
+}
+
+static enum key_file_state read_key(int fd, uint8_t *key)
+{
+    struct stat about;
+    char text[DIGITS];
+    if (fstat(fd, &about) != 0) {
+        return KEY_FILE_UNREADABLE;
+    }
+    if (S_ISDIR(about.st_mode)) {
+        errno = EISDIR;
+        return KEY_FILE_UNREADABLE;
+    }
+    if (!S_ISREG(about.st_mode)) {
+        return KEY_FILE_NO_KEY;
+    }
+    if ((about.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+        return KEY_FILE_WRITABLE;
+    }
+    ssize_t got = read_all(fd, text, sizeof text);
+    bool whole = got == DIGITS && read_digits(text, key);
+    secure_wipe(text, sizeof text);
+    if (!whole) {
+        return got < 0 ? KEY_FILE_UNREADABLE : KEY_FILE_NO_KEY;
+    }
+    return (about.st_mode & (S_IRGRP | S_IROTH)) != 0 ? KEY_FILE_SEEN
+                                                      : KEY_FILE_GOOD;
+}
+
 enum key_file_state key_file_read(const char *path, uint8_t *key)
 {
-    char text[DIGITS];
-    struct stat about;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    ssize_t got =
-        fd < 0 || fstat(fd, &about) != 0 ? -1 : read_all(fd, text, sizeof text);
+    forbid_dumps();
+    /* A pipe's other end is not waited for. */
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    enum key_file_state state =
+        fd < 0 ? KEY_FILE_UNREADABLE : read_key(fd, key);
     int reason = errno;
     if (fd >= 0) {
         close(fd);
     }
+    if (state != KEY_FILE_GOOD && state != KEY_FILE_SEEN) {
+        secure_wipe(key, SECURE_KEY_BYTES);
+    }
     errno = reason;
-    if (got < 0) {
-        return KEY_FILE_UNREADABLE;
-    }
-    if ((about.st_mode & S_IWOTH) != 0) {
-        return KEY_FILE_WRITABLE;
-    }
-    if (got < DIGITS || !read_digits(text, key)) {
-        return KEY_FILE_NO_KEY;
-    }
-    return (about.st_mode & (S_IRGRP | S_IROTH)) != 0 ? KEY_FILE_SEEN
-                                                      : KEY_FILE_GOOD;
+    return state;
 }
 
 struct key_file_text key_file_text(enum key_file_state state)
@@ -63,7 +96,7 @@ struct key_file_text key_file_text(enum key_file_state state)
     static const struct key_file_text texts[] = {
         [KEY_FILE_SEEN] = {"can be read by others, who can join the cube then",
                            "chmod 600 it"},
-        [KEY_FILE_WRITABLE] = {"can be written by others",
+        [KEY_FILE_WRITABLE] = {"can be written by others than its owner",
                                "chmod 600 it, and see that it is still yours"},
         [KEY_FILE_UNREADABLE] = {"cannot be read",
                                  "give the key's file, or make one with: "

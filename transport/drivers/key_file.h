@@ -1,6 +1,7 @@
-/* The file with a cube's key: 64 hexadecimal digits.  Whoever can write it can
- * join the cube, so that such a file is refused; whoever can read it can, too,
- * of which the user is to be told.
+/* The file with a cube's key: 64 hexadecimal digits.  Others who can write it,
+ * its group or all, can join the cube, so that such a file is refused; so can
+ * those who can read it, of which the user is to be told.  From then on the
+ * process leaves no core, and the user's other programs cannot look into it.
  *
  * Memory: none.  Work: reads the first 64 bytes.
  *
@@ -16,7 +17,7 @@
 enum key_file_state {
     KEY_FILE_GOOD,
     KEY_FILE_SEEN,       /* good, but others can read it */
-    KEY_FILE_WRITABLE,   /* others can write it */
+    KEY_FILE_WRITABLE,   /* its group or others can write it */
     KEY_FILE_UNREADABLE, /* and errno */
     KEY_FILE_NO_KEY      /* not 64 digits */
 };
@@ -26,7 +27,8 @@ struct key_file_text {
     const char *what, *next;
 };
 
-/* key: SECURE_KEY_BYTES, filled where the state is one of the first two. */
+/* key: SECURE_KEY_BYTES, filled where the state is one of the first two, else
+ * zeros; the caller's to wipe. */
 enum key_file_state key_file_read(const char *path, uint8_t *key);
 struct key_file_text key_file_text(enum key_file_state state);
 

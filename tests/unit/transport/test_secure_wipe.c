@@ -1,44 +1,13 @@
 /* What was wiped is gone from memory, although nobody reads it again.  A stack
  * of the test's own is looked through when the function that worked on it has
  * returned. */
-#include <ucontext.h>
-
+#include "own_stack.h"
 #include "secure_world.h"
 
 /* In this unit, so that the compiler sees all that it could leave out. */
 #include "transport/secure_wipe.c"
 
-enum { STACK_BYTES = 1 << 18, SECRET_BYTES = 64 };
-
-static _Alignas(64) uint8_t stack[STACK_BYTES];
-
-static void run_on_stack(void (*work)(void))
-{
-    static ucontext_t here, there;
-    memset(stack, 0, sizeof stack);
-    assert_int_equal(getcontext(&there), 0);
-    there.uc_stack.ss_sp = stack;
-    there.uc_stack.ss_size = sizeof stack;
-    there.uc_link = &here;
-    makecontext(&there, work, 0);
-    assert_int_equal(swapcontext(&here, &there), 0);
-}
-
-/* Whether a part of a secret is in the memory. */
-static bool holds(const void *memory, size_t size, const uint8_t *secret,
-                  size_t secret_bytes)
-{
-    enum { RUN = 8 };
-    const uint8_t *bytes = memory;
-    for (size_t i = 0; i + RUN <= size; i++) {
-        for (size_t k = 0; k + RUN <= secret_bytes; k += RUN) {
-            if (memcmp(bytes + i, secret + k, RUN) == 0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
+enum { SECRET_BYTES = 64 };
 
 static uint8_t secret[SECRET_BYTES];
 
