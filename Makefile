@@ -198,10 +198,12 @@ $(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch: \
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $(planted) $(filter %.o %.a,$^) $(HOST_LIBS) -o $@
 
-# The tools that the system tests change point sets with, and bytes on a wire.
-points: $(BUILD)/tests/points $(BUILD)/tests/relay
-$(BUILD)/tests/points $(BUILD)/tests/relay: $(BUILD)/tests/%: \
-		$(obj)/tests/system/%.o
+# The tools that the system tests change point sets with, and bytes on a wire,
+# and call listeners with.
+tools := $(patsubst tests/system/%.c,$(BUILD)/tests/%,$(wildcard \
+	tests/system/*.c))
+points: $(tools)
+$(tools): $(BUILD)/tests/%: $(obj)/tests/system/%.o
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
