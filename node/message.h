@@ -68,6 +68,8 @@ struct node_pong_message {
     uint32_t received; /* from the host before that ping */
     uint32_t sent;     /* to the host before this one */
     uint32_t links;    /* bit d: link d has been up since this start */
+    uint32_t silent;   /* bit d: nothing was heard by link d for a second, which
+                          was up; a pong goes unasked where that changes */
     uint32_t refused;  /* bit d: who is at the other end has not its key */
     uint32_t work;     /* steps and messages of its role since this start: a
                           change is progress, of whatever size */
@@ -175,7 +177,7 @@ struct node_finished_message {
 /* The layouts are the same on every processor. */
 static_assert(sizeof(struct incode_face) == 12, "face layout");
 static_assert(sizeof(struct incode_job) == 56, "job layout");
-static_assert(sizeof(struct node_pong_message) == 32, "pong layout");
+static_assert(sizeof(struct node_pong_message) == 36, "pong layout");
 static_assert(sizeof(struct node_job_message) == 64, "job layout");
 static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
 static_assert(sizeof(struct node_setup_message) == 96, "setup layout");

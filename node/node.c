@@ -8,7 +8,14 @@
 #include "totals.h"
 #include "transport/wiring.h"
 
-enum { IDLE_MAX_US = 1000000, FAREWELL_US = 500000 };
+enum {
+    IDLE_MAX_US = 100000,
+    FAREWELL_US = 500000,
+    LOOK_US = 50000,
+    SILENT_US =
+        1200000, /* twice the time in which a link has to say something */
+    SERIAL_BITS = 24000 /* more where frames wait for a slow wire */
+};
 
 struct node {
     const struct node_board *board;
@@ -22,11 +29,18 @@ struct node {
     bool stopping, closing;
     struct cube_wiring followed; /* its generation is the one at work */
     struct node_counted counted;
-    struct node_pong_message pong; /* the answer that is owed */
+    struct node_pong_message pong; /* the answer that is owed, or was last */
+    bool pinged;                   /* in this generation */
     bool owes_pong, owes_ready, owes_report;
     struct node_finished_message before; /* of roles before this one */
     struct node_fault fault;
     bool fault_sent;
+    struct {
+        uint64_t frames; /* that had come at the last look */
+        uint32_t quiet_us;
+    } heard[CUBE_LINKS_MAX];
+    uint32_t silent; /* links, as a pong has told or is about to */
+    uint64_t looked_us;
     uint32_t work; /* steps and messages of roles: what a pong tells of it */
     uint64_t now_us, stop_us;
 };
@@ -211,7 +225,7 @@ static void take_ping(struct node *n, const struct cube_message *message)
     memcpy(&ping, message->data, sizeof ping);
     n->pong.pinged = ping.sent;
     n->pong.received = n->counted.received;
-    n->owes_pong = true;
+    n->pinged = n->owes_pong = true;
 }
 
 /* What comes from the host alone, and what has no content. */
@@ -304,11 +318,49 @@ static uint32_t links_seen(const struct node *n)
     return seen;
 }
 
+/* Whether a link that was up has said nothing for long, by this node's own
+ * time: while it stood still itself it could not hear. */
+static bool is_silent(struct node *n, unsigned d, uint32_t passed_us)
+{
+    const struct link_statistics *s = cube_link_statistics(n->cube, d);
+    uint32_t baud = n->board->identity.serial_baud;
+    uint32_t limit_us =
+        SILENT_US +
+        (baud == 0 ? 0 : SERIAL_BITS * UINT32_C(10000) / baud * 100);
+    if (s->frames_received != n->heard[d].frames || s->sessions == 0) {
+        n->heard[d].frames = s->frames_received;
+        n->heard[d].quiet_us = 0;
+    } else if (n->heard[d].quiet_us <= limit_us) {
+        n->heard[d].quiet_us += passed_us;
+    }
+    return n->heard[d].quiet_us > limit_us;
+}
+
+/* What is new of silent neighbours the host is told unasked: its pings may not
+ * come through. */
+static void look_at_links(struct node *n)
+{
+    uint64_t passed_us = n->now_us - n->looked_us;
+    uint32_t silent = 0;
+    if (passed_us < LOOK_US) {
+        return;
+    }
+    n->looked_us = n->now_us;
+    uint32_t step_us =
+        passed_us < 2 * LOOK_US ? (uint32_t)passed_us : 2 * LOOK_US;
+    for (unsigned d = 0; d < cube_links(n->cube); d++) {
+        silent |= (uint32_t)is_silent(n, d, step_us) << d;
+    }
+    n->owes_pong = n->owes_pong || (silent != n->silent && n->pinged);
+    n->silent = silent;
+}
+
 static bool send_pong(struct node *n)
 {
     n->pong.start = n->board->identity.epoch;
     n->pong.sent = n->counted.sent;
     n->pong.links = links_seen(n);
+    n->pong.silent = n->silent;
     n->pong.refused =
         n->board->refused == NULL ? 0 : n->board->refused(n->board->context);
     n->pong.work = n->work;
@@ -357,7 +409,7 @@ static void follow_wiring(struct node *n)
     }
     end_role(n);
     n->followed = *wiring;
-    n->owes_pong = n->owes_ready = n->owes_report = false;
+    n->pinged = n->owes_pong = n->owes_ready = n->owes_report = false;
     n->fault.size = 0;
     n->fault_sent = false;
     n->counted.received = n->counted.sent = 0;
@@ -423,6 +475,7 @@ enum node_event node_step(struct node *node)
     node->now_us = node->board->now_us(node->board->context);
     unsigned moved = (unsigned)cube_poll(node->cube, node->now_us);
     follow_wiring(node);
+    look_at_links(node);
     while (cube_read(node->cube, &message)) {
         take_message(node, &message);
         cube_release(node->cube);

@@ -73,6 +73,15 @@ unsigned host_cube_node_options(
     const struct host_cube_file *file, unsigned node,
     char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES]);
 
+/* The line for a shell that starts a node; NULL: it does not fit. */
+const char *host_cube_start_line(const struct host_cube_file *file,
+                                 unsigned node, char *line, size_t size);
+
+/* How the host reaches the node of a wire of its own: an address, or a device.
+ */
+const char *host_cube_wire_name(const struct host_cube_wire *wire, char *name,
+                                size_t size);
+
 /* `incode cube FILE`: prints how each node is started. */
 int host_cube_print(const char *path, struct host_error *error);
 

@@ -85,29 +85,47 @@ unsigned host_cube_node_options(
     return n;
 }
 
-/* A byte becomes "$(printf '\\377')" at most. */
-static void print_word(const char *word, const char *before)
+const char *host_cube_start_line(const struct host_cube_file *file,
+                                 unsigned node, char *line, size_t size)
 {
-    char quoted[20 * HOST_NODE_OPTION_BYTES];
-    if (host_text_quote(quoted, sizeof quoted, word) == 0) {
-        printf("%s%s", before, quoted);
+    static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
+    unsigned count = host_cube_node_options(file, node, options);
+    if (host_text_quote(line, size, file->board->program) != 0) {
+        return NULL;
     }
+    for (unsigned k = 0; k < count; k++) {
+        size_t used = strlen(line);
+        if (size - used < 2 || host_text_quote(line + used + 1, size - used - 1,
+                                               options[k]) != 0) {
+            return NULL;
+        }
+        line[used] = ' ';
+    }
+    return line;
+}
+
+const char *host_cube_wire_name(const struct host_cube_wire *wire, char *name,
+                                size_t size)
+{
+    if (wire->serial) {
+        snprintf(name, size, "%s", wire->device[1]);
+    } else {
+        host_cube_print_address(&wire->via, name, size);
+    }
+    return name;
 }
 
 int host_cube_print(const char *path, struct host_error *error)
 {
-    static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
+    /* A byte becomes "$(printf '\\377')" at most. */
+    static char line[20 * HOST_NODE_OPTIONS_MAX * HOST_NODE_OPTION_BYTES];
     static struct host_cube_file file;
     if (host_cube_file_read(&file, path, error) != 0) {
         return error->code;
     }
     for (unsigned i = 0; i < file.nodes; i++) {
-        unsigned count = host_cube_node_options(&file, i, options);
-        print_word(file.board->program, "");
-        for (unsigned k = 0; k < count; k++) {
-            print_word(options[k], " ");
-        }
-        printf("\n");
+        (void)host_cube_start_line(&file, i, line, sizeof line);
+        printf("%s\n", line);
     }
     host_cube_file_free(&file);
     return 0;

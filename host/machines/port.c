@@ -108,6 +108,12 @@ void host_port_rest(struct host_port *port, uint64_t rest_us)
     }
 }
 
+int host_port_fault(const struct host_port *port)
+{
+    return port->kind == HOST_PORT_NET && port->net.tcp.fd < 0 ? port->net.fault
+                                                               : 0;
+}
+
 bool host_port_other_key(const struct host_port *port)
 {
     return port->kind == HOST_PORT_NET && port->net.other_key;

@@ -58,6 +58,9 @@ void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
  * called again then. */
 void host_port_rest(struct host_port *port, uint64_t rest_us);
 
+/* Why nobody is reached by it now, as errno has it; 0: that is not known. */
+int host_port_fault(const struct host_port *port);
+
 /* Whether what was last reached by it could not prove that it has our key. */
 bool host_port_other_key(const struct host_port *port);
 

@@ -1,5 +1,6 @@
 #include "remote.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <sodium.h>
 #include <stdio.h>
@@ -167,22 +168,53 @@ static bool machine_kill(void *context, unsigned node)
     return host_child_kill(&r->process[node]);
 }
 
-/* The host hears of the keys on its own wires alone. */
-static const char *machine_doubt(void *context, unsigned node)
+/* Which of the host's own wires leads to the node; -1: none. */
+static int port_to(const struct host_remote *r, unsigned node)
 {
-    const struct host_remote *r = context;
-    const char *doubt = NULL;
     for (unsigned i = 0; i < r->ports; i++) {
-        if (host_cube_host_wire(r->file, i)->node == node &&
-            host_port_other_key(&r->port[i])) {
-            doubt = "answers, but with another key; give both ends the same "
-                    "key file";
-        } else if (host_cube_host_wire(r->file, i)->node == node &&
-                   host_port_other_user(&r->port[i])) {
-            doubt = "answers, but is another user's; start it as the same user";
+        if (host_cube_host_wire(r->file, i)->node == node) {
+            return (int)i;
         }
     }
-    return doubt;
+    return -1;
+}
+
+static const char *machine_doubt(void *context, unsigned node)
+{
+    static char text[80];
+    const struct host_remote *r = context;
+    int port = port_to(r, node);
+    int fault = port < 0 ? 0 : host_port_fault(&r->port[port]);
+    if (port >= 0 && host_port_other_key(&r->port[port])) {
+        return "answers, but with another key; give both ends the same key "
+               "file";
+    }
+    if (port >= 0 && host_port_other_user(&r->port[port])) {
+        return "answers, but is another user's; start it as the same user";
+    }
+    snprintf(text, sizeof text, "%s", fault == 0 ? "" : strerror(fault));
+    text[0] = (char)tolower((unsigned char)text[0]);
+    return fault == 0 ? NULL : text;
+}
+
+static const char *machine_start_line(void *context, unsigned node)
+{
+    static char line[1600];
+    const struct host_remote *r = context;
+    return r->file->local[node]
+               ? NULL
+               : host_cube_start_line(r->file, node, line, sizeof line);
+}
+
+static const char *machine_address(void *context, unsigned node)
+{
+    static char name[SERIAL_NAME_MAX];
+    const struct host_remote *r = context;
+    int port = port_to(r, node);
+    return port < 0 ? NULL
+                    : host_cube_wire_name(
+                          host_cube_host_wire(r->file, (unsigned)port), name,
+                          sizeof name);
 }
 
 static void machine_rest(void *context, uint64_t rest_us)
@@ -245,6 +277,8 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     machine.kill = machine_kill;
     machine.keyed = remote->file->has_key;
     machine.doubt = machine_doubt;
+    machine.start_line = machine_start_line;
+    machine.address = machine_address;
     machine.rest = machine_rest;
     machine.ended = machine_ended;
     machine.stop = machine_stop;

@@ -97,6 +97,18 @@ static const char *doubt(void *context, unsigned node)
     return t->machine.doubt(t->machine.context, node);
 }
 
+static const char *start_line(void *context, unsigned node)
+{
+    struct host_throttled *t = context;
+    return t->machine.start_line(t->machine.context, node);
+}
+
+static const char *address(void *context, unsigned node)
+{
+    struct host_throttled *t = context;
+    return t->machine.address(t->machine.context, node);
+}
+
 static void rest(void *context, uint64_t rest_us)
 {
     struct host_throttled *t = context;
@@ -135,6 +147,8 @@ struct host_machine host_throttle_machine(struct host_throttled *throttled,
     result.restarts = machine->restarts != NULL ? restarts : NULL;
     result.kill = machine->kill != NULL ? kill_node : NULL;
     result.doubt = machine->doubt != NULL ? doubt : NULL;
+    result.start_line = machine->start_line != NULL ? start_line : NULL;
+    result.address = machine->address != NULL ? address : NULL;
     result.rest = machine->rest != NULL ? rest : NULL;
     result.ended = ended;
     result.stop = stop;

@@ -75,8 +75,8 @@ static const struct argp_option options_of_run[] = {
     {"link", KEY_LINK, "NAME", 0, "Wires between nodes:", 1},
     {"board", KEY_BOARD, "NAME", 0, "What a node runs on:", 1},
     {"patience", KEY_PATIENCE, "SECONDS", 0,
-     "Wait so long for a node that does not answer, then start it again or "
-     "go on without it. Default: 60",
+     "Give up a node that shows no progress for so long: start it again, or go "
+     "on without it. Default: 60",
      1},
     {"cube", KEY_CUBE, "FILE", 0,
      "Run on the nodes that FILE describes, over the wires that it names; see "

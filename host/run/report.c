@@ -141,10 +141,15 @@ void host_report_run(FILE *file, const struct host_run_options *options,
         fprintf(file, "coordinates of -0.0, which count as 0.0: %llu\n",
                 (unsigned long long)r->negative_zeros);
     }
-    fprintf(file,
-            "%s on %u node%s: %.3f s to triangulate (%.3f Mtet/s), %.3f s "
-            "in all%s\n",
-            r->strategy->name, r->nodes, r->nodes == 1 ? "" : "s",
+    fprintf(file, "%s on ", r->strategy->name);
+    if (r->lost > 0) {
+        fprintf(file, "%u of ", r->nodes - r->lost);
+    }
+    fprintf(file, "%u node%s", r->nodes, r->nodes == 1 ? "" : "s");
+    if (r->lost > 0 || r->restarts > 0) {
+        fprintf(file, ", %u lost, %u started again", r->lost, r->restarts);
+    }
+    fprintf(file, ": %.3f s to triangulate (%.3f Mtet/s), %.3f s in all%s\n",
             r->time_triangulation_s,
             1e-6 * ratio((double)r->tetrahedra, r->time_triangulation_s),
             r->time_total_s, r->verified ? "; verified" : "");

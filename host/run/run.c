@@ -82,6 +82,7 @@ void host_run_sum(const struct host_service *service,
     r->retransmitted = service->retransmitted;
     r->faces_spilled = service->spill.faces_total;
     r->restarts = service->restarts;
+    r->lost = r->nodes - service->work.living;
     r->generations = service->generations;
     for (unsigned i = 0; i < r->nodes; i++) {
         const struct node_finished_message *f = &r->node[i].statistics;

@@ -72,6 +72,7 @@ struct host_run_result {
     uint64_t host_peak_bytes;
     uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
     uint64_t retransmitted, faces_spilled;
+    unsigned lost;                  /* nodes that the run had to do without */
     unsigned restarts, generations; /* of nodes; of the cube's wiring */
     unsigned missing_wires;         /* that were named */
     uint64_t candidates, candidates_histogram[24];

@@ -135,6 +135,7 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "socket_send_bytes", (uint64_t)r->socket_send_bytes);
     put(o, "socket_receive_bytes", (uint64_t)r->socket_receive_bytes);
     put(o, "retransmitted_frames", r->retransmitted);
+    put(o, "nodes_lost", r->lost);
     put(o, "node_restarts", r->restarts);
     put(o, "generations", r->generations);
     put(o, "missing_wires", r->missing_wires);

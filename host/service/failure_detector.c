@@ -2,8 +2,11 @@
 
 #include <string.h>
 
+#include "bring_up.h"
+#include "doubts.h"
 #include "idle_nodes.h"
 #include "missing_links.h"
+#include "notices.h"
 
 enum {
     CHECK_EVERY_US = 20000,
@@ -13,9 +16,9 @@ enum {
     PINGS_DUE_MAX = 8,         /* and none while so many wait for the wire */
     PING_AGAIN_US = 2000000,   /* a ping may have been lost with a node; */
     PING_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
-    PROBE_US = 3000000,
+    PROBE_US_MIN = 500000,
+    PROBE_US_MAX = 3000000,
     WIRE_DOWN_US_MAX = 8000000,
-    BRING_UP_US_MAX = 9000000,
     IN_USE_US_MAX = 5000000,  /* longer than a link keeps to a silent host, */
     IN_USE_US_LAST = 9000000, /* whether it was told so again or not */
     IN_USE_TOLD_US = 2000000, /* it is told so more often as long as it is so */
@@ -65,6 +68,15 @@ static void ping_next(struct host_service *s)
     }
 }
 
+/* The last part of the patience, in which a silent node is pinged alone. */
+static uint64_t probe_us(const struct host_service *s)
+{
+    uint64_t half = s->patience_us / 2;
+    uint64_t probe = PROBE_US_MIN + s->patience_us / 16;
+    probe = probe < PROBE_US_MAX ? probe : PROBE_US_MAX;
+    return probe < half ? probe : half;
+}
+
 void host_detector_begin(struct host_service *service, uint64_t now_us)
 {
     struct host_service *s = service;
@@ -86,7 +98,12 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
         node->pinged = false;
         node->ping_again_us = PING_AGAIN_US_MIN;
         node->sent = node->received = node->missed = 0;
-        node->silent_us = node->still_us = 0;
+        node->still_us = 0;
+        node->cut_off = false;
+        node->silent = 0;
+        if (node->silent_us > s->patience_us - probe_us(s)) {
+            node->silent_us = s->patience_us - probe_us(s);
+        }
         node->awaited = INCODE_NONE;
         node->left = false;
         s->report[i].up = s->report[i].ready = false;
@@ -138,7 +155,8 @@ int host_detector_pong(struct host_service *service,
                          message->size, sizeof pong);
     }
     memcpy(&pong, message->data, sizeof pong);
-    if (node->start != 0 && node->start != pong.start) {
+    bool anew = node->start != 0 && node->start != pong.start;
+    if (anew) {
         s->blamed = message->source;
     }
     bool first = !report->up;
@@ -150,7 +168,7 @@ int host_detector_pong(struct host_service *service,
         s->news_us = s->check_us;
         node->missed = pong.pinged - pong.received;
         node->ping_again_us = PING_AGAIN_US;
-        if (node->start != 0 && node->start != pong.start) {
+        if (anew) {
             close_start(s, message->source);
         }
         node->start = pong.start;
@@ -165,6 +183,9 @@ int host_detector_pong(struct host_service *service,
     }
     node->work = pong.work;
     node->awaited = pong.awaited;
+    node->refused = pong.refused;
+    node->silent = pong.silent;
+    host_doubts_heard(s, message->source, anew && first);
     host_missing_links_heard(s, message->source, pong.links);
     node->pinged = false;
     node->ping_due = false; /* what would have been asked again, is answered */
@@ -232,19 +253,39 @@ static int fail_wrong(const struct host_service *s, struct host_error *error)
                          : "run the same version of the program everywhere");
 }
 
+/* A node that was silent for as long as the user has patience. */
+static void give_up(struct host_service *s, unsigned i)
+{
+    struct host_node *node = &s->node[i];
+    node->silent_us = 0;
+    s->probe = true;
+    if (s->machine->kill != NULL && s->machine->kill(s->machine->context, i)) {
+        /* the machine will say that it has started it again */
+        host_notice(s, i, "no answer for %llu s; it is ended and started again",
+                    (unsigned long long)s->patience_us / 1000000);
+        return;
+    }
+    node->given_up = true;
+    s->blamed = i;
+    s->loss = true;
+    if (i == cube_wiring(s->cube)->gateway && s->machine->spare_node == 0) {
+        return; /* the error says so */
+    }
+    host_notice(s, i,
+                "given up after %llu s without an answer; its work is given "
+                "to others, look after that node and its wires",
+                (unsigned long long)s->patience_us / 1000000);
+}
+
 /* Nodes that are silent, and what follows.  One that takes nothing off its
  * links holds up all that is on the way to it and behind, and so makes others
- * silent: at first nobody is blamed, but each is pinged alone. */
+ * silent: at first nobody is blamed, but each is pinged alone, for the last
+ * part of the patience.  One that no live wire leads to needs no such proof. */
 static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
 {
-    uint16_t gateway = cube_wiring(s->cube)->gateway;
     for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];
-        /* Without the only gateway the run is over: haste gains nothing. */
-        bool haste =
-            s->probing && (i != gateway || s->machine->spare_node != 0);
-        uint64_t limit =
-            haste && s->patience_us > PROBE_US ? PROBE_US : s->patience_us;
+        bool alone = s->probing || node->cut_off;
         if (node->pinged && now_us - node->pinged_us >= node->ping_again_us) {
             node->ping_due = true;
             node->pinged_us = now_us;
@@ -257,18 +298,16 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
             continue;
         }
         node->silent_us += elapsed_us;
-        if (node->silent_us <= limit) {
+        if (node->silent_us <= s->patience_us - (alone ? 0 : probe_us(s))) {
             continue;
         }
-        node->silent_us = 0;
-        s->probe = true;
-        if (s->probing && s->machine->kill != NULL &&
-            s->machine->kill(s->machine->context, i)) {
-            continue; /* the machine will say that it has started it again */
+        if (alone) {
+            give_up(s, i);
+        } else {
+            s->probe = true;
+            s->blamed = i;
+            s->loss = true;
         }
-        node->given_up = s->probing;
-        s->blamed = i;
-        s->loss = true;
     }
 }
 
@@ -323,7 +362,9 @@ static int check_wire(struct host_service *s, uint64_t now_us,
         cube_link_statistics(s->cube, wire)->sessions == 0) {
         s->wire_down_us = now_us;
     }
-    if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX) {
+    /* Without another wire it is the node that is waited for. */
+    if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX &&
+        s->machine->spare_node != 0) {
         s->wire_lost = true;
         s->blamed = gateway;
         s->loss = true;
@@ -331,53 +372,18 @@ static int check_wire(struct host_service *s, uint64_t now_us,
     return 0;
 }
 
-/* For nodes to come: as long as the machine would need to start them. */
-static uint64_t patience_of(const struct host_service *s)
-{
-    return s->machine->restarts != NULL ? BRING_UP_US_MAX : s->patience_us;
-}
-
 int host_detector_doubt(const struct host_service *service, unsigned node,
                         struct host_error *error)
 {
     const struct host_machine *m = service->machine;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
-    return doubt == NULL
-               ? 0
-               : host_fail(error, HOST_CUBE, "node %u link %u: %s", node,
-                           host_detector_link(service, node), doubt);
-}
-
-static int fail_silent(const struct host_service *s, unsigned node,
-                       struct host_error *error)
-{
-    if (host_detector_doubt(s, node, error) != 0) {
-        return error->code;
-    }
-    return host_fail(error, HOST_CUBE,
-                     "node %u link %u: no answer, %u of %u nodes are there; is "
-                     "the node's program of this version%s, and the machine "
-                     "not too busy?",
-                     node, host_detector_link(s, node), s->up,
-                     s->machine->nodes,
-                     s->machine->keyed ? ", its key file the same" : "");
-}
-
-/* Nodes that have not answered since the generation began. */
-static int check_bring_up(const struct host_service *s, uint64_t now_us,
-                          struct host_error *error)
-{
-    if (s->started || s->up == s->work.living ||
-        now_us - s->began_us <= patience_of(s) ||
-        host_missing_links_undecided(s, now_us, patience_of(s))) {
+    if (doubt == NULL) {
         return 0;
     }
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->work.lost[i] && !s->report[i].up) {
-            return fail_silent(s, i, error);
-        }
-    }
-    return 0;
+    bool next = strchr(doubt, ';') != NULL;
+    return host_fail(error, HOST_CUBE, "node %u link %u: %s%s", node,
+                     host_detector_link(service, node), doubt,
+                     next ? "" : "; look after that node and its wires");
 }
 
 int host_detector_check(struct host_service *service, uint64_t now_us,
@@ -407,16 +413,18 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
         s->restarts = s->machine->restarts(s->machine->context);
         s->loss = true;
     }
-    if (!host_missing_links_check(s, now_us, patience_of(s))) {
-        s->loss = s->loss || wiring->dead_count > wiring->settled;
+    if (!host_missing_links_check(s, now_us, host_bring_up_patience(s))) {
+        s->loss = s->loss || (wiring->dead_count > wiring->settled &&
+                              host_missing_links_spare(s));
     }
     ping_in_turn(s, now_us);
     elapsed = elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX;
     listen(s, now_us, elapsed);
+    host_doubts_check(s, elapsed);
     host_idle_check(s, elapsed);
     host_missing_links_look(s, elapsed);
     if (check_wire(s, now_us, error) != 0) {
         return error->code;
     }
-    return check_bring_up(s, now_us, error);
+    return host_bring_up_check(s, now_us, error);
 }

@@ -3,10 +3,11 @@
  * Each node is pinged in turn.  Its pong names its start and how many messages
  * it has had and sent; another start than before, or a count that does not
  * match, is a loss.  So is a node that the machine had to start again, a dead
- * link that the cube has found, and a node that does not answer for the length
- * of the service's patience, and for a moment more in the next generation, when
- * it is pinged alone: the machine ends it, if it can start it again, and it
- * counts as lost otherwise.
+ * link that the cube has found and that no node needs, and a node that does not
+ * answer for the length of the service's patience, in the last part of which it
+ * is pinged alone, in the next generation: the machine ends it, if it can start
+ * it again, and it is given up otherwise.  One that answers and does nothing:
+ * idle_nodes.h.  What the user is told meanwhile: doubts.h.
  *
  * Memory: none of its own.  Work: constant a message; one pass over the nodes
  * at each check, every 20 ms.

@@ -1,6 +1,7 @@
 #include "generations.h"
 
 #include "failure_detector.h"
+#include "missing_links.h"
 #include "sending.h"
 #include "transport/wiring.h"
 
@@ -115,7 +116,7 @@ int host_generation_renew(struct host_service *service, uint64_t now_us,
     if (check_progress(s, error) != 0) {
         return error->code;
     }
-    if (s->searching) {
+    if (s->searching || (!s->started && !host_missing_links_spare(s))) {
         next.dead_count = next.settled; /* that a wire is absent shows later */
     } else {
         next.absent_s = s->started ? s->machine->absent_s : next.absent_s;

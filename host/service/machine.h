@@ -58,9 +58,14 @@ struct host_machine {
      * as where it is NULL: the node is not this machine's to start. */
     bool (*kill)(void *context, unsigned node);
     bool keyed; /* the nodes must have the host's key */
-    /* Why a node is not heard, and what to do, as "WHAT; WHAT TO DO NEXT";
-     * NULL, or the result: nothing is known of it. */
+    /* Why a node is not heard, as "WHAT" or "WHAT; WHAT TO DO NEXT"; NULL, or
+     * the result: nothing is known of it.  Until the next call. */
     const char *(*doubt)(void *context, unsigned node);
+    /* The line for a shell that starts the node, and by which address the host
+     * reaches it; NULL, or the results: it is not the user who starts it, the
+     * host has no wire to it.  Until the next call. */
+    const char *(*start_line)(void *context, unsigned node);
+    const char *(*address)(void *context, unsigned node);
     /* Leaves the host's wires alone for a time, as another host has them; NULL:
      * there is no other. */
     void (*rest)(void *context, uint64_t rest_us);

@@ -16,9 +16,9 @@ enum {
     ATTENTIVE_US = 1000000 /* a node without an answer for longer is not */
 };
 
-/* Follows live links from the gateway; true: they lead to all nodes. */
-static bool holds_together(const struct host_service *s,
-                           const struct cube_wiring *w)
+/* Follows live links from the gateway: which nodes they lead to. */
+static const bool *follow(const struct host_service *s,
+                          const struct cube_wiring *w)
 {
     static bool reached[HOST_NODES_MAX];
     unsigned dimension = s->machine->dimension, count = 1, before = 0;
@@ -37,8 +37,34 @@ static bool holds_together(const struct host_service *s,
             }
         }
     }
-    return count == s->machine->nodes &&
-           !wiring_is_dead(w, w->dead_count, w->gateway, dimension, dimension);
+    return reached;
+}
+
+/* True: they lead to all nodes that are not lost, and so does the host's. */
+static bool holds_together(const struct host_service *s,
+                           const struct cube_wiring *w)
+{
+    unsigned dimension = s->machine->dimension;
+    const bool *reached = follow(s, w);
+    bool all =
+        !wiring_is_dead(w, w->dead_count, w->gateway, dimension, dimension);
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        all = all && (reached[i] || s->work.lost[i]);
+    }
+    return all;
+}
+
+bool host_missing_links_spare(struct host_service *service)
+{
+    struct host_service *s = service;
+    struct cube_wiring found = *cube_wiring(s->cube);
+    found.gateway = host_generation_gateway(s, &found);
+    bool spare = holds_together(s, &found);
+    const bool *reached = follow(s, &found);
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        s->node[i].cut_off = !spare && !s->work.lost[i] && !reached[i];
+    }
+    return spare;
 }
 
 /* Errors and what is as good as one go there, whatever else is quiet. */
@@ -102,15 +128,6 @@ static uint64_t search_us(uint64_t patience_us)
 {
     uint64_t most = patience_us * 2 / 5;
     return most < SEARCH_US_MAX ? most : SEARCH_US_MAX;
-}
-
-bool host_missing_links_undecided(const struct host_service *service,
-                                  uint64_t now_us, uint64_t patience_us)
-{
-    const struct host_service *s = service;
-    return s->machine->absent_s != 0 &&
-           (s->searching ? now_us - s->search_us < search_us(patience_us)
-                         : now_us - s->news_us < wait_us(patience_us));
 }
 
 bool host_missing_links_check(struct host_service *service, uint64_t now_us,

@@ -33,9 +33,10 @@
 bool host_missing_links_check(struct host_service *service, uint64_t now_us,
                               uint64_t patience_us);
 
-/* Whether a search is on or due, so that nobody is to be blamed yet. */
-bool host_missing_links_undecided(const struct host_service *service,
-                                  uint64_t now_us, uint64_t patience_us);
+/* Whether all nodes can do without what has been found dead.  Where they
+ * cannot, those who are cut off by it are waited for as any silent node is, and
+ * are noted as such. */
+bool host_missing_links_spare(struct host_service *service);
 
 /* A node has said which of its links have been up. */
 void host_missing_links_heard(struct host_service *service, unsigned node,

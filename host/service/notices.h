@@ -16,6 +16,11 @@ enum { HOST_NOTICE_BYTES = 2000 }; /* of a line, cut there */
 void host_notice(struct host_service *service, unsigned node,
                  const char *format, ...) __attribute__((format(printf, 3, 4)));
 
+/* The same of one of its links. */
+void host_notice_of(struct host_service *service, unsigned node, unsigned link,
+                    const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
 /* The same of the host's own wire, or of no node in particular. */
 void host_notice_line(struct host_service *service, const char *line);
 

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bring_up.h"
 #include "failure_detector.h"
 #include "generations.h"
 #include "handlers.h"
@@ -127,6 +128,7 @@ int host_service_open(struct host_service *service, struct host_error *error)
     }
     s->generations = 1;
     s->check_us = s->wire_down_us = now_of(s);
+    s->opened_us = s->came_us = s->check_us;
     host_detector_begin(s, s->check_us);
     return 0;
 }
@@ -141,6 +143,9 @@ int host_service_start(struct host_service *service, struct host_error *error)
     int status = host_service_open(service, error);
     while (status == 0 && !host_service_is_up(service)) {
         status = host_service_round(service, error);
+    }
+    if (status == 0) {
+        host_bring_up_done(service);
     }
     return status;
 }

@@ -58,6 +58,7 @@ struct host_node {
     bool started_anew;       /* as it was not to be trusted with work */
     uint32_t work;           /* as its last pong counted it, */
     uint32_t awaited;        /* and the page that it waited for */
+    uint32_t refused;        /* links where it met another key */
     uint64_t still_us;       /* without progress: idle_nodes.h */
     bool pinged;             /* a ping has not been answered */
     bool ping_last;          /* what it was sent last is a ping */
@@ -65,6 +66,11 @@ struct host_node {
     uint32_t missed;         /* pings that were lost before the first answer */
     uint32_t start;          /* the epoch of its start; 0: not heard of */
     uint64_t silent_us;      /* that it has not answered */
+    bool cut_off;            /* no live wire leads to it */
+    uint32_t silent;         /* links by which it hears nothing */
+    bool doubted;            /* the user was told so: doubts.h; */
+    uint32_t wires_doubted;  /* and of these links, */
+    uint64_t wires_us;       /* after so long */
     uint64_t pinged_us, ping_again_us;
     uint32_t links;          /* that have been up, as either end has said */
     uint64_t links_heard_us; /* uncabled_us when this end said so last */
@@ -122,7 +128,14 @@ struct host_service {
     /* Losses in a row without a brick between them that was committed. */
     unsigned fruitless;
     uint32_t committed_before;
-    bool wire_lost; /* the one in use is dead */
+    bool wire_lost;                      /* the one in use is dead */
+    uint64_t wire_frames, wire_quiet_us; /* that have come by it; since then */
+    /* Nodes to come: bring_up.h. */
+    unsigned there; /* the most that were, */
+    uint64_t came_us,
+        opened_us;       /* when the last of them came; the first look */
+    char waiting[400];   /* what the user was told, as far as needed, */
+    uint64_t waiting_us; /* and when */
     /* Wires that never came up are looked for: missing_links.h. */
     bool searching;
     uint64_t search_us;   /* since when, */

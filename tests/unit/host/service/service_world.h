@@ -56,6 +56,8 @@ static struct {
     bool sequential;     /* how it runs */
     bool sick;           /* node 0 starts again whenever it has work */
     uint64_t patience_s; /* 0: 8 */
+    uint64_t stopped_us; /* when a run that failed ended its nodes */
+    void (*stop)(void *context);
     /* What the user was told, and when. */
     struct {
         char line[TOLD_BYTES];
@@ -209,6 +211,14 @@ static inline uint64_t told_us(const char *text)
     return UINT64_MAX;
 }
 
+/* The first stop of the machine is the run's end. */
+static inline void machine_stop(void *context)
+{
+    world.stopped_us =
+        world.stopped_us == 0 ? world.sim.now_us : world.stopped_us;
+    world.stop(context);
+}
+
 static inline bool machine_ended(void *context)
 {
     (void)context;
@@ -220,6 +230,8 @@ static inline struct host_machine make_machine(void)
     struct host_machine machine = host_world_machine(&world.sim);
     machine.missing = NULL;
     machine.told = machine_told;
+    world.stop = machine.stop;
+    machine.stop = machine_stop;
     machine.check = machine_check;
     machine.ended = machine_ended;
     return machine;

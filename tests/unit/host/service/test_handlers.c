@@ -490,7 +490,7 @@ static void test_texts(void **unused)
         {NODE_READY, &ready, sizeof ready, "protocol version 4, expected 5"},
         {NODE_READY, &ready, 4, "protocol version 4, expected 5"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
-        {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 32"},
+        {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 36"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
         {NODE_RESULT, &ready, 2, "results in 2 bytes, expected 8"},
         {NODE_PAGE_REQUEST, &page, 4, "page 1000000 out of range 0.."},

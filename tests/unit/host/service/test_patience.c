@@ -83,6 +83,137 @@ static void test_idle_holder(void **unused)
     assert_int_equal(told_us("node 0"), UINT64_MAX);
 }
 
+/* --- nodes that do not answer ----------------------------------------------
+ */
+
+static void cut_off(unsigned node)
+{
+    for (unsigned d = 0; d < DIMENSION; d++) {
+        world.events[d] = (struct event){CUT, 0.4, node, d};
+    }
+}
+
+/* One that is killed, stopped or cut off is named within two seconds, and
+ * given up when the patience is over, neither before nor later: whatever its
+ * links are found to be meanwhile. */
+static void test_silent(void **unused)
+{
+    (void)unused;
+    for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
+        for (unsigned how = 0; how < 3; how++) {
+            uint64_t patience_us = patiences[k] * SECOND;
+            char text[80];
+            prepare();
+            world.patience_s = patiences[k];
+            world.dead_us = how == 1 ? 0 : 1500000;
+            if (how < 2) {
+                world.events[0] =
+                    (struct event){how == 0 ? KILL : STOP, 0.4, 5, 0};
+            } else {
+                cut_off(5);
+            }
+            survives(&host_spatial);
+            snprintf(text, sizeof text,
+                     "node 5 link 2: given up after %u s without an answer; ",
+                     (unsigned)patiences[k]);
+            told_at(text, time_of(0.4) + patience_us);
+            uint64_t doubt_us = told_us("node 5 link 2: no answer for ");
+            if (patiences[k] > 1 && doubt_us > time_of(0.4) + 2 * SECOND) {
+                show_told();
+                fail_msg("it was not doubted in time");
+            }
+            assert_int_equal(result.lost, 1);
+        }
+    }
+}
+
+/* One that comes back in time is told of as well, and nothing is lost. */
+static void test_back(void **unused)
+{
+    (void)unused;
+    prepare();
+    world.dead_us = 0;
+    world.stop_us = 3 * SECOND;
+    world.events[0] = (struct event){STOP, 0.4, 6, 0};
+    survives(&host_spatial);
+    assert_int_equal(result.generations, 1);
+    assert_int_equal(result.lost, 0);
+    assert_int_equal(world.told_count, 2);
+    told_at("node 6 link 2: no answer for ", time_of(0.4) + SECOND);
+    told_at("node 6 link 2: answers again; ", time_of(0.4) + 3 * SECOND);
+    prepare();
+    world.events[0] = (struct event){RESTART, 0.4, 6, 0};
+    survives(&host_spatial);
+    assert_int_equal(world.told_count, 1);
+    told_at("node 6 link 2: has started again; ", time_of(0.4));
+}
+
+/* The same of node 0: without it the cube cannot go on. */
+static void test_silent_gateway(void **unused)
+{
+    (void)unused;
+    for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
+        prepare();
+        world.patience_s = patiences[k];
+        world.events[0] = (struct event){KILL, 0.4, 0, 0};
+        start_world();
+        fails_with("node 0 link 3: lost, and the cube cannot go on without it");
+        assert_in_range(world.stopped_us, time_of(0.4) + patiences[k] * SECOND,
+                        time_of(0.4) + patiences[k] * SECOND + 2 * SLACK_US);
+        assert_int_equal(told_us("node 1"), UINT64_MAX); /* nobody knows */
+    }
+}
+
+/* --- nodes that never come -------------------------------------------------
+ */
+
+static void test_never_started(void **unused)
+{
+    (void)unused;
+    for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
+        for (unsigned i = 0; i < NODES; i += 3) {
+            char text[80];
+            prepare();
+            world.patience_s = patiences[k];
+            world.absent_s = k % 2 == 0 ? 3 : 0;
+            start_world();
+            host_world_late(&world.sim, i, UINT64_MAX / 4);
+            snprintf(text, sizeof text, "no answer for %u s, %u of 8 nodes are",
+                     (unsigned)patiences[k], i == 0 ? 0 : 7);
+            fails_with(text);
+            uint64_t end_us = world.stopped_us;
+            assert_in_range(end_us, patiences[k] * SECOND,
+                            patiences[k] * SECOND + 2 * SLACK_US);
+            snprintf(text, sizeof text, "node %u: no answer, %s", i,
+                     i == 0 ? "and the other 7 are behind it; "
+                            : "7 of 8 are there; ");
+            if (patiences[k] > 1) {
+                told_at(text, 1500000);
+            }
+        }
+    }
+}
+
+/* Those who come late are told of, and who is still to come. */
+static void test_late(void **unused)
+{
+    (void)unused;
+    prepare();
+    world.absent_s = 3;
+    start_world();
+    host_world_late(&world.sim, 3, 3 * SECOND);
+    host_world_late(&world.sim, 4, 5 * SECOND);
+    survives_as(&host_spatial);
+    assert_int_equal(result.missing_wires, 0);
+    told_at("node 4: no answer, nor of 2 more, 5 of 8 are known ", 1500000);
+    told_at("node 4: no answer, 7 of 8 are there; ", 3 * SECOND);
+    told_at("host: all nodes are there; ", 5 * SECOND);
+    assert_int_equal(world.told_count, 3);
+}
+
+/* --- nodes that do nothing, again ------------------------------------------
+ */
+
 /* Where nobody works, the run ends. */
 static void test_all_idle(void **unused)
 {
@@ -100,6 +231,11 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_idle),
         cmocka_unit_test(test_idle_holder),
+        cmocka_unit_test(test_silent),
+        cmocka_unit_test(test_back),
+        cmocka_unit_test(test_silent_gateway),
+        cmocka_unit_test(test_never_started),
+        cmocka_unit_test(test_late),
         cmocka_unit_test(test_all_idle),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -1,0 +1,168 @@
+#include "bring_up.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "failure_detector.h"
+#include "notices.h"
+
+enum {
+    STARTED_HERE_US = 9000000, /* the machine's own nodes need no more */
+    TELL_US = 1500000,
+    TELL_AGAIN_US = 1000000
+};
+
+uint64_t host_bring_up_patience(const struct host_service *service)
+{
+    return service->machine->restarts != NULL ? STARTED_HERE_US
+                                              : service->patience_us;
+}
+
+/* How many nodes are not there, and the first of them, nearest first.  by_wire:
+ * one whose wire was up is there. */
+static unsigned count(const struct host_service *s, bool by_wire,
+                      unsigned *first)
+{
+    unsigned sum = 0, least = UINT32_MAX;
+    unsigned gateway = cube_wiring(s->cube)->gateway;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        unsigned away = (unsigned)__builtin_popcount(i ^ gateway);
+        bool missing = !s->work.lost[i] && !s->report[i].up &&
+                       !(by_wire && s->node[i].links != 0);
+        sum += missing;
+        if (missing && away < least) {
+            least = away;
+            *first = i;
+        }
+    }
+    return sum;
+}
+
+/* Wires tell of nodes that cannot answer yet, and of some that are gone. */
+static unsigned count_missing(const struct host_service *s, unsigned *first)
+{
+    unsigned missing = count(s, true, first);
+    return missing > 0 ? missing : count(s, false, first);
+}
+
+/* A neighbour that has met somebody with another key where the node should be;
+ * -1: none has. */
+static int refused_by(const struct host_service *s, unsigned node)
+{
+    for (unsigned d = 0; d < s->machine->dimension; d++) {
+        if ((s->node[node ^ 1u << d].refused >> d & 1) != 0) {
+            return (int)(node ^ 1u << d);
+        }
+    }
+    return -1;
+}
+
+/* Why the node is not heard, as "WHAT" or "WHAT; NEXT". */
+static const char *reason(const struct host_service *s, unsigned node,
+                          char *text, size_t size)
+{
+    const struct host_machine *m = s->machine;
+    const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
+    int other = refused_by(s, node);
+    if (doubt != NULL) {
+        snprintf(text, size, "%s", doubt);
+    } else if (other >= 0) {
+        snprintf(text, size,
+                 "node %d meets another key there; give both the same key file",
+                 other);
+    } else {
+        snprintf(text, size, "no answer");
+    }
+    return text;
+}
+
+/* Writes who is waited for: "node 3 at ADDRESS: WHY, 2 of 4 nodes are there;
+ * start it with: LINE". */
+static void describe(const struct host_service *s, char *line, size_t size)
+{
+    const struct host_machine *m = s->machine;
+    char why[160], more[80] = "";
+    unsigned node = 0, missing = count_missing(s, &node);
+    const char *at = m->address == NULL ? NULL : m->address(m->context, node);
+    const char *start =
+        m->start_line == NULL ? NULL : m->start_line(m->context, node);
+    bool next = strchr(reason(s, node, why, sizeof why), ';') != NULL;
+    if (missing == m->nodes && missing > 1) {
+        snprintf(more, sizeof more, ", and the other %u are behind it",
+                 missing - 1);
+    } else if (missing > 1) {
+        snprintf(more, sizeof more,
+                 ", nor of %u more, %u of %u are known to be there",
+                 missing - 1, m->nodes - missing, m->nodes);
+    } else {
+        snprintf(more, sizeof more, ", %u of %u are there", m->nodes - missing,
+                 m->nodes);
+    }
+    snprintf(line, size, "node %u%s%s: %s%s%s%s", node,
+             at != NULL ? " at " : "", at != NULL ? at : "", why,
+             next ? "" : more,
+             next            ? ""
+             : start != NULL ? "; start it with: "
+                             : "; is it started, and wired as it should be?",
+             next || start == NULL ? "" : start);
+}
+
+static void tell(struct host_service *s, uint64_t now_us)
+{
+    char line[HOST_NOTICE_BYTES];
+    if (now_us - s->opened_us < TELL_US || s->machine->restarts != NULL ||
+        (s->waiting[0] != '\0' && now_us - s->waiting_us < TELL_AGAIN_US)) {
+        return;
+    }
+    describe(s, line, sizeof line);
+    if (strncmp(line, s->waiting, sizeof s->waiting - 1) != 0) {
+        snprintf(s->waiting, sizeof s->waiting, "%.*s",
+                 (int)sizeof s->waiting - 1, line);
+        s->waiting_us = now_us;
+        host_notice_line(s, line);
+    }
+}
+
+static int fail(const struct host_service *s, struct host_error *error)
+{
+    unsigned first = 0, missing = count_missing(s, &first);
+    if (host_detector_doubt(s, first, error) != 0) {
+        return error->code;
+    }
+    return host_fail(
+        error, HOST_CUBE,
+        "node %u link %u: no answer for %llu s, %u of %u nodes are there; %s%s",
+        first, host_detector_link(s, first),
+        (unsigned long long)host_bring_up_patience(s) / 1000000,
+        s->machine->nodes - missing, s->machine->nodes,
+        s->machine->start_line != NULL
+            ? "start those that are missing, incode cube prints how"
+            : "is the node's program of this version, and the machine not too "
+              "busy?",
+        s->machine->keyed ? ", with the same key file" : "");
+}
+
+int host_bring_up_check(struct host_service *service, uint64_t now_us,
+                        struct host_error *error)
+{
+    struct host_service *s = service;
+    unsigned first = 0;
+    if (s->started || s->up == s->work.living) {
+        return 0;
+    }
+    unsigned there = s->machine->nodes - count(s, true, &first);
+    if (there > s->there) {
+        s->there = there;
+        s->came_us = now_us;
+    }
+    tell(s, now_us);
+    return now_us - s->came_us <= host_bring_up_patience(s) ? 0
+                                                            : fail(s, error);
+}
+
+void host_bring_up_done(struct host_service *service)
+{
+    if (service->waiting[0] != '\0') {
+        host_notice_line(service, "host: all nodes are there; the run begins");
+    }
+}

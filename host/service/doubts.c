@@ -1,0 +1,131 @@
+#include "doubts.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "notices.h"
+
+enum { DOUBT_US = 1300000, WIRE_US = 1200000 };
+
+/* By which wire the host speaks now. */
+static unsigned wire_of(const struct host_service *s)
+{
+    uint16_t gateway = cube_wiring(s->cube)->gateway;
+    return gateway != 0 && gateway == s->machine->spare_node ? 1 : 0;
+}
+
+static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
+{
+    uint64_t frames =
+        cube_link_statistics(s->cube, wire_of(s))->frames_received;
+    s->wire_quiet_us =
+        frames == s->wire_frames ? s->wire_quiet_us + elapsed_us : 0;
+    s->wire_frames = frames;
+}
+
+/* Whether the node has answered of late. */
+static bool is_heard(const struct host_service *s, unsigned i)
+{
+    return !s->work.lost[i] && s->report[i].up && !s->node[i].doubted &&
+           s->node[i].silent_us < DOUBT_US / 2;
+}
+
+/* How many say that the node is silent, and have not said since that it is not;
+ * *others: how many are heard and say nothing of the kind. */
+static unsigned witnesses(const struct host_service *s, unsigned i,
+                          unsigned *others)
+{
+    unsigned silent = 0;
+    *others = 0;
+    if (i == cube_wiring(s->cube)->gateway) {
+        silent += s->wire_quiet_us > WIRE_US;
+        *others += s->wire_quiet_us <= WIRE_US;
+    }
+    for (unsigned d = 0; d < s->machine->dimension; d++) {
+        unsigned other = i ^ 1u << d;
+        bool up = (s->node[other].links >> d & 1) != 0;
+        bool quiet = (s->node[other].silent >> d & 1) != 0;
+        silent += up && quiet && !s->work.lost[other];
+        *others += up && !quiet && is_heard(s, other);
+    }
+    return silent;
+}
+
+static void doubt(struct host_service *s, unsigned i)
+{
+    const struct host_machine *m = s->machine;
+    const char *why = m->doubt == NULL ? NULL : m->doubt(m->context, i);
+    bool next = why != NULL && strchr(why, ';') != NULL;
+    s->node[i].doubted = true;
+    host_notice(s, i,
+                "no answer for %.1f s%s%s%s given up after %llu s without one, "
+                "look after that node",
+                1e-6 * (double)s->node[i].silent_us, why == NULL ? "" : ": ",
+                why == NULL ? "" : why, next ? ", or" : "; it is",
+                (unsigned long long)s->patience_us / 1000000);
+}
+
+static void doubt_wire(struct host_service *s, unsigned i, unsigned d)
+{
+    s->node[i].wires_doubted |= 1u << d;
+    s->node[i ^ 1u << d].wires_doubted |= 1u << d;
+    host_notice_of(s, i, d,
+                   "nothing comes by the wire to node %u; if it stays so "
+                   "the run goes round it, look after that wire",
+                   i ^ 1u << d);
+}
+
+/* Wires that one end says are silent, while the node at the other is heard: for
+ * a while, as one that comes back is heard before it is told so. */
+static void look_at_links(struct host_service *s, unsigned i,
+                          uint64_t elapsed_us)
+{
+    struct host_node *node = &s->node[i];
+    uint32_t wires = node->silent & ~node->wires_doubted;
+    for (unsigned d = 0; d < s->machine->dimension; d++) {
+        bool both = is_heard(s, i) && is_heard(s, i ^ 1u << d);
+        wires &= both ? ~(uint32_t)0 : ~(1u << d);
+    }
+    wires &= (1u << s->machine->dimension) - 1;
+    node->wires_us = wires != 0 ? node->wires_us + elapsed_us : 0;
+    for (unsigned d = 0; wires >> d != 0 && node->wires_us > WIRE_US / 2; d++) {
+        if ((wires >> d & 1) != 0) {
+            doubt_wire(s, i, d);
+        }
+    }
+}
+
+void host_doubts_check(struct host_service *service, uint64_t elapsed_us)
+{
+    struct host_service *s = service;
+    unsigned others;
+    look_at_wire(s, elapsed_us);
+    for (unsigned i = 0; i < s->machine->nodes && s->started; i++) {
+        uint64_t limit =
+            s->patience_us / 2 < DOUBT_US ? s->patience_us / 2 : DOUBT_US;
+        if (s->work.lost[i] || s->node[i].doubted) {
+            continue;
+        }
+        if (s->node[i].silent_us > limit && witnesses(s, i, &others) > 0 &&
+            others == 0) {
+            doubt(s, i);
+        } else {
+            look_at_links(s, i, elapsed_us);
+        }
+    }
+}
+
+void host_doubts_heard(struct host_service *service, unsigned node, bool anew)
+{
+    struct host_service *s = service;
+    struct host_node *n = &s->node[node];
+    n->wires_doubted &= n->silent;
+    if (anew) {
+        host_notice(s, node,
+                    "has started again; what it had not finished is done "
+                    "again");
+    } else if (n->doubted) {
+        host_notice(s, node, "answers again; the run goes on with it");
+    }
+    n->doubted = false;
+}
