@@ -441,7 +441,7 @@ done
 # --- cube files ---------------------------------------------------------------
 
 cube() { "$INCODE" cube "$@"; }
-refuses 'cube/a directory' 3 "^incode: $in: Is a directory; " cube "$in"
+refuses 'cube/a directory' 3 "^incode: $in: a directory; " cube "$in"
 refuses 'cube/no such file' 3 'absent.cube: No such file' cube "$in/absent.cube"
 refuses 'cube/no text' 3 'good.npy: not a text' cube "$in/good.npy"
 printf 'dimension = 0; key = "seen.key";
@@ -456,9 +456,7 @@ check 'cube/a key that others can read' "$(last "$scratch/errors")" \
 chmod 600 "$in/seen.key"
 cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"
 check 'cube/a key of its own, from a file' "exit $?" test ! -s "$scratch/errors"
-cube <(cat "$in/seen.cube" | sed 's/key = "[^"]*";//
-    s/7500";/7500"; insecure = true;/') > "$scratch/output"
-check 'cube/from a pipe' "exit $?" grep -q -e '--board linux' "$scratch/output"
+refuses 'cube/from a pipe' 3 ': a pipe or device; ' cube <(cat "$in/seen.cube")
 
 # --- a node's own arguments ---------------------------------------------------
 
@@ -493,15 +491,15 @@ node 'another board' '--board z80: another board' \
     --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --board z80
 node 'an address of others' '--wire 0=listen:192.0.2.1:5: cannot listen .*: ' \
     --node 0 --dimension 0 --wire 0=listen:192.0.2.1:5 --key "$in/key"
-node 'no key' '--wire 0=listen:127.0.0.1:5: a wire over TCP wants a key; make' \
+node 'no key' '--wire 0=listen:127.0.0.1:5: a wire over TCP wants a key' \
     --node 0 --dimension 0 --wire 0=listen:127.0.0.1:5
-node 'no key to call with' '--wire 0=call:.*: a wire over TCP wants a key; ' \
+node 'no key to call with' '--wire 0=call:.*: a wire over TCP wants a key' \
     --node 0 --dimension 0 --wire 0=call:127.0.0.1:5
 node 'no links' '--insecure x: not links as in 0,2' \
     --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --insecure x
 node 'a path that is too long' '--wire .*: not a path of 1 to 107 bytes' \
     --node 0 --dimension 0 --wire "0=unix-listen:/$(printf '%0107d' 0)"
-node 'a path of a file' '--wire 0=unix-listen:.*: cannot listen.*: that file is' \
+node 'a path of a file' '--wire 0=unix-listen:.*: cannot listen there: File exists' \
     --node 0 --dimension 0 --wire "0=unix-listen:$in/key"
 node 'no such wire' '--wire 0=tape:a: not one of listen:' \
     --node 0 --dimension 0 --wire 0=tape:a

@@ -63,8 +63,7 @@ start_nodes() {
     local options
     nodes=
     while read -r options; do
-        # shellcheck disable=SC2086
-        "$BUILD/"$options 2> /dev/null < /dev/null &
+        eval "$BUILD/$options 2> /dev/null < /dev/null &"
         nodes="$nodes $!"
     done < <("$INCODE" cube "$1" | grep -e "${2:-^incode-node }")
 }
