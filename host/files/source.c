@@ -59,6 +59,15 @@ static int too_large(const struct host_source *source, size_t bytes,
                      (double)source->most / mb);
 }
 
+int host_source_unpacks(const struct host_source *source, uint64_t packed,
+                        uint64_t bytes, struct host_error *error)
+{
+    struct host_source part = {.path = source->path, .packed = (size_t)packed};
+    return bytes > most_bytes(&part, (size_t)bytes)
+               ? too_large(&part, (size_t)bytes, error)
+               : 0;
+}
+
 /* Room for `more` bytes, or for as many as it may have, if for any. */
 static int reserve(struct host_source *source, size_t more,
                    struct host_error *error)

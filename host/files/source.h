@@ -41,6 +41,11 @@ int host_source_open(struct host_source *source, const char *path, bool packed,
 int host_source_wrap(struct host_source *source, const char *path,
                      const void *data, size_t bytes, struct host_error *error);
 
+/* Whether `bytes` that `packed` of the file's become, at once, are within the
+ * same bounds; else HOST_INPUT. */
+int host_source_unpacks(const struct host_source *source, uint64_t packed,
+                        uint64_t bytes, struct host_error *error);
+
 void host_source_close(struct host_source *source);
 
 /* "PATH: what" with HOST_INPUT. */

@@ -241,8 +241,8 @@ static bool is_binary(struct host_scan *s, struct host_error *error)
     }
     host_scan_fail(s, nul, error,
                    "a NUL byte where text is due: the file is binary or UTF-16 "
-                   "perhaps; give it the extension of its format, or save it "
-                   "as UTF-8");
+                   "perhaps; give it the extension of its format, or say it "
+                   "with --format, or save it as UTF-8");
     return true;
 }
 

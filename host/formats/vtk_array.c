@@ -156,7 +156,9 @@ static int unpack_blocks(struct vtk_array *out, const struct packed *p,
         if (packed > p->bytes || size > packed * INFLATION_MAX + 1024 ||
             size * blocks > packed * INFLATION_MAX * 2 + 1024 * blocks) {
             damaged(p, error);
-        } else if (plain(&in, p, head.bytes + (size_t)packed, error) == 0 &&
+        } else if (host_source_unpacks(p->source, packed, size * blocks,
+                                       error) == 0 &&
+                   plain(&in, p, head.bytes + (size_t)packed, error) == 0 &&
                    reserve(out, (size_t)(size * blocks), error) == 0) {
             inflate_blocks(out, p, &head, &in, blocks, error);
         }

@@ -7,35 +7,57 @@
 
 enum { ROWS_SHOWN = 1 << 14 }; /* a clock a point would cost too much */
 
+enum { ROW_BYTES = 3 * sizeof(double) };
+
+/* Makes room for `rows` more, by half of what there is; where that is much, not
+ * beyond the memory that is available, which the kernel would give and then end
+ * the program for. */
+static int grow(struct host_points *points, uint64_t rows,
+                struct host_error *error)
+{
+    const uint64_t much = ((uint64_t)64 << 20) / ROW_BYTES;
+    uint64_t more = points->capacity / 2 + rows + 1024;
+    void *grown = NULL;
+    if (more > much) {
+        uint64_t room = host_memory_available() / ROW_BYTES;
+        more = room <= much ? 0 : room < more ? room : more;
+    }
+    uint64_t capacity = points->capacity + more;
+    if (more >= rows) {
+        grown = host_remap(points->xyz, points->capacity * ROW_BYTES,
+                           capacity * ROW_BYTES);
+    }
+    if (grown == NULL) {
+        return host_fail(error, HOST_INPUT,
+                         "host: more than %llu points are no longer held by "
+                         "the memory available; free some memory or take a "
+                         "machine with more",
+                         (unsigned long long)points->count);
+    }
+    points->xyz = grown;
+    points->capacity = capacity;
+    return 0;
+}
+
 int host_points_append(struct host_points *points, const double *xyz,
                        uint64_t rows, struct host_error *error)
 {
-    const size_t row = 3 * sizeof *points->xyz;
     if (points->count + rows >= UINT32_MAX) {
         return host_fail(error, HOST_INPUT,
                          "host: more points than row numbers of 32 bits "
                          "allow; split the input");
     }
-    if (points->capacity - points->count < rows) {
-        uint64_t capacity = points->capacity * 3 / 2 + rows + 1024;
-        void *grown =
-            host_remap(points->xyz, points->capacity * row, capacity * row);
-        if (grown == NULL) {
-            return host_fail_memory(error, "the points");
-        }
-        points->xyz = grown;
-        points->capacity = capacity;
+    if (points->capacity - points->count < rows &&
+        grow(points, rows, error) != 0) {
+        return error->code;
     }
-    memcpy(points->xyz + 3 * points->count, xyz, rows * row);
-    if ((points->count + rows) / ROWS_SHOWN != points->count / ROWS_SHOWN) {
-        host_progress_show(0, 0, points->count + rows);
-    }
+    memcpy(points->xyz + 3 * points->count, xyz, rows * ROW_BYTES);
     points->count += rows;
     return 0;
 }
 
 void host_points_free(struct host_points *points)
 {
-    host_unmap(points->xyz, points->capacity * 3 * sizeof *points->xyz);
+    host_unmap(points->xyz, points->capacity * ROW_BYTES);
     *points = (struct host_points){0};
 }

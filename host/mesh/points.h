@@ -27,7 +27,7 @@ struct host_points {
     bool wide;         /* columns after the third were passed over */
 };
 
-/* Appends rows; HOST_BROKEN without memory, HOST_INPUT past 2^32 - 2 rows. */
+/* Appends rows; HOST_INPUT past 2^32 - 2 rows, or what the memory holds. */
 int host_points_append(struct host_points *points, const double *xyz,
                        uint64_t rows, struct host_error *error);
 

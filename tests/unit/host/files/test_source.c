@@ -16,6 +16,7 @@
 
 #include "host/base/memory.h"
 #include "host/files/source.h"
+#include "host/formats/read.h"
 
 /* A directory of its own, which is the current one. */
 static char directory[] = "/tmp/incode-source-XXXXXX";
@@ -124,12 +125,87 @@ static void a_plain_file_beyond_the_memory(void **unused)
     assert_int_equal(unlink("huge.las"), 0);
 }
 
+/* A file of points whose numbers are a block of nothing but zeros. */
+static char *zeros_in_vtk(size_t points, size_t *bytes)
+{
+    enum { ROOM = 1 << 18 };
+    uLongf size = 24 * points, packed = ROOM - 1024;
+    char *file = malloc(ROOM), *zeros = calloc(1, size);
+    assert_true(file != NULL && zeros != NULL);
+    int n = snprintf(file, ROOM,
+                     "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" "
+                     "compressor=\"vtkZLibDataCompressor\"><PolyData>"
+                     "<Piece NumberOfPoints=\"%zu\"><Points><DataArray "
+                     "type=\"Float64\" NumberOfComponents=\"3\" "
+                     "format=\"appended\" offset=\"0\"/></Points></Piece>"
+                     "</PolyData><AppendedData encoding=\"raw\">_",
+                     points);
+    char *head = file + n;
+    assert_int_equal(
+        compress2((Bytef *)head + 16, &packed, (Bytef *)zeros, size, 1), Z_OK);
+    const uint32_t words[] = {1, (uint32_t)size, (uint32_t)size,
+                              (uint32_t)packed};
+    for (int i = 0; i < 16; i++) {
+        head[i] = (char)(words[i / 4] >> (8 * (i % 4)));
+    }
+    static const char end[] = "</AppendedData></VTKFile>";
+    memcpy(head + 16 + packed, end, sizeof end - 1);
+    *bytes = (size_t)n + 16 + packed + sizeof end - 1;
+    free(zeros);
+    return file;
+}
+
+static void an_array_beyond_the_memory(void **unused)
+{
+    (void)unused;
+    struct host_points points;
+    struct host_error error = {0};
+    size_t bytes;
+    char *file = zeros_in_vtk(1750000, &bytes);
+    leave_memory((uint64_t)72 << 20);
+    assert_int_equal(host_points_parse("a.vtp", file, bytes, &points, &error),
+                     HOST_INPUT);
+    assert_int_equal(setrlimit(RLIMIT_AS, &before), 0);
+    assert_non_null(strstr(error.text, "a.vtp: 0."));
+    assert_non_null(strstr(error.text, "become more than 3"));
+    error = (struct host_error){0};
+    assert_int_equal(host_points_parse("a.vtp", file, bytes, &points, &error),
+                     0);
+    assert_int_equal(points.count, 1750000);
+    host_points_free(&points);
+    free(file);
+}
+
+/* Numbers of a byte each become points of 24: these tell how many there were.
+ */
+static void points_beyond_the_memory(void **unused)
+{
+    (void)unused;
+    enum { ROWS = 4096 };
+    static const double some[3 * ROWS];
+    struct host_points points = {0};
+    struct host_error error = {0};
+    unsigned long long told = 0;
+    leave_memory((uint64_t)320 << 20);
+    while (host_points_append(&points, some, ROWS, &error) == 0) {
+    }
+    assert_int_equal(setrlimit(RLIMIT_AS, &before), 0);
+    assert_int_equal(error.code, HOST_INPUT);
+    assert_int_equal(sscanf(error.text, "host: more than %llu points", &told),
+                     1);
+    assert_int_equal(told, points.count);
+    assert_true(24 * points.count > 96 << 20);
+    host_points_free(&points);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_unpacks_beyond_the_memory),
         cmocka_unit_test(what_is_little),
         cmocka_unit_test(a_plain_file_beyond_the_memory),
+        cmocka_unit_test(an_array_beyond_the_memory),
+        cmocka_unit_test(points_beyond_the_memory),
     };
     return cmocka_run_group_tests(tests, enter, leave);
 }
