@@ -3,12 +3,14 @@
 # Variables: BUILD (where everything made goes), CC, ARCH (-march=), OPT,
 # SAN (sanitizers, as in SAN=address,undefined; their own BUILD, please).
 
-BUILD  ?= build
-ARCH   ?= native
+# The usual value, also where a variable is given without one.
+usual   = $(eval override $(1) := $(or $(strip $($(1))),$(2)))
+$(call usual,BUILD,build)
+$(call usual,ARCH,native)
+$(call usual,OUT,out)
 SAN    ?=
 OPT    ?= $(if $(SAN),-O1,-O3)
 PREFIX ?= /usr/local
-OUT    ?= out
 POINTS ?=
 FUZZ_SECONDS ?= 60
 ifeq ($(origin CC),default)
@@ -77,7 +79,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 .DELETE_ON_ERROR:
 .SECONDARY:
 .PHONY: all ncube unit points planted bare fuzzers run check test test-full \
-	bench firmware fuzz lint install clean help deps deps-run deps-test \
+	bench firmware fuzz lint install uninstall clean help deps deps-run deps-test \
 	deps-bench deps-full FORCE
 
 programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
@@ -288,9 +290,29 @@ fuzz: deps-test
 lint: deps-test
 	@BUILD='$(BUILD)' bash tests/lint
 
-install: all
-	install -d '$(DESTDIR)$(PREFIX)/bin'
-	install $(programs) '$(DESTDIR)$(PREFIX)/bin'
+# Where the programs, their pages and their completion go: what is put there,
+# and what is taken away again.
+bin        = $(DESTDIR)$(PREFIX)/bin
+man        = $(DESTDIR)$(PREFIX)/share/man/man1
+completion = $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
+pages     := $(man_pages) $(BUILD)/pages/incode.bash
+$(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
+	@mkdir -p $(@D)
+	$(say) PAGE $@
+	@bash host/pages $* $(BUILD) > $@
+
+install: all $(pages)
+	install -d '$(bin)' '$(man)' '$(completion)'
+	install $(programs) '$(bin)'
+	install -m 644 $(man_pages) '$(man)'
+	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode'
+	ln -sf incode '$(completion)/incode-node'
+
+uninstall:
+	rm -f $(patsubst %,'$(bin)/%',$(notdir $(programs))) \
+		$(patsubst %,'$(man)/%',$(notdir $(man_pages))) \
+		'$(completion)/incode' '$(completion)/incode-node'
 
 clean:
 	rm -rf '$(BUILD)'
@@ -314,7 +336,9 @@ help:
 	@echo '                         warnings as errors, analysers'
 	@echo 'make ncube               build/libncube.a: the calls of the nCUBE, for'
 	@echo '                         porting programs that were written for them'
-	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin'
+	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, their man pages'
+	@echo '                         and completion to DIR/share'
+	@echo 'make uninstall           remove them (with the same PREFIX)'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
 

@@ -27,8 +27,9 @@
 #include "host/run/run.h"
 #include "host/sim/sim.h"
 #include "incode/predicates/predicates.h"
+#include "node/version.h"
 
-const char *argp_program_version = "incode 0.1.0";
+const char *argp_program_version = "incode " NODE_VERSION;
 
 enum { ARGUMENTS_MAX = 4, KEY_FORMAT_IN = 256, KEY_FORMAT_OUT };
 
@@ -334,14 +335,14 @@ struct command {
     int (*run)(int argc, char **argv, struct host_error *error);
 };
 
-enum { HELP_COLUMN = 23, TEXT_MAX = 2048 };
+enum { HELP_COLUMN = 29, TEXT_MAX = 2048 };
 
 static int command_help(int argc, char **argv, struct host_error *error);
 
 static const struct command commands[] = {
     {"run", "POINTS -o OUT", "triangulate on a cube of nodes", command_run},
     {"gen", "KIND N -o FILE",
-     "make points: uniform, bubbles, bluntfin, sphere, grid,\nrotated, hub",
+     "make points: uniform, bubbles, bluntfin, sphere,\ngrid, rotated, hub",
      command_gen},
     {"verify", "POINTS TETS", "check a triangulation exactly", command_verify},
     {"digest", "TETS", "print what tells triangulations apart", command_digest},

@@ -286,8 +286,7 @@ int main(int argc, char **argv)
     static struct linux_board linux_board;
     static struct node_board board;
     const char *why = NULL;
-    if (argc == 2 && strcmp(argv[1], "--help") == 0) {
-        linux_options_help();
+    if (argc == 2 && linux_options_answer(argv[1])) {
         return 0;
     }
     int status = prepare(argv, &options, &linux_board, &board);

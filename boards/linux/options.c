@@ -3,6 +3,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "node/version.h"
+
 static const char help[] =
     "Usage: incode-node ARGUMENT VALUE ...\n"
     "A node of a cube, as a process.  incode cube FILE prints the line for "
@@ -15,11 +17,13 @@ static const char help[] =
     "  --memory BYTES     data memory in all, stack included (4194304);\n"
     "                     below 4 GiB\n"
     "  --stack BYTES      of it (65536)\n"
-    "  --window N         frames a link and direction, 1 to 64; by memory\n"
-    "  --serial-baud BAUD the cube has serial wires, the slowest so fast\n"
-    "  --host-port 0|1    besides node 0, this node has a host port\n"
+    "  --window N         frames a link and direction, 1 to 64 (0: by memory)\n"
+    "  --serial-baud BAUD the cube has serial wires, the slowest so fast (0: "
+    "none)\n"
+    "  --host-port 0|1    besides node 0, this node has a host port (0)\n"
     "  --dead US          microseconds of silence after which a link is given "
-    "up; 0: never\n"
+    "up (0:\n"
+    "                     never)\n"
     "  --key FILE         64 hexadecimal digits, as incode key FILE makes "
     "them: the key\n"
     "                     of the cube, without which no wire goes over TCP\n"
@@ -43,14 +47,26 @@ static const char help[] =
     "  --awake US         microseconds to stay awake when there is nothing to "
     "do\n"
     "\n"
+    "  --help, --version  print this, or the version\n"
+    "\n"
     "Exit status: 0 done, 2 wrong usage, 4 it cannot start.\n";
 
 static const char no_such[] = "no such argument";
 static const char see_help[] = "see incode-node --help";
 
-void linux_options_help(void)
+bool linux_options_answer(const char *argument)
 {
-    (void)!write(STDOUT_FILENO, help, sizeof help - 1);
+    static const char version[] = "incode-node " NODE_VERSION "\n";
+    if (strcmp(argument, "--help") == 0 || strcmp(argument, "-h") == 0 ||
+        strcmp(argument, "help") == 0) {
+        (void)!write(STDOUT_FILENO, help, sizeof help - 1);
+        return true;
+    }
+    if (strcmp(argument, "--version") == 0 || strcmp(argument, "-V") == 0) {
+        (void)!write(STDOUT_FILENO, version, sizeof version - 1);
+        return true;
+    }
+    return false;
 }
 
 static bool read_number(const char **text, uint64_t *value)

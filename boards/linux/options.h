@@ -40,7 +40,7 @@ struct linux_options {
 bool linux_options_read(char **argv, struct linux_options *options,
                         struct linux_fault *fault);
 
-/* What --help prints. */
-void linux_options_help(void);
+/* Prints what --help or --version asks for; false: neither is asked for. */
+bool linux_options_answer(const char *argument);
 
 #endif

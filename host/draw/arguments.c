@@ -1,9 +1,9 @@
-#include <argp.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "draw.h"
+#include "host/base/options.h"
 #include "host/base/parse.h"
 #include "picture.h"
 
@@ -147,9 +147,6 @@ int host_draw_arguments(int argc, char **argv,
         NULL};
     struct parse_draw parse = {options, error};
     *options = (struct host_draw_options){.axis = -1, .width = WIDTH};
-    if (argp_parse(&argp, argc, argv, 0, NULL, &parse) != 0) {
-        return host_fail(error, HOST_USAGE,
-                         "incode draw: wrong usage; see incode draw --help");
-    }
-    return check(options, error);
+    int status = host_options_parse(&argp, argc, argv, 0, &parse, error);
+    return status != 0 ? status : check(options, error);
 }

@@ -500,7 +500,10 @@ static int parse_run(int argc, char **argv, unsigned flags,
         "  incode run points.xyz --nodes 8 --verify --stats run.json\n"
         "  incode run - -o - < points.xyz > tetrahedra.ele\n\n"
         "Exit status: 0 done, 1 the program failed, 2 wrong usage, 3 wrong "
-        "input, 4 cube, link or node failure, 5 a verification failed.",
+        "input or an output that cannot be written, 4 cube, link or node "
+        "failure, 5 a verification failed. A signal such as that of Ctrl-C "
+        "ends it as a signal does (130 in a shell). Unless it is 0, no output "
+        "has its name, and what had it before is as it was.",
         NULL,
         complete_help,
         NULL};

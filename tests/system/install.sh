@@ -1,0 +1,96 @@
+#!/usr/bin/env bash
+# What make install puts somewhere else: the programs, their pages for man, and
+# their completion, in which stands all that --help tells of; make uninstall
+# takes all of it away.
+. tests/system/lib.sh
+root="$scratch/root"
+make=("${MAKE:-make}" --no-print-directory BUILD="$BUILD" DESTDIR="$root"
+    PREFIX=/opt/incode)
+
+succeeds 'install/install' "${make[@]}" install > "$scratch/said"
+cat "$scratch/said"
+share=$root/opt/incode/share
+completion=$share/bash-completion/completions
+check 'install/the programs' 'they do not run' eval \
+    '"$root/opt/incode/bin/incode" --version > "$scratch/version" &&
+     "$root/opt/incode/bin/incode-node" --version > "$scratch/version.node"'
+check 'install/one version' "$(cat "$scratch/version" "$scratch/version.node")" \
+    test "$(cat "$scratch/version.node")" = "incode-node $(cut -d ' ' -f 2 \
+        < "$scratch/version")"
+
+# complete PROGRAM WORD...: what completes the last word.
+# shellcheck disable=SC1091
+. "$completion/incode"
+complete_words() {
+    COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMPREPLY=()
+    if [ "$1" = incode ]; then _incode; else _incode_node; fi
+    echo " ${COMPREPLY[*]} "
+}
+told_by() { # COMMAND...: the options of a help's lists
+    "$@" --help | grep -oE '^ +-.*' | sed -E 's/   .*//' |
+        grep -oE -- '(^|[ ,])--?[a-zA-Z?][a-z-]*' | tr -d ' ,' | sort -u
+}
+lacking() { # PAGE COMPLETED OPTION...: those that are not in both
+    local page=$1 completed=$2 option
+    for option in "${@:3}"; do
+        grep -qE -- "^\.B (.*, )?${option//\?/\\?}([= ,]|$)" "$page" ||
+            echo "$option (page)"
+        [[ "$completed" = *" $option "* ]] || echo "$option (completion)"
+    done
+}
+# pages_tell PROGRAM [COMMAND]: the part of the page that is about it.
+pages_tell() {
+    local program=$1 command=${2:-} options=() lacks
+    sed 's/\\-/-/g' "$share/man/man1/$program.1" | awk -v name="$command" '
+        /^\.S[SH] / { on = $0 == (name == "" ? ".SH SYNOPSIS" : ".SS " name) }
+        on' > "$scratch/page"
+    mapfile -t options < <(told_by "$BUILD/$program" ${command:+"$command"})
+    lacks=$(lacking "$scratch/page" "$(complete_words "$program" \
+        ${command:+"$command"} -)" "${options[@]}")
+    check "install/options of $program${command:+ $command}" \
+        "${#options[@]}: $lacks" test -z "$lacks" -a ${#options[@]} -gt 2
+}
+mapfile -t commands < <("$INCODE" --help |
+    awk '/^Commands:/ { on = 1 } /^$/ { on = 0 } on && /^  [a-z]/ { print $1 }')
+check 'install/commands' "${commands[*]}" test ${#commands[@]} -gt 7
+for command in "${commands[@]}"; do
+    [ "$command" = help ] || pages_tell incode "$command"
+done
+pages_tell incode
+pages_tell incode-node
+
+completes() { # EXPECTED WORD...
+    local said
+    said=$(complete_words "${@:2}")
+    check "install/completion of ${*:2}" "$said" test "$said" = " $1 "
+}
+completes 'sequential spatial' incode run --strategy s
+completes spatial incode run a.xyz --strategy = sp
+completes 512 incode sim --nodes = 5
+completes --strategy incode run --str
+completes verify incode ver
+completes 'verify' incode help ver
+completes '' incode run a # a file's name
+completes --dimension incode-node --node 0 --dim
+
+for page in incode incode-node; do
+    if command -v man > "$scratch/which"; then
+        man --warnings -E UTF-8 -Tutf8 -Z -l "$share/man/man1/$page.1" \
+            > "$scratch/printed" 2> "$scratch/errors"
+        check "install/man takes $page.1" "$(last "$scratch/errors")" \
+            test ! -s "$scratch/errors" -a -s "$scratch/printed"
+    else
+        skip "install/man takes $page.1" 'there is no man'
+    fi
+done
+
+"${make[@]}" uninstall > "$scratch/said"
+check 'install/uninstall leaves nothing' "$(find "$root" ! -type d)" \
+    test -z "$(find "$root" ! -type d)"
+
+# A variable without a value is one that is not given.
+"${make[@]}" -n V=1 BUILD="$scratch/none" ARCH= "$scratch/none/incode" \
+    > "$scratch/said" 2> "$scratch/errors"
+check 'install/make ARCH= without a value' "$(last "$scratch/errors")" eval \
+    'grep -q -- "-march=native " "$scratch/said" &&
+     ! grep -qE -- "-march=( |$)" "$scratch/said"'
