@@ -1,6 +1,7 @@
 /* The statistics have every name that scripts rely on, and its value. */
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -83,21 +84,28 @@ static void fill(struct host_run_result *r)
     }
 }
 
-static void test_names(void **unused)
+/* What is written of a result, read again. */
+static json_t *written(const struct host_run_result *result)
 {
-    (void)unused;
-    static struct host_run_result result;
     struct host_error error = {0};
     char path[] = "/tmp/incode-stats-XXXXXX";
     int fd = mkstemp(path);
     assert_true(fd >= 0);
     close(fd);
-    fill(&result);
-    assert_int_equal(host_stats_write(path, &result, &error), 0);
+    assert_int_equal(host_stats_write(path, result, &error), 0);
     assert_int_equal(host_output_commit(&error), 0);
     json_t *o = json_load_file(path, 0, NULL);
     unlink(path);
     assert_non_null(o);
+    return o;
+}
+
+static void test_names(void **unused)
+{
+    (void)unused;
+    static struct host_run_result result;
+    fill(&result);
+    json_t *o = written(&result);
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         assert_non_null(json_object_get(o, names[i]));
     }
@@ -126,6 +134,83 @@ static void test_names(void **unused)
             150 + k);
     }
     json_decref(o);
+}
+
+/* Whether a row of the table has `name` in its first column. */
+static bool documented(const char *table, const char *name)
+{
+    char quoted[64];
+    snprintf(quoted, sizeof quoted, "`%s`", name);
+    for (const char *row = table; (row = strstr(row, "\n| `")) != NULL;) {
+        const char *end = strstr(row + 3, " |");
+        const char *at = strstr(++row, quoted);
+        if (at != NULL && at < end) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static unsigned undocumented(const char *table, json_t *object)
+{
+    unsigned count = 0;
+    const char *name;
+    json_t *value;
+    json_object_foreach(object, name, value)
+    {
+        if (!documented(table, name)) {
+            print_error("README.md has no row of `%s` under Statistics\n",
+                        name);
+            count++;
+        }
+    }
+    return count;
+}
+
+/* Names of the first column that neither the run nor a node has. */
+static unsigned unwritten(const char *table, json_t *run, json_t *node)
+{
+    unsigned count = 0;
+    for (const char *row = table; (row = strstr(row, "\n| `")) != NULL;) {
+        const char *end = strstr(row + 3, " |");
+        while ((row = strchr(row, '`')) != NULL && row < end) {
+            char name[64] = "";
+            size_t n = strcspn(++row, "`");
+            assert_true(n < sizeof name);
+            memcpy(name, row, n);
+            row += n + 1;
+            if (json_object_get(run, name) == NULL &&
+                json_object_get(node, name) == NULL) {
+                print_error("README.md: `%s` is not written\n", name);
+                count++;
+            }
+        }
+        row = end;
+    }
+    return count;
+}
+
+/* README.md has a row for each field that is written, and for no other. */
+static void test_documented(void **unused)
+{
+    (void)unused;
+    static struct host_run_result result;
+    static char text[1 << 18];
+    FILE *file = fopen("README.md", "r");
+    assert_non_null(file);
+    assert_true(fread(text, 1, sizeof text - 1, file) > 0);
+    (void)fclose(file);
+    char *table = strstr(text, "\n### Statistics\n");
+    assert_non_null(table);
+    char *end = strstr(table + 1, "\n### ");
+    assert_non_null(end);
+    *end = '\0';
+    fill(&result);
+    json_t *run = written(&result);
+    json_t *node = json_array_get(json_object_get(run, "per_node"), 0);
+    assert_int_equal(undocumented(table, run) + undocumented(table, node), 0);
+    assert_int_equal(unwritten(table, run, node), 0);
+    json_decref(run);
 }
 
 static void test_candidates(void **unused)
@@ -191,6 +276,7 @@ int main(int argc, char **argv)
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_names),
+        cmocka_unit_test(test_documented),
         cmocka_unit_test(test_candidates),
         cmocka_unit_test(test_unwritable),
         cmocka_unit_test(test_peak_is_its_own),
