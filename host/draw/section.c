@@ -99,20 +99,20 @@ static unsigned corners(const struct cut *c, const double *vertex[4],
     return 3;
 }
 
+static wide length(const double *a, const double *b)
+{
+    wide x = (wide)a[0] - (wide)b[0], y = (wide)a[1] - (wide)b[1];
+    wide z = (wide)a[2] - (wide)b[2];
+    return sqrtl(x * x + y * y + z * z);
+}
+
 static double size_of(const double *vertex[4])
 {
-    wide sum = 0;
-    for (unsigned i = 0; i < 4; i++) {
-        for (unsigned j = i + 1; j < 4; j++) {
-            wide square = 0;
-            for (unsigned d = 0; d < 3; d++) {
-                wide x = (wide)vertex[i][d] - (wide)vertex[j][d];
-                square += x * x;
-            }
-            sum += sqrtl(square);
-        }
-    }
-    return (double)logl(sum / 6);
+    wide first = length(vertex[0], vertex[1]) + length(vertex[0], vertex[2]) +
+                 length(vertex[0], vertex[3]);
+    wide others = length(vertex[1], vertex[2]) + length(vertex[1], vertex[3]) +
+                  length(vertex[2], vertex[3]);
+    return (double)logl((first + others) / 6);
 }
 
 /* The first pass: how many cells there are, and their box. */

@@ -65,7 +65,7 @@ static void merge(struct svg *s)
     const struct host_section *section = s->picture->section;
     for (uint64_t i = 0; i < section->count; i++) {
         const struct host_cell *cell = &section->cells[i];
-        long at[4][2];
+        long at[4][2] = {{0}};
         unsigned n = quarters(s->picture, cell, at);
         struct pixel *pixel = pixel_of(s, at, n);
         if (pixel != NULL) {
@@ -135,7 +135,7 @@ static void put_cells(struct svg *s, unsigned colour)
         if (host_picture_colour(s->picture, cell) != colour) {
             continue;
         }
-        long at[4][2];
+        long at[4][2] = {{0}};
         unsigned n = quarters(s->picture, cell, at);
         if (pixel_of(s, at, n) != NULL) {
             continue;

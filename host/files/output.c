@@ -323,6 +323,11 @@ int host_output_probe(const char *path, struct host_error *error)
     return error->code;
 }
 
+void host_output_expect(void)
+{
+    asked = 1;
+}
+
 /* --- writing -------------------------------------------------------------- */
 
 static void flush(struct host_output *out)

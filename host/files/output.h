@@ -54,6 +54,10 @@ int host_output_open(struct host_output *out, const char *path,
  * stays open, for its reader would take that for the end. */
 int host_output_probe(const char *path, struct host_error *error);
 
+/* An output was asked for, and is another process's to make: a signal that ends
+ * this one says that there is none. */
+void host_output_expect(void);
+
 /* None of these fails at once: host_output_close tells. */
 void host_output_bytes(struct host_output *out, const void *bytes, size_t n);
 void host_output_unsigned(struct host_output *out, uint64_t value);

@@ -17,6 +17,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/parse.h"
+#include "host/files/output.h"
 #include "transport/drivers/mpi_environment.h"
 
 #define SOCKET_NAME "INCODE_LAUNCHER"
@@ -556,6 +557,9 @@ int host_launch_mpi(char **argv, const struct host_run_options *options,
         host_run_clean(options, l->host_pid);
     }
     if (caught != 0 && !(whole && l->report.status == 0)) {
+        if (options->outputs > 0 || options->stats != NULL) {
+            host_output_expect();
+        }
         (void)sigaction(SIGINT, &before[0], NULL);
         (void)sigaction(SIGTERM, &before[1], NULL);
         (void)raise(caught);
