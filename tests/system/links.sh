@@ -222,6 +222,7 @@ END
     start_nodes "$scratch/paths.cube"
     same 'nodes at paths' --cube "$scratch/paths.cube" \
         --stats "$scratch/stats.json"
+    same 'the same nodes at paths again' --cube "$scratch/paths.cube"
     check 'links/nodes at paths: said so' "$(last "$scratch/errors")" \
         test "$(stat_of "$scratch/stats.json" link)" = unix -a \
         ! -s "$scratch/errors"
