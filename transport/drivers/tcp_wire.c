@@ -189,6 +189,7 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
     if (getsockopt(c->fd, SOL_SOCKET, SO_ERROR, &fault, &size) != 0 ||
         fault != 0) {
         wire->fault = fault;
+        wire->other_key = false; /* it is gone */
         return -1;
     }
     wire->answer_us = within(TCP_CALL_MIN_US, 8 * (now_us - c->since_us));
@@ -231,6 +232,7 @@ static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
     int status = secure_shake(&c->heard.shake, &pipe);
     wire->other_key = status < 0 ? c->heard.shake.fault == SECURE_OTHER_KEY
                                  : wire->other_key && status == 0;
+    wire->other_key_us = status < 0 ? now_us : wire->other_key_us;
     bool elsewhere =
         status > 0 && wire->tcp.fd >= 0 && secure_shake_misled(&c->heard.shake);
     return elsewhere ? -1 : status;
@@ -340,6 +342,9 @@ static void tick(struct tcp_wire *wire)
             met = true;
             look_at(wire, &wire->candidate[i], now_us);
         }
+    }
+    if (now_us - wire->other_key_us > TCP_OTHER_KEY_US) {
+        wire->other_key = false;
     }
     bool in_use = wire->tcp.fd >= 0 && wire->proven;
     wire->look_us = met ? now_us + TCP_LOOK_US : 0;

@@ -55,6 +55,7 @@ enum {
     TCP_PAUSE_MIN_US = 20000,   /* before the next call, doubled each time */
     TCP_PAUSE_AWAY_US = 40000,  /* up to this by one who had no place, */
     TCP_PAUSE_MAX_US = 1000000, /* else up to this */
+    TCP_OTHER_KEY_US = 5000000  /* nobody with another key: it is gone */
 };
 
 struct tcp_wire_config {
@@ -92,7 +93,8 @@ struct tcp_wire {
     bool proven;                 /* it has shown who it is */
     bool replaced;               /* by a newer one: the link hears of a break */
     bool quiet;                  /* nobody called when it was last waited for */
-    bool other_key;              /* the last one called had another key */
+    bool other_key;              /* the last one called had another key, */
+    uint64_t other_key_us;       /* and when it was met last */
     bool other_user;             /* or is run by another user */
     struct secure_source source; /* of what makes each opening another */
     uint64_t call_us, pause_us;

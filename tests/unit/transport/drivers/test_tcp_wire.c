@@ -74,6 +74,33 @@ static void wires_that_break_go_on(void **unused)
     }
 }
 
+/* One with another key that is gone is not spoken of any more: the end that
+ * called it hears of that, the other after a while. */
+static void another_key_that_is_gone_is_forgotten(void **unused)
+{
+    (void)unused;
+    for (unsigned gone = 0; gone < 2; gone++) {
+        static struct end ends[2];
+        struct tcp_address at = free_address(AF_INET);
+        struct tcp_wire *left = &ends[1 - gone].wire;
+        open_end(&ends[1], 1, &at, key);
+        open_end(&ends[0], 0, &at, other_key);
+        for (uint64_t begin = clock_us(); !left->other_key;) {
+            step(&ends[0]);
+            step(&ends[1]);
+            assert_true(clock_us() - begin < 5000000);
+        }
+        close_end(&ends[gone]);
+        assert_true(left->other_key);
+        left->other_key_us -= gone == 0 ? TCP_OTHER_KEY_US : 0;
+        for (uint64_t begin = clock_us(); left->other_key;) {
+            step(&ends[1 - gone]);
+            assert_true(clock_us() - begin < TCP_OTHER_KEY_US);
+        }
+        close_end(&ends[1 - gone]);
+    }
+}
+
 static void another_key_never_connects(void **unused)
 {
     static struct end ends[2];
@@ -392,6 +419,7 @@ int main(void)
         cmocka_unit_test(paths),
         cmocka_unit_test(wires_that_break_go_on),
         cmocka_unit_test(another_key_never_connects),
+        cmocka_unit_test(another_key_that_is_gone_is_forgotten),
         cmocka_unit_test(one_who_is_led_elsewhere_ends_nothing),
         cmocka_unit_test(strangers_change_nothing),
         cmocka_unit_test(strangers_without_a_key_change_nothing),
