@@ -535,7 +535,8 @@ static void refusals(void **unused)
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         uint8_t large[1600] = {0};
         assert_int_equal(
-            incode_triangulator_page(s.t, s.pages[0], large, sizes[i]), -1);
+            incode_triangulator_page(s.t, s.pages[0], large, sizes[i]),
+            INCODE_PAGE_UNSOUND);
     }
     /* All the same, it finishes. */
     assert_true(solo_step(&s, UINT64_MAX));
