@@ -17,6 +17,8 @@ struct incode_triangulator {
     struct incode_map map;
     struct incode_front front;
     struct incode_maker maker;
+    uint32_t units; /* of work that a step may do, as it goes on */
+    uint64_t spent; /* units */
 };
 
 #endif

@@ -145,6 +145,8 @@ incode_triangulator_init(void *arena, size_t bytes,
     uint8_t *front = (uint8_t *)arena + round_up(sizeof *t);
     uint8_t *maker = front + round_up(incode_front_bytes(&shares.front));
     t->map = map;
+    t->units = UINT32_MAX;
+    t->spent = 0;
     incode_front_init(&t->front, front, &shares.front, setup->bricks,
                       (enum incode_face_rule)setup->face_rule, &outside->front);
     incode_maker_init(&t->maker, maker, &shares.maker, &points,
@@ -227,6 +229,14 @@ static void plant(struct incode_triangulator *t)
 }
 #endif
 
+/* A face is a unit, and so are as many points as a brick has. */
+static void spend_candidates(struct incode_triangulator *t, uint64_t before)
+{
+    uint64_t looked = t->maker.counts.candidates - before;
+    incode_walker_spend(&t->maker.walker,
+                        1 + (uint32_t)(looked / INCODE_BRICK_POINTS));
+}
+
 /* Closes the star of a vertex as far as it goes. */
 static enum incode_outcome close_star(struct incode_triangulator *t,
                                       unsigned task)
@@ -241,9 +251,14 @@ static enum incode_outcome close_star(struct incode_triangulator *t,
             r = INCODE_AGAIN;
             break;
         }
+        uint64_t before = t->maker.counts.candidates;
         r = advance(t, task);
+        spend_candidates(t, before);
         if (r == INCODE_OK && incode_star_is_full(front))
             r = INCODE_AGAIN; /* the list will find it crowded */
+        if (r == INCODE_OK && t->maker.walker.left == 0)
+            r = incode_maker_is_searching(&t->maker, task) ? INCODE_MORE
+                                                           : INCODE_AGAIN;
     }
 #ifdef INCODE_PLANT_TWICE
     plant(t);
@@ -287,7 +302,7 @@ static enum incode_outcome build_first(struct incode_triangulator *t,
 static enum incode_step run(struct incode_triangulator *t, unsigned task)
 {
     enum incode_outcome r;
-    incode_front_run(&t->front);
+    incode_front_run(&t->front, t->maker.walker.left);
     if (incode_front_is_seed(&t->front, task))
         r = build_first(t, task);
     else if (t->maker.index == INCODE_KD)
@@ -355,13 +370,26 @@ enum incode_step incode_triangulator_step(struct incode_triangulator *t)
     if (incode_front_is_finished(&t->front))
         return INCODE_FINISHED;
     bool released = incode_pager_release(&t->maker.pager, false);
+    struct incode_walker *walker = &t->maker.walker;
+    walker->left = t->units;
     enum incode_step r = step(t);
+    t->spent += 1 + (t->units - walker->left);
     if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;
     if (r == INCODE_WAITING &&
         (released || incode_pager_release(&t->maker.pager, true)))
         return INCODE_WORKED;
     return r;
+}
+
+void incode_triangulator_allow(struct incode_triangulator *t, uint32_t units)
+{
+    t->units = units > 0 ? units : 1;
+}
+
+uint64_t incode_triangulator_spent(const struct incode_triangulator *t)
+{
+    return t->spent;
 }
 
 /* ---- reports ---- */

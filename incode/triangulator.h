@@ -138,6 +138,15 @@ int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
 /* Works on: see enum incode_step.  Bounds are stated at the top. */
 enum incode_step incode_triangulator_step(struct incode_triangulator *t);
 
+/* From now on a step ends after about so many units of work, at first after as
+ * many as it likes.  A unit is a step, a face, or as many points looked at as a
+ * brick has: a microsecond or less where doubles are quick.  What a step
+ * leaves, the next ones do; the results are the same. */
+void incode_triangulator_allow(struct incode_triangulator *t, uint32_t units);
+
+/* Units that were worked since init. */
+uint64_t incode_triangulator_spent(const struct incode_triangulator *t);
+
 /* Counts of all jobs since init. */
 void incode_triangulator_statistics(const struct incode_triangulator *t,
                                     struct incode_statistics *s);

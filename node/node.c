@@ -42,6 +42,7 @@ struct node {
     uint32_t silent; /* links, as a pong has told or is about to */
     uint64_t looked_us;
     uint32_t work; /* steps and messages of roles: what a pong tells of it */
+    struct node_pace pace;
     uint64_t now_us, stop_us;
 };
 
@@ -133,6 +134,7 @@ struct node *node_start(const struct node_board *board, const char **why)
     INCODE_ASSERT(node->cube != NULL);
     node->counted.cube = node->cube;
     node->counted.self = board->identity.self;
+    node_pace_init(&node->pace, board->now_us, board->context);
     return node;
 }
 
@@ -426,7 +428,9 @@ static void send_fault(struct node *n)
 static unsigned serve_role(struct node *n)
 {
     const struct node_role *role = n->role;
-    unsigned moved = role->work(n->role_arena) + role->send(n->role_arena);
+    node_pace_begin(&n->pace, n->now_us);
+    unsigned moved =
+        role->work(n->role_arena, &n->pace) + role->send(n->role_arena);
     n->work += moved;
     uint32_t epoch = role->done(n->role_arena);
     if (!node_fault_is_set(&n->fault) && epoch != 0 &&

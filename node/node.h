@@ -4,7 +4,7 @@
  *
  * Memory: the board's arena, filled as struct node_map of message.h states.
  * Work: a step handles the frames that links hold, then lets the role
- * compute for a bounded while and send what may leave.
+ * compute for NODE_PACE_US (pace.h) and send what may leave.
  *
  *     struct node *node = node_start(&board, &why);
  *     while ((event = node_step(node)) != NODE_STOPPED)

@@ -179,8 +179,9 @@ enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which);
 enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
                                     uint32_t *which);
 
-/* A task runs: sets how many tetrahedra it may build. */
-void incode_front_run(struct incode_front *front);
+/* A task runs: sets how many tetrahedra it may build, `most` at most, 1 at
+ * least. */
+void incode_front_run(struct incode_front *front, uint32_t most);
 
 /* It is suspended, for an answer that is not there (fault) or of its own
  * accord.  advanced: the search of its answer got on, so that it needs no room

@@ -30,13 +30,16 @@ static enum incode_turn begin_task(struct incode_front *front, uint32_t v,
     return INCODE_TURN_TASK;
 }
 
-void incode_front_run(struct incode_front *front)
+void incode_front_run(struct incode_front *front, uint32_t most)
 {
     front->built_max = front->spill_from < front->bricks ? INCODE_SPILL_BUILT
                                                          : INCODE_STAR_BUILT;
     size_t room = front->outside.emit_room(front->outside.context);
     if (front->built_max > room)
         front->built_max = (uint32_t)room;
+    most = most > 0 ? most : 1;
+    if (front->built_max > most)
+        front->built_max = most;
 }
 
 /* The brick of a task that has run; one that ran for the first time counts. */

@@ -156,6 +156,14 @@ static void ask_ahead(const struct incode_cell_search *c,
     }
 }
 
+/* Rows and points that a call may look at. */
+static uint32_t work_of(const struct incode_walker *walker)
+{
+    const uint32_t most = INCODE_CELL_SEARCH_WORK / INCODE_CELL_SEARCH_UNIT;
+    uint32_t units = walker->left < most ? walker->left : most;
+    return units == 0 ? 1 : units * INCODE_CELL_SEARCH_UNIT;
+}
+
 /* The rest of the piece at work. */
 static enum incode_walk finish_piece(struct incode_cell_search *c,
                                      const struct incode_grid *g,
@@ -173,7 +181,7 @@ static enum incode_walk finish_piece(struct incode_cell_search *c,
             return INCODE_WALK_WAIT;
         }
         *work += batch.count;
-        if (*work >= INCODE_CELL_SEARCH_WORK)
+        if (*work >= work_of(walker))
             return INCODE_WALK_STOP;
     }
     return INCODE_WALK_DONE;
@@ -300,7 +308,7 @@ static enum incode_walk run_layer(struct incode_cell_search *c,
     s->rows.end = 0;
     for (; c->y <= s->outer[1].last; c->y++) {
         enum incode_walk r = run_row(c, g, walker, q, s);
-        if (r == INCODE_WALK_DONE && s->work >= INCODE_CELL_SEARCH_WORK)
+        if (r == INCODE_WALK_DONE && s->work >= work_of(walker))
             r = INCODE_WALK_STOP;
         if (r != INCODE_WALK_DONE)
             return r;
@@ -330,6 +338,7 @@ static enum incode_walk run_shell(struct incode_cell_search *c,
         c->y = s.outer[1].first;
         c->x = s.outer[0].first;
     }
+    incode_walker_spend(walker, 1 + s.work / INCODE_CELL_SEARCH_UNIT);
     return r;
 }
 

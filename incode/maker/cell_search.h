@@ -21,6 +21,7 @@
 
 enum {
     INCODE_CELL_SEARCH_WORK = 4096,
+    INCODE_CELL_SEARCH_UNIT = 64, /* of these make a unit of the walker */
     INCODE_CELL_SEARCH_PIECE = 24 /* points of a row that need no halving */
 };
 

@@ -83,11 +83,11 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
     const struct incode_query *q = &s->query;
     uint16_t near[2] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
     uint32_t apex = INCODE_LOCAL_NONE;
+    s->advanced = false;
     if (s->stage == INCODE_SEARCH_POINTS) {
-        if (incode_search_run(m, s) == INCODE_WAIT) {
-            s->page = q->missing;
-            return INCODE_WAIT;
-        }
+        enum incode_outcome r = incode_search_run(m, s);
+        if (r != INCODE_OK)
+            return r;
         s->stage = INCODE_SEARCH_FOUND;
     }
     if (q->best != INCODE_NONE) {

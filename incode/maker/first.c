@@ -155,6 +155,7 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
     struct incode_query *q = &search->query;
     double p[3];
     unsigned looks = 0;
+    search->advanced = false;
     if (!incode_fetch_point(m, v, p, &search->page))
         return INCODE_WAIT;
     const struct incode_frame *frame =
@@ -164,18 +165,17 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
     while (search->stage == INCODE_SEARCH_FIRST && m->fault == NULL) {
         if (s->stage == INCODE_FIRST_NEAREST ||
             s->stage == INCODE_FIRST_CIRCLE) {
+            q->pauses = true;
             enum incode_walk r =
                 incode_walk(&m->walker, q, incode_visit_points, NULL);
-            search->page = q->missing;
             if (r == INCODE_WALK_WAIT)
-                return INCODE_WAIT;
+                return incode_search_suspend(search);
             walked(m, search, frame, p);
             continue;
         }
-        if (incode_search_run(m, search) == INCODE_WAIT) {
-            search->page = q->missing;
-            return INCODE_WAIT;
-        }
+        enum incode_outcome r = incode_search_run(m, search);
+        if (r != INCODE_OK)
+            return r;
         if (looked(m, search))
             settle(m, search, p, a);
         else

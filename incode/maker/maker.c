@@ -71,7 +71,7 @@ void incode_maker_init(struct incode_maker *m, void *memory,
                          : 0);
     m->lookahead = lookahead_of(m);
     m->walker = (struct incode_walker){&m->pager, &m->tree, &m->counts.tally,
-                                       &m->counts.candidates};
+                                       &m->counts.candidates, UINT32_MAX};
     m->local.pages_max = share->frames / 2;
     incode_local_reset(&m->local);
     m->spread = 1.6;

@@ -359,6 +359,7 @@ struct walk {
     struct incode_query *q;
     incode_visit *visit;
     void *context;
+    bool visited; /* a brick, in this call */
 };
 
 enum { ASK_AHEAD = 8 };
@@ -386,6 +387,8 @@ static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
         boxes.hi[d] = frame->leaf_hi[d];
     }
     uint32_t mask = passing(w->q, &boxes, incode_frame_leaves(frame));
+    incode_walker_spend(w->walker, 1);
+    w->visited = true;
     if (mask != 0 && !w->visit(w->walker, w->q, frame, brick, mask, w->context))
         return INCODE_WALK_STOP;
     return INCODE_WALK_DONE;
@@ -422,6 +425,10 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
         if (end <= w->q->cursor)
             continue;
         uint32_t page = tree->base[level - 1] + first + child;
+        if (w->q->pauses && w->visited && w->walker->left == 0) {
+            w->q->missing = INCODE_NONE;
+            return INCODE_WALK_WAIT;
+        }
         if (w->q->pages_max != 0 && w->q->pages++ == w->q->pages_max)
             return INCODE_WALK_STOP;
         const struct incode_frame *f = incode_pager_get(w->walker->pager, page);
@@ -444,7 +451,7 @@ enum incode_walk incode_walk(struct incode_walker *walker,
                              struct incode_query *q, incode_visit *visit,
                              void *context)
 {
-    struct walk w = {walker, q, visit, context};
+    struct walk w = {walker, q, visit, context, false};
     uint32_t top = walker->tree->levels - 1;
     const struct incode_frame *root =
         incode_pager_get(walker->pager, walker->tree->base[top]);
@@ -459,7 +466,7 @@ enum incode_walk incode_walk_brick(struct incode_walker *walker,
                                    struct incode_query *q, uint32_t brick,
                                    incode_visit *visit, void *context)
 {
-    struct walk w = {walker, q, visit, context};
+    struct walk w = {walker, q, visit, context, false};
     const struct incode_frame *f = incode_pager_get(walker->pager, brick);
     q->missing = brick;
     return f == NULL ? INCODE_WALK_WAIT : visit_brick(&w, brick, f);

@@ -43,6 +43,8 @@ struct incode_query {
     bool large;          /* round, and the sphere itself tells of boxes, too */
     bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
     bool done;           /* not what lies within [done_lo, done_hi] */
+    bool pauses;         /* the walk is suspended where the walker has no more
+                            units left, with INCODE_NONE missing */
     double lo[3], hi[3]; /* absolute coordinates */
     double done_lo[3], done_hi[3];
     uint32_t v, b, c;            /* vertex numbers */
@@ -87,7 +89,16 @@ struct incode_walker {
     const struct incode_tree *tree;
     struct incode_tally *tally;
     uint64_t *candidates;
+    uint32_t left; /* units of work of this call, as it goes on: the bricks
+                      that may be visited; one is always */
 };
+
+/* So many units were worked. */
+static inline void incode_walker_spend(struct incode_walker *walker,
+                                       uint32_t units)
+{
+    walker->left = walker->left > units ? walker->left - units : 0;
+}
 
 /* Called with a brick and its leaves that pass, one bit each (boxes_only: the
  * first brick of a page and its boxes that pass); false stops the walk. */

@@ -132,17 +132,25 @@ void incode_search_learn(struct incode_maker *m, const struct incode_query *q)
         incode_empty_spheres_add(&m->empty, p, q->scale);
 }
 
+enum incode_outcome incode_search_suspend(struct incode_search *s)
+{
+    s->page = s->query.missing;
+    s->advanced = s->page == INCODE_NONE;
+    return s->advanced ? INCODE_MORE : INCODE_WAIT;
+}
+
 enum incode_outcome incode_search_run(struct incode_maker *m,
                                       struct incode_search *s)
 {
     struct incode_query *q = &s->query;
     for (;;) {
         uint64_t before = m->counts.candidates;
+        q->pauses = true;
         enum incode_walk r =
             incode_walk(&m->walker, q, incode_visit_points, NULL);
         s->looked += m->counts.candidates - before;
         if (r == INCODE_WALK_WAIT)
-            return INCODE_WAIT;
+            return incode_search_suspend(s);
         if (q->question == INCODE_QUERY_HALF_SPACE) {
             m->half_spaces[m->half_space_next] = q->half_space;
             m->half_space_next = (m->half_space_next + 1) % INCODE_HALF_SPACES;

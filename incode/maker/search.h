@@ -21,9 +21,13 @@ void incode_search_begin(struct incode_maker *m, struct incode_search *s,
                          const double pb[3], const double pc[3], double radius);
 
 /* Goes on with it: INCODE_OK with query.best (INCODE_NONE: a hull facet), or
- * INCODE_WAIT for query.missing. */
+ * INCODE_WAIT for query.missing, or INCODE_MORE: the walker has no units left.
+ */
 enum incode_outcome incode_search_run(struct incode_maker *m,
                                       struct incode_search *s);
+
+/* Notes what a walk waits for: INCODE_WAIT or INCODE_MORE, as above. */
+enum incode_outcome incode_search_suspend(struct incode_search *s);
 
 /* The next box of a search for a first candidate. */
 void incode_search_box(struct incode_maker *m, struct incode_search *s);

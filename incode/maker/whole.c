@@ -44,6 +44,9 @@ static enum incode_outcome look_at_all(struct incode_maker *m,
                                        struct incode_search *s)
 {
     for (int i = 0; i < SWEEP_BRICKS && s->sweep_left > 0; i++) {
+        if (i > 0 && m->walker.left == 0)
+            break;
+        incode_walker_spend(&m->walker, 1);
         uint32_t brick = s->sweep;
         const struct incode_frame *f = incode_pager_get(&m->pager, brick);
         if (f == NULL) {
@@ -112,7 +115,8 @@ enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
     do {
         r = m->index == INCODE_GRID ? look_at_cells(m, s) : look_at_all(m, s);
     } while (r == INCODE_MORE && m->index == INCODE_GRID &&
-             s->cells.reach <= SHELLS && s->cells.list == s->cells.end);
+             m->walker.left > 0 && s->cells.reach <= SHELLS &&
+             s->cells.list == s->cells.end);
     s->looked += m->counts.candidates - before;
     if (r == INCODE_MORE)
         s->page = INCODE_NONE;

@@ -228,9 +228,9 @@ static unsigned holder_send(void *self)
     return sent + ask_host(self);
 }
 
-static unsigned holder_work(void *self)
+static unsigned holder_work(void *self, struct node_pace *pace)
 {
-    (void)self;
+    (void)self, (void)pace;
     return 0;
 }
 

@@ -6,11 +6,11 @@
  * Memory: a role has the node's arena, but for the cube's windows and the node
  * itself; its own state lies at the arena's start, and is what `self` points
  * at.  Roles take turns in it.  Work: every function returns at once; `work`
- * after a bounded amount of computing.
+ * after a bounded time (node/pace.h).
  *
  *     const struct node_role *role = node_role_named(setup.role);
  *     if (role != NULL && role->start(arena, bytes, &setup, &counted, &fault))
- *         moved = role->work(arena) + role->send(arena);
+ *         moved = role->work(arena, &pace) + role->send(arena);
  */
 #ifndef NODE_ROLES_H
 #define NODE_ROLES_H
@@ -23,6 +23,7 @@
 #include "node/counted.h"
 #include "node/fault.h"
 #include "node/message.h"
+#include "node/pace.h"
 
 struct node_role {
     /* As statistics name it. */
@@ -50,8 +51,9 @@ struct node_role {
     void (*message)(void *self, const struct cube_message *message,
                     uint64_t now_us);
 
-    /* Computes for a while; the number of steps that did something. */
-    unsigned (*work)(void *self);
+    /* Computes for as long as the pace has it; the number of steps that did
+     * something. */
+    unsigned (*work)(void *self, struct node_pace *pace);
 
     /* Sends what may leave; the number of messages. */
     unsigned (*send)(void *self);

@@ -399,24 +399,40 @@ static void worker_message(void *self, const struct cube_message *message,
     }
 }
 
-static unsigned worker_work(void *self)
+/* One step of at most so many units; false: there is nothing to do. */
+static bool work_on(struct worker *w, uint32_t units)
+{
+    incode_triangulator_allow(w->triangulator, units);
+    enum incode_step step = incode_triangulator_step(w->triangulator);
+    if (step == INCODE_BROKEN) {
+        node_fault_set(w->fault, incode_triangulator_fault(w->triangulator), 0,
+                       0);
+    }
+    w->drained = step == INCODE_FINISHED;
+    return step == INCODE_WORKED || step == INCODE_FINISHED;
+}
+
+static unsigned worker_work(void *self, struct node_pace *pace)
 {
     struct worker *w = self;
     unsigned worked = 0;
-    while (w->working && !w->drained && worked < NODE_STEPS &&
+    uint32_t units = 0; /* since the last look at the clock */
+    bool goes_on = w->working;
+    while (goes_on && !w->drained && worked < NODE_STEPS &&
            !node_fault_is_set(w->fault) &&
            node_outbox_free(&w->results) > BATCHES_RESERVED) {
-        enum incode_step step = incode_triangulator_step(w->triangulator);
-        if (step == INCODE_BROKEN) {
-            node_fault_set(w->fault, incode_triangulator_fault(w->triangulator),
-                           0, 0);
-            break;
+        uint64_t before = incode_triangulator_spent(w->triangulator);
+        goes_on = work_on(w, pace->units);
+        worked += goes_on;
+        units +=
+            (uint32_t)(incode_triangulator_spent(w->triangulator) - before);
+        if (goes_on && node_pace_is_due(pace, units)) {
+            goes_on = node_pace_goes_on(pace, units);
+            units = 0;
         }
-        w->drained = step == INCODE_FINISHED;
-        if (step == INCODE_WAITING) {
-            break;
-        }
-        worked++;
+    }
+    if (units > 0) {
+        node_pace_end(pace, units);
     }
     if (w->drained) {
         close_batch(w);

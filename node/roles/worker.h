@@ -4,11 +4,12 @@
  * host and come back.
  *
  * Memory: its state, two outboxes, then the triangulator.  Work: `work` closes
- * at most NODE_STEPS stars, and `send` sends what the link takes.
+ * at most NODE_STEPS stars, fewer where the time does not suffice, and `send`
+ * sends what the link takes.
  *
  *     const struct node_role *role = &node_worker_role;
  *     role->message(arena, &message, now_us);
- *     moved = role->work(arena) + role->send(arena);
+ *     moved = role->work(arena, &pace) + role->send(arena);
  */
 #ifndef NODE_WORKER_H
 #define NODE_WORKER_H
@@ -16,7 +17,7 @@
 #include "roles.h"
 
 enum {
-    NODE_STEPS = 32,      /* triangulator's steps between looks at links */
+    NODE_STEPS = 32, /* triangulator's steps between looks at links, at most */
     NODE_WANTED_MAX = 64, /* pages asked for and not yet sent for */
     /* Messages on their way out: one for each 64 KiB of memory, within. */
     NODE_RESULT_SLOTS_MIN = 4,

@@ -75,9 +75,10 @@ static void echo_message(void *self, const struct cube_message *message,
     }
 }
 
-static unsigned echo_work(void *self)
+static unsigned echo_work(void *self, struct node_pace *pace)
 {
     struct echo *e = self;
+    (void)pace;
     if (e->epoch == ECHO_FAILS) {
         if (++e->worked == 3) {
             node_fault_set(e->fault, "worn out", 0, 0);

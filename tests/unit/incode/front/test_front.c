@@ -227,7 +227,7 @@ static void run(struct world *w, unsigned task)
 {
     uint32_t v = w->front.task[task].v;
     bool done;
-    incode_front_run(&w->front);
+    incode_front_run(&w->front, UINT32_MAX);
     if (w->front.task[task].seed)
         done = run_seed(w, v);
     else

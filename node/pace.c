@@ -1,0 +1,45 @@
+#include "pace.h"
+
+void node_pace_init(struct node_pace *pace, uint64_t (*now_us)(void *context),
+                    void *context)
+{
+    *pace = (struct node_pace){.now_us = now_us, .context = context};
+    pace->units = 1;
+    pace->unit_ns = NODE_PACE_STEP_US * UINT64_C(1000);
+}
+
+void node_pace_begin(struct node_pace *pace, uint64_t now_us)
+{
+    pace->begun_us = pace->looked_us = now_us;
+}
+
+/* How long a unit takes: twice as long as was thought, at most, as the clock
+ * goes on while others have the processor; and less by and by, as units differ.
+ */
+static void look(struct node_pace *pace, uint32_t units)
+{
+    uint64_t now = pace->now_us(pace->context);
+    uint64_t unit_ns = (now - pace->looked_us) * 1000 / (units > 0 ? units : 1);
+    uint64_t most_ns = 2 * pace->unit_ns + 1;
+    pace->looked_us = now;
+    if (unit_ns >= pace->unit_ns) {
+        pace->unit_ns = unit_ns < most_ns ? unit_ns : most_ns;
+    } else {
+        pace->unit_ns -= (pace->unit_ns - unit_ns + 7) / 8;
+    }
+    uint64_t fit = NODE_PACE_STEP_US * UINT64_C(1000) / (pace->unit_ns + 1);
+    pace->units = fit < 1                     ? 1
+                  : fit > NODE_PACE_UNITS_MAX ? NODE_PACE_UNITS_MAX
+                                              : (uint32_t)fit;
+}
+
+bool node_pace_goes_on(struct node_pace *pace, uint32_t units)
+{
+    look(pace, units);
+    return pace->looked_us - pace->begun_us < NODE_PACE_LAST_US;
+}
+
+void node_pace_end(struct node_pace *pace, uint32_t units)
+{
+    look(pace, units);
+}
