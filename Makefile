@@ -348,8 +348,8 @@ run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev libpng-d
 	libjansson-dev libserialport-dev libsodium-dev libconfig-dev \
 	libopenmpi-dev openmpi-bin
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
-	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq procps openssl \
-	gcc-arm-none-eabi libnewlib-arm-none-eabi
+	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps \
+	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi
 bench_packages = $(run_packages) g++ libcgal-dev jq
 full_packages  = $(test_packages) $(bench_packages) debootstrap cpio \
 	qemu-system-arm gcc-aarch64-linux-gnu libc6-dev-arm64-cross
