@@ -5,7 +5,6 @@
 
 #include "formats.h"
 #include "host/base/progress.h"
-#include "host/base/progress.h"
 
 static const struct host_format *format_of(const char *path, enum host_use use,
                                            const char *what,
