@@ -576,50 +576,23 @@ static void boards_that_are_refused(void **unused)
     assert_string_equal(why, "a node's memory is below 4 GiB");
 }
 
-/* A text that is too long is cut, and the first fault stays. */
-static void fault_texts(void **unused)
-{
-    static struct node_fault fault;
-    char words[NODE_FAULT_TEXT_MAX + 11];
-    (void)unused;
-    assert_false(node_fault_is_set(&fault));
-    node_fault_set(&fault, "#, # and #", 0, UINT32_MAX);
-    assert_string_equal(fault.text, "0, 4294967295 and 4294967295");
-    assert_int_equal(fault.size, strlen(fault.text));
-    node_fault_set(&fault, "later", 0, 0);
-    assert_int_equal(fault.text[0], '0');
-    fault.size = 0;
-    memset(words, 'x', sizeof words - 1);
-    words[sizeof words - 1] = '\0';
-    words[NODE_FAULT_TEXT_MAX - 2] = '#';
-    node_fault_set(&fault, words, 123, 0);
-    assert_int_equal(fault.size, NODE_FAULT_TEXT_MAX);
-    assert_string_equal(fault.text + NODE_FAULT_TEXT_MAX - 3, "x12");
-}
+#define ON_A_CUBE(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(a_role_of_its_own, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(roles_map_their_arena, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(a_second_setup, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(pongs_tell_of_work, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(an_unknown_role, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(setups_of_other_versions, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(invalid_setups, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(what_a_worker_refuses, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(pages_that_a_worker_refuses, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(what_a_holder_refuses, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(a_fault_is_told_at_once, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(boards_that_are_refused, set_up,
-                                        tear_down),
-        cmocka_unit_test(fault_texts),
+        ON_A_CUBE(a_role_of_its_own),
+        ON_A_CUBE(roles_map_their_arena),
+        ON_A_CUBE(a_second_setup),
+        ON_A_CUBE(pongs_tell_of_work),
+        ON_A_CUBE(an_unknown_role),
+        ON_A_CUBE(setups_of_other_versions),
+        ON_A_CUBE(invalid_setups),
+        ON_A_CUBE(what_a_worker_refuses),
+        ON_A_CUBE(pages_that_a_worker_refuses),
+        ON_A_CUBE(what_a_holder_refuses),
+        ON_A_CUBE(a_fault_is_told_at_once),
+        ON_A_CUBE(boards_that_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
