@@ -5,6 +5,8 @@
 #include "node/keepers.h"
 #include "notices.h"
 
+enum { SILENT_US = 1000000 };
+
 void host_idle_progress(struct host_service *service, unsigned node)
 {
     service->node[node].still_us = 0;
@@ -73,7 +75,9 @@ void host_idle_check(struct host_service *service, uint64_t elapsed_us)
     for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];
         node->still_us = is_owed(s, i) ? 0 : node->still_us + elapsed_us;
-        if (!owes(s, i) || node->still_us <= s->patience_us) {
+        /* One that is silent does not answer: failure_detector.h. */
+        if (!owes(s, i) || node->still_us <= s->patience_us ||
+            node->silent_us > SILENT_US) {
             continue;
         }
         char why[80];
