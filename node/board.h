@@ -19,6 +19,7 @@
 #include <stdint.h>
 
 #include "transport/cube.h"
+#include "transport/secure_seed.h"
 
 /* Who the node is, as its board was told. */
 struct node_identity {
@@ -53,6 +54,10 @@ struct node_identity {
 struct node_board {
     void *context;
     struct node_identity identity;
+    /* Where what never comes again is from: random bytes, or the device and the
+     * number of its start.  identity.h draws the epoch from it, and keyed wires
+     * their nonces.  All 0: the board is told its epoch, and has no keys. */
+    struct secure_source source;
     /* Sends and receives bytes on link i: 0 .. dimension - 1 to the neighbours;
      * node 0, and the one with host_port, have the host at link `dimension`. */
     struct link_pipe pipes[CUBE_LINKS_MAX];

@@ -26,10 +26,10 @@
 #include <unistd.h>
 
 #include "boards/process.h"
+#include "node/identity.h"
 #include "node/node.h"
 #include "options.h"
 #include "transport/drivers/key_file.h"
-#include "transport/learn.h"
 #include "wire.h"
 
 enum { SANITIZED_STATIC = 8192 };
@@ -118,15 +118,21 @@ static bool open_wires(struct linux_board *linux_board,
     return true;
 }
 
+static bool random_bytes(void *context, uint8_t *bytes, size_t size)
+{
+    (void)context;
+    return getrandom(bytes, size, 0) == (ssize_t)size;
+}
+
 /* What the one who starts a node does otherwise. */
 static void start_alone(struct linux_options *options,
                         struct linux_board *linux_board, char **argv)
 {
-    uint32_t epoch = 0;
+    struct secure_source source = {.random = random_bytes};
+    struct node_identity identity = {.epoch = 0};
     linux_board->again = argv;
-    while (options->epoch == 0) {
-        (void)getrandom(&epoch, sizeof epoch, 0);
-        options->epoch = epoch;
+    if (options->epoch == 0 && node_identity_epoch(&identity, &source)) {
+        options->epoch = identity.epoch;
     }
 #ifndef INCODE_SANITIZED
     struct rlimit stack = {options->stack, options->stack};
@@ -140,13 +146,7 @@ static void start_alone(struct linux_options *options,
 /* Once: a greeting may be a stranger's, and the next one right. */
 static void tell_of_greeting(const struct learner *learner, bool *told)
 {
-    const char *what = learner->misfits > 0
-                           ? "a neighbour takes this node for one with "
-                             "another number of wires"
-                       : learner->misplaced > 0
-                           ? "a neighbour's wire is in another link than it "
-                             "should"
-                           : NULL;
+    const char *what = node_identity_doubt(learner);
     if (what != NULL && !*told) {
         fault_print(&(struct linux_fault){
             .where = "--wire",
@@ -161,17 +161,16 @@ static void learn(const struct node_board *board, struct linux_options *options)
 {
     static struct learner learner;
     struct linux_board *links = board->context;
-    struct learned learned;
+    struct node_identity identity = {.self = 0};
     bool told = false;
-    learner_init(&learner, board->pipes, links->links_count);
-    while (!learner_poll(&learner, &learned)) {
+    node_identity_listen(&learner, board, links->links_count);
+    while (!node_identity_hear(&learner, &identity)) {
         tell_of_greeting(&learner, &told);
         idle(links, 50000);
     }
-    options->node = learned.self;
-    options->dimension = learned.dimension;
-    options->host_port =
-        learned.self != 0 && links->links_count > learned.dimension;
+    options->node = identity.self;
+    options->dimension = identity.dimension;
+    options->host_port = identity.host_port;
 }
 
 /* For those who call from now on: which wires these are. */
@@ -203,6 +202,7 @@ static void fill_in(struct node_board *board, struct linux_board *linux_board)
         board->pipes[i] = linux_wire_pipe(&linux_board->wire[i]);
     }
     board->context = linux_board;
+    board->source.random = random_bytes;
     board->now_us = now_us;
     board->busy_us = busy_us;
     board->idle = idle;
