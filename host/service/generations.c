@@ -116,9 +116,12 @@ int host_generation_renew(struct host_service *service, uint64_t now_us,
     if (check_progress(s, error) != 0) {
         return error->code;
     }
-    if (s->searching || (!s->started && !host_missing_links_spare(s))) {
-        next.dead_count = next.settled; /* that a wire is absent shows later */
-    } else {
+    if (s->searching || !host_missing_links_spare(s)) {
+        /* That a wire is absent shows later, and who is cut off is waited
+         * for. */
+        next.dead_count = next.settled;
+    }
+    if (!s->searching) {
         next.absent_s = s->started ? s->machine->absent_s : next.absent_s;
     }
     if (s->wire_lost) {
