@@ -95,7 +95,9 @@ static double section_area(struct host_plane plane, double unit)
 
 static void test_covers_the_section_once(void **unused)
 {
-    static const double units[] = {1.0, 1e307, 4.9e-324, 1.0};
+    /* The widest has sides that are no double any more. */
+    static const double units[] = {1.0, 1e307, 4.9e-324, 5e307};
+    static const double from[] = {0.0, 0.0, 0.0, -3.0};
     static const double at[] = {0.25,   1.0, 2.0, 3.3333333333333335,
                                 5.9999, 6.0};
     double *xyz = points.xyz, scaled[3 * ROWS * ROWS * ROWS];
@@ -103,12 +105,13 @@ static void test_covers_the_section_once(void **unused)
     points.xyz = scaled;
     for (size_t u = 0; u < sizeof units / sizeof units[0]; u++) {
         for (uint64_t i = 0; i < 3 * points.count; i++) {
-            scaled[i] = xyz[i] * units[u];
+            scaled[i] = (xyz[i] + from[u]) * units[u];
         }
         for (unsigned axis = 0; axis < 3; axis++) {
             for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
-                double z = at[i] * units[u];
-                struct host_plane plane = {axis, z > 0.0 ? z : units[u]};
+                double z = (at[i] + from[u]) * units[u];
+                z = z == 0.0 ? units[u] : z; /* a quarter of the least */
+                struct host_plane plane = {axis, z};
                 assert_true(fabs(section_area(plane, units[u]) - 1.0) < 1e-5);
             }
         }
