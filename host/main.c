@@ -430,13 +430,16 @@ static const struct argp top = {
 /* No command: what was meant. */
 static int refuse_command(const char *word, struct host_error *error)
 {
+    char quoted[512];
     const char *nearest = host_text_nearest(word, command_name, NULL);
-    if (nearest == NULL && (access(word, F_OK) == 0 || strchr(word, '.'))) {
+    bool there = nearest == NULL && access(word, F_OK) == 0;
+    if (there || strchr(word, '.') != NULL) { /* which no command has */
+        bool fits = host_text_quote(quoted, sizeof quoted, word) == 0;
         return host_fail(
             error, HOST_USAGE,
             "%s: a file's name, no command; to triangulate it, write "
             "incode run %s -o OUT",
-            word, word);
+            word, fits ? quoted : "POINTS");
     }
     return host_fail(
         error, HOST_USAGE, "%s: no such command; %s%s%sallowed: %s", word,

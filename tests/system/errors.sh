@@ -369,6 +369,10 @@ usage 'convert to nothing' 'OUT' convert "$good"
 # What a new user writes: done as it was meant, or what to write instead.
 usage 'a command mistyped' 'gne: no such command; did you mean gen\?' gne
 usage 'a file for a command' 'write incode run .*good.xyz -o OUT' "$good"
+usage 'a file that is named like a command' \
+    'write incode run convert.xyz -o OUT' convert.xyz
+usage 'a file whose name a shell would run' \
+    "write incode run 'a; touch b.xyz' -o OUT" 'a; touch b.xyz'
 usage 'an option mistyped' '--strateyg: .*did you mean --strategy\?' run "$good" \
     --strateyg auto
 usage 'one dash' '-nodes: .*did you mean --nodes\?' run "$good" -nodes 2
