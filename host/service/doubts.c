@@ -3,21 +3,15 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "failure_detector.h"
 #include "notices.h"
 
 enum { DOUBT_US = 1300000, WIRE_US = 1200000 };
 
-/* By which wire the host speaks now. */
-static unsigned wire_of(const struct host_service *s)
-{
-    uint16_t gateway = cube_wiring(s->cube)->gateway;
-    return gateway != 0 && gateway == s->machine->spare_node ? 1 : 0;
-}
-
 static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
 {
     uint64_t frames =
-        cube_link_statistics(s->cube, wire_of(s))->frames_received;
+        cube_link_statistics(s->cube, host_detector_wire(s))->frames_received;
     s->wire_quiet_us =
         frames == s->wire_frames ? s->wire_quiet_us + elapsed_us : 0;
     s->wire_frames = frames;
@@ -58,10 +52,11 @@ static void doubt(struct host_service *s, unsigned i)
     bool next = why != NULL && strchr(why, ';') != NULL;
     s->node[i].doubted = true;
     host_notice(s, i,
-                "no answer for %.1f s%s%s%s given up after %llu s without one, "
+                "no answer for %.1f s%s%s%s %s after %llu s without one, "
                 "look after that node",
                 1e-6 * (double)s->node[i].silent_us, why == NULL ? "" : ": ",
                 why == NULL ? "" : why, next ? ", or" : "; it is",
+                m->restarts != NULL ? "ended and started again" : "given up",
                 (unsigned long long)s->patience_us / 1000000);
 }
 

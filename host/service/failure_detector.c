@@ -25,8 +25,9 @@ enum {
     IN_USE_REST_US = 1000000
 };
 
-static unsigned wire_of(const struct host_service *s)
+unsigned host_detector_wire(const struct host_service *service)
 {
+    const struct host_service *s = service;
     uint16_t gateway = cube_wiring(s->cube)->gateway;
     return gateway != 0 && gateway == s->machine->spare_node ? 1 : 0;
 }
@@ -314,7 +315,8 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
 /* Whether another host has the nodes; it may have died just before. */
 static bool in_use(struct host_service *s, uint64_t now_us)
 {
-    const struct link_peer *peer = cube_link_peer(s->cube, wire_of(s));
+    const struct link_peer *peer =
+        cube_link_peer(s->cube, host_detector_wire(s));
     if (peer->refusal != LINK_IN_USE) {
         s->in_use_us = 0;
         return false;
@@ -345,7 +347,7 @@ static bool stays_in_use(const struct host_service *s, uint64_t now_us)
 static int check_wire(struct host_service *s, uint64_t now_us,
                       struct host_error *error)
 {
-    unsigned wire = wire_of(s);
+    unsigned wire = host_detector_wire(s);
     enum link_state state = cube_link_state(s->cube, wire);
     uint16_t gateway = cube_wiring(s->cube)->gateway;
     if (in_use(s, now_us)) {

@@ -28,6 +28,9 @@ void host_detector_begin(struct host_service *service, uint64_t now_us);
 /* The run is over, for those too whose statistics have not come. */
 void host_detector_end(struct host_service *service);
 
+/* By which of its wires the host speaks now. */
+unsigned host_detector_wire(const struct host_service *service);
+
 /* The link by which a node is reached first. */
 unsigned host_detector_link(const struct host_service *service, unsigned node);
 

@@ -45,6 +45,12 @@ static unsigned culprit(const struct host_service *s, unsigned i)
     return holds ? keeper : i;
 }
 
+static const char *work_of_one_left(const struct host_service *s)
+{
+    return s->work.living > 1 ? "its work is given to others"
+                              : "no other node is left to do its work";
+}
+
 bool host_idle_leave(struct host_service *service, unsigned node,
                      const char *why)
 {
@@ -64,8 +70,8 @@ bool host_idle_leave(struct host_service *service, unsigned node,
     }
     n->aside = true;
     s->loss = true;
-    host_notice(s, node,
-                "%s; its work is given to others, look after that node", why);
+    host_notice(s, node, "%s; %s, look after that node", why,
+                work_of_one_left(s));
     return true;
 }
 
@@ -88,9 +94,8 @@ void host_idle_check(struct host_service *service, uint64_t elapsed_us)
             s->node[who].aside = true;
             s->loss = true;
             host_notice(s, who,
-                        "%s, for the second time; its work is given to "
-                        "others, look after that node",
-                        why);
+                        "%s, for the second time; %s, look after that node",
+                        why, work_of_one_left(s));
         }
     }
 }

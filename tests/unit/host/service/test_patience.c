@@ -214,7 +214,8 @@ static void test_late(void **unused)
 /* --- nodes that do nothing, again ------------------------------------------
  */
 
-/* Where nobody works, the run ends. */
+/* Where nobody works, the run ends; of the last one nobody says that others do
+ * its work. */
 static void test_all_idle(void **unused)
 {
     (void)unused;
@@ -224,6 +225,14 @@ static void test_all_idle(void **unused)
     }
     start_world();
     fails_with("no node is left to work");
+    unsigned others = 0, nobody = 0;
+    for (unsigned i = 0; i < world.told_count; i++) {
+        const char *line = world.told[i].line;
+        others += strstr(line, "; its work is given to others, ") != NULL;
+        nobody += strstr(line, "; no other node is left to do its ") != NULL;
+    }
+    assert_int_equal(others, NODES - 1);
+    assert_int_equal(nobody, 1);
 }
 
 int main(void)
