@@ -63,8 +63,11 @@ told() {
 said() { grep -qE "^incode: $1" "$errors" || ! kill -0 $host 2> /dev/null; }
 # A slow machine may look when the run is over: something else was said since.
 said_and_next() {
-    { kill -0 $host 2> /dev/null || ! last "$errors" | grep -qE "^incode: $1"; } &&
-        grep -E "^incode: $1" "$errors" | grep -qE '; ..*'
+    if ! kill -0 $host 2> /dev/null &&
+        last "$errors" | grep -qE "^incode: $1"; then
+        return 1
+    fi
+    grep -E "^incode: $1" "$errors" | grep -qE '; ..*'
 }
 
 # ends NAME STATUS: with the right output, or with none.
