@@ -52,7 +52,8 @@ struct host_sim_port {
 struct host_sim_wire {
     struct sim_wire wire;
     uint32_t cuts, deaf[2]; /* reasons for it to be so */
-    bool missing;           /* never there */
+    bool missing;           /* never there, */
+    bool dead;              /* or cut for good since */
 };
 
 struct host_sim_cube {

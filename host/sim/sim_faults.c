@@ -160,7 +160,9 @@ static bool slow_host(struct host_sim_run *r, const struct host_sim_event *e)
 static void kill_wire(struct host_sim_run *r)
 {
     struct host_sim_cube *cube = &r->world.cube;
-    host_sim_cube_cut(cube, (unsigned)draw(r, 0, cube->host_wire - 1), true);
+    unsigned wire = (unsigned)draw(r, 0, cube->host_wire - 1);
+    cube->wire[wire].dead = true;
+    host_sim_cube_cut(cube, wire, true);
 }
 
 static void kill_node(struct host_sim_run *r)
