@@ -116,6 +116,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     while (host_format_row(formats) != NULL) {
         formats++;
     }
+    demand(formats > 0);
     const struct host_format *format = host_format_row(data[0] % formats);
     if (tets.count > 0 && format->write_tetrahedra != NULL) {
         struct host_output out;

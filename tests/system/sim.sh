@@ -59,7 +59,7 @@ incode sim --seed 7 > "$said" 2>&1
 check sim/rate "$(grep 'in ours' "$said")" \
     grep -qE ' in ours$| [1-9][0-9]*\.[0-9] in ours, ' "$said"
 
-refuses sim/no-cube 2 'not a number of nodes' incode sim --nodes 3
+refuses sim/no-cube 2 'not a power of two' incode sim --nodes 3
 refuses sim/no-range 2 'not a range' incode sim --seeds 5
 refuses sim/backwards 2 'not a range' incode sim --seeds 9..5
 

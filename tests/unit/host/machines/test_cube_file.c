@@ -172,72 +172,71 @@ static void write_changed(const char *old, const char *new)
 
 /* A text of the good file, another in its place, and where and what the error
  * must say, if it is one. */
+static const struct {
+    const char *old, *new, *where, *what;
+    int code;
+} mistakes[] = {
+    {"dimension = 1;", "dimension = 11;", ":1: ", "0 to 10", 3},
+    {"dimension = 1;", "", ":1: ", "dimension", 3},
+    {"dimension = 1;", "dimension = ;", ":1: ", "syntax error", 3},
+    {"\"512K\"", "\"12K\"", ":1: ", "memory", 3},
+    {"memory", "mammary", ":1: ", "mammary: no such setting", 3},
+    {"lab.key", "no.key", ":1: ", "cannot be read: No such file", 3},
+    {"lab.key", ".", ":1: ", "cannot be read: Is a directory", 3},
+    {"lab.key", "lab.cube", ":1: ", "64 hexadecimal digits", 3},
+    {"start = [1]", "board = \"z80\"", ":1: ", "give \"linux\"", 3},
+    {"start = [1]", "board = 7", ":1: ", "give \"linux\"", 3},
+    {"start = [1]", "start = [1, 0, 1]", ":1: ", "twice", 3},
+    {"127.0.0.1:7001", "10.0.0.1:7000", ":4: ",
+     "node 1 and the host has 10.0.0.1:7000, and so has that between node "
+     "0 and the host in line 3; ",
+     3},
+    {"/dev/ttyS1\", \"/dev/ttyUSB0", "/dev/t\", \"/dev/t", ":0: ", "", 0},
+    {"start = [1]", "start = [0, 1]", ":0: ", "", 0},
+    {"tcp = \"127.0.0.1:7001\"", "serial = [\"/dev/ttyS1\", \"/dev/a\"]",
+     ":5: ", "/dev/ttyS1", 3},
+    {"tcp = \"127.0.0.1:7001\"", "serial = [\"/dev/ttyUSB0\", \"/dev/a\"]",
+     ":0: ", "", 0},
+    {"key = \"lab.key\";", "",
+     ":3: ", "without a key; make one with: incode key FILE", 3},
+    {"start = [1]", "start = [2]", ":1: ", "start", 3},
+    {"node = 1; to = 0;", "node = 1; to = 1;", ":5: ", "no neighbours", 3},
+    {"node = 1; to = 0;", "node = 7; to = 0;", ":5: ", "not a node", 3},
+    {"node = 1; to = 0;", "node = 1; to = \"host\";",
+     ":2: ", "no link between nodes 0 and 1", 3},
+    {"node = 0; to = \"host\"", "node = 1; to = \"host\"", ":2: ", "node 0", 3},
+    {"baud = 921600", "baud = 12", ":6: ", "300 to 20000000", 3},
+    {"rtscts", "ctsrts", ":6: ", "ctsrts: no such setting", 3},
+    {"[\"/dev/ttyS1\", \"/dev/ttyUSB0\"]", "[\"/dev/ttyS1\"]",
+     ":5: ", "two devices", 3},
+    {"tcp = \"10.0.0.1:7000\"", "tcp = \"10.0.0.1\"", ":3: ", "port", 3},
+    {"tcp = \"10.0.0.1:7000\";", "", ":3: ", "none or several", 3},
+    {"tcp = \"10.0.0.1:7000\";", "tcp = \"10.0.0.1:7\"; unix = \"/a\";",
+     ":3: ", "none or several", 3},
+    {"tcp = \"127.0.0.1:7001\"", "unix = \"/run/h\"", ":0: ", "", 0},
+    {"tcp = \"127.0.0.1:7001\"", "unix = \"\"", ":4: ", "unix: not a path", 3},
+    {"tcp = \"127.0.0.1:7001\"",
+     "unix = \"/run/a/path/that/is/far/longer/than/what/the/kernel/has/"
+     "room/for/in/an/address/of/a/socket/which/is/107/bytes\"",
+     ":4: ", "unix: not a path", 3},
+    {"key = \"lab.key\";", "key = \"\";", ":1: ", "incode key FILE", 3},
+    {"127.0.0.1:7001", "no.such.host.invalid:7001",
+     ":4: ", "no.such.host.invalid", 4},
+};
+
 static void mistakes_are_named(void **unused)
 {
-    static const struct {
-        const char *old, *new, *where, *what;
-        int code;
-    } cases[] = {
-        {"dimension = 1;", "dimension = 11;", ":1: ", "0 to 10", 3},
-        {"dimension = 1;", "", ":1: ", "dimension", 3},
-        {"dimension = 1;", "dimension = ;", ":1: ", "syntax error", 3},
-        {"\"512K\"", "\"12K\"", ":1: ", "memory", 3},
-        {"memory", "mammary", ":1: ", "mammary: no such setting", 3},
-        {"lab.key", "no.key", ":1: ", "cannot be read: No such file", 3},
-        {"lab.key", ".", ":1: ", "cannot be read: Is a directory", 3},
-        {"lab.key", "lab.cube", ":1: ", "64 hexadecimal digits", 3},
-        {"start = [1]", "board = \"z80\"", ":1: ", "give \"linux\"", 3},
-        {"start = [1]", "board = 7", ":1: ", "give \"linux\"", 3},
-        {"start = [1]", "start = [1, 0, 1]", ":1: ", "twice", 3},
-        {"127.0.0.1:7001", "10.0.0.1:7000", ":4: ",
-         "node 1 and the host has 10.0.0.1:7000, and so has that between node "
-         "0 and the host in line 3; ",
-         3},
-        {"/dev/ttyS1\", \"/dev/ttyUSB0", "/dev/t\", \"/dev/t", ":0: ", "", 0},
-        {"start = [1]", "start = [0, 1]", ":0: ", "", 0},
-        {"tcp = \"127.0.0.1:7001\"", "serial = [\"/dev/ttyS1\", \"/dev/a\"]",
-         ":5: ", "/dev/ttyS1", 3},
-        {"tcp = \"127.0.0.1:7001\"", "serial = [\"/dev/ttyUSB0\", \"/dev/a\"]",
-         ":0: ", "", 0},
-        {"key = \"lab.key\";", "",
-         ":3: ", "without a key; make one with: incode key FILE", 3},
-        {"start = [1]", "start = [2]", ":1: ", "start", 3},
-        {"node = 1; to = 0;", "node = 1; to = 1;", ":5: ", "no neighbours", 3},
-        {"node = 1; to = 0;", "node = 7; to = 0;", ":5: ", "not a node", 3},
-        {"node = 1; to = 0;", "node = 1; to = \"host\";",
-         ":2: ", "no link between nodes 0 and 1", 3},
-        {"node = 0; to = \"host\"", "node = 1; to = \"host\"", ":2: ", "node 0",
-         3},
-        {"baud = 921600", "baud = 12", ":6: ", "300 to 20000000", 3},
-        {"rtscts", "ctsrts", ":6: ", "ctsrts: no such setting", 3},
-        {"[\"/dev/ttyS1\", \"/dev/ttyUSB0\"]", "[\"/dev/ttyS1\"]",
-         ":5: ", "two devices", 3},
-        {"tcp = \"10.0.0.1:7000\"", "tcp = \"10.0.0.1\"", ":3: ", "port", 3},
-        {"tcp = \"10.0.0.1:7000\";", "", ":3: ", "none or several", 3},
-        {"tcp = \"10.0.0.1:7000\";", "tcp = \"10.0.0.1:7\"; unix = \"/a\";",
-         ":3: ", "none or several", 3},
-        {"tcp = \"127.0.0.1:7001\"", "unix = \"/run/h\"", ":0: ", "", 0},
-        {"tcp = \"127.0.0.1:7001\"", "unix = \"\"", ":4: ", "unix: not a path",
-         3},
-        {"tcp = \"127.0.0.1:7001\"",
-         "unix = \"/run/a/path/that/is/far/longer/than/what/the/kernel/has/"
-         "room/for/in/an/address/of/a/socket/which/is/107/bytes\"",
-         ":4: ", "unix: not a path", 3},
-        {"key = \"lab.key\";", "key = \"\";", ":1: ", "incode key FILE", 3},
-        {"127.0.0.1:7001", "no.such.host.invalid:7001",
-         ":4: ", "no.such.host.invalid", 4},
-    };
     static struct host_cube_file file;
     (void)unused;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (size_t i = 0; i < sizeof mistakes / sizeof mistakes[0]; i++) {
         char where[96];
         struct host_error error = {0};
-        write_changed(cases[i].old, cases[i].new);
-        snprintf(where, sizeof where, "%s%s", path, cases[i].where);
+        write_changed(mistakes[i].old, mistakes[i].new);
+        snprintf(where, sizeof where, "%s%s", path, mistakes[i].where);
         int status = host_cube_file_read(&file, path, &error);
-        if (status != cases[i].code ||
+        if (status != mistakes[i].code ||
             (status != 0 && (strstr(error.text, where) == NULL ||
-                             strstr(error.text, cases[i].what) == NULL))) {
+                             strstr(error.text, mistakes[i].what) == NULL))) {
             fail_msg("case %zu: exit %d: %s", i, status, error.text);
         }
         if (status == 0) {

@@ -65,7 +65,8 @@ static void test_idle(void **unused)
             }
             snprintf(text, sizeof text,
                      "node %u link %u: answers, but has done nothing for %u s",
-                     i, i == 0 ? DIMENSION : 2, (unsigned)patiences[k]);
+                     i, i == 0 ? (unsigned)DIMENSION : 2u,
+                     (unsigned)patiences[k]);
             told_at(text, time_of(0.4) + patiences[k] * SECOND);
         }
     }
