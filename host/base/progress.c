@@ -86,7 +86,7 @@ struct tails {
 static struct tails tails_of(double part, double amount, double seconds)
 {
     struct tails t = {0};
-    char left[48] = "", rate[48] = "", count[48] = "";
+    char left[40] = "", rate[40] = "", count[40] = "";
     if (part > 0.0) {
         double s = seconds / part - seconds + 0.999;
         unsigned all = s < 3.6e6 ? (unsigned)s : 3600000;

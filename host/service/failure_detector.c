@@ -278,6 +278,17 @@ static void give_up(struct host_service *s, unsigned i)
                 (unsigned long long)s->patience_us / 1000000);
 }
 
+/* How long a node may be silent.  The run ends with the one node by which the
+ * host speaks: where the wire to it was heard meanwhile, it has twice the time,
+ * as its answers may have been lost with what was behind them. */
+static uint64_t silence_us_max(const struct host_service *s, unsigned i)
+{
+    bool last_resort = i == cube_wiring(s->cube)->gateway &&
+                       s->machine->spare_node == 0 &&
+                       s->wire_quiet_us < s->patience_us / 2;
+    return last_resort ? 2 * s->patience_us : s->patience_us;
+}
+
 /* Nodes that are silent, and what follows.  One that takes nothing off its
  * links holds up all that is on the way to it and behind, and so makes others
  * silent: at first nobody is blamed, but each is pinged alone, for the last
@@ -299,7 +310,8 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
             continue;
         }
         node->silent_us += elapsed_us;
-        if (node->silent_us <= s->patience_us - (alone ? 0 : probe_us(s))) {
+        uint64_t most = silence_us_max(s, i);
+        if (node->silent_us <= most - (alone ? 0 : probe_us(s))) {
             continue;
         }
         if (alone) {

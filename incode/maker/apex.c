@@ -322,7 +322,7 @@ static bool contest_near_degenerate(struct incode_make *n)
     const struct incode_maker *m = n->maker;
     const struct incode_local_points *local = &m->local;
     n->degenerate.known = true;
-    n->degenerate.ball.radius = __builtin_inf();
+    n->degenerate.ball = (struct incode_ball){.radius = __builtin_inf()};
     n->degenerate.spread = 0;
     n->degenerate.regular = n->regular;
     if (n->regular)

@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "node_talk.h"
+#include "tests/unit/emulated.h"
 
 static uint64_t state = 88172645463325252u;
 
@@ -20,9 +21,12 @@ static uint8_t draw(void)
 static void random_talks(void **unused)
 {
     const char *wanted = getenv("TALKS");
-    uint8_t bytes[300];
+    uint8_t bytes[300] = {0};
     (void)unused;
-    for (long talks = wanted == NULL ? 150 : atol(wanted); talks > 0; talks--) {
+    for (long talks = wanted != NULL ? atol(wanted)
+                      : emulated()   ? 25
+                                     : 150;
+         talks > 0; talks--) {
         bytes[0] = 0; /* a right setup, */
         bytes[1] = bytes[2] = 0;
         bytes[3] = 20;
