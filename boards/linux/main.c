@@ -94,9 +94,10 @@ static bool read_key(const char *path, uint8_t key[SECURE_KEY_BYTES],
 
 static bool open_wires(struct linux_board *linux_board,
                        const struct linux_options *options,
-                       struct tcp_wire *net, struct linux_fault *fault)
+                       struct secure_source *source, struct tcp_wire *net,
+                       struct linux_fault *fault)
 {
-    struct linux_guard guard = {NULL, false};
+    struct linux_guard guard = {.source = source};
     if (options->key != NULL) {
         if (!read_key(options->key, linux_board->key, fault)) {
             return false;
@@ -263,8 +264,9 @@ static int prepare(char **argv, struct linux_options *options,
     }
     linux_board->links_count = options->links_count + options->wires_count;
     linux_board->awake_us = options->awake;
+    board->source.random = tcp_random;
     if (options->wires_count > 0 &&
-        !open_wires(linux_board, options, net, &fault)) {
+        !open_wires(linux_board, options, &board->source, net, &fault)) {
         return complain(fault, 2);
     }
     for (unsigned i = 0; i < options->links_count; i++) {

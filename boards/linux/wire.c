@@ -53,6 +53,7 @@ static bool guard_net(const struct linux_guard *guard,
     config->insecure = guard->insecure;
     config->key = guard->insecure ? NULL : guard->key;
     config->suite = config->key == NULL ? NULL : &secure_sodium;
+    config->source = guard->source;
     if (!guard->insecure && guard->key == NULL) {
         fault->what = "a wire over TCP wants a key";
         fault->next = "make one with: incode key FILE, and give it with --key "

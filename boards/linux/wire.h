@@ -46,6 +46,7 @@ void linux_wire_inherit(struct linux_wire *wire, int fd);
  * without. */
 struct linux_guard {
     const uint8_t *key;
+    struct secure_source *source; /* of its openings */
     bool insecure;
 };
 

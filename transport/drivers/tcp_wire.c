@@ -70,7 +70,7 @@ static bool crowded(struct tcp_wire *wire)
     return c->fd >= 0 && begun(wire, c);
 }
 
-static bool system_random(void *context, uint8_t *bytes, size_t size)
+bool tcp_random(void *context, uint8_t *bytes, size_t size)
 {
     (void)context;
     return getrandom(bytes, size, 0) == (ssize_t)size;
@@ -83,8 +83,11 @@ static bool begin_shake(struct tcp_wire *wire, struct secure_shake *shake)
     const struct tcp_wire_config *c = &wire->config;
     struct secure_self self = {
         c->suite, c->key, !c->listens, {unknown, unknown}};
+    struct secure_source *source =
+        c->source != NULL ? c->source : &wire->source;
     struct secure_seed seed;
-    if (!secure_seed_draw(&wire->source, c->suite, c->key, &seed)) {
+    if (!secure_seed_draw(source, c->suite, c->key, &seed)) {
+        errno = EAGAIN;
         return false;
     }
     if (c->ends != NULL) {
@@ -100,7 +103,6 @@ static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
 {
     memset(&c->heard, 0, sizeof c->heard);
     if (wire->config.suite != NULL && !begin_shake(wire, &c->heard.shake)) {
-        close(fd);
         return false;
     }
     /* A peer that answers no more is a broken connection, in the end. */
@@ -135,7 +137,9 @@ static bool accept_some(struct tcp_wire *wire, uint64_t now_us)
         }
         wire->strangers += c->fd >= 0;
         drop(c);
-        (void)begin(wire, c, fd, true, now_us);
+        if (!begin(wire, c, fd, true, now_us)) {
+            close(fd);
+        }
     }
     return some;
 }
@@ -156,8 +160,8 @@ static void call(struct tcp_wire *wire, uint64_t now_us)
     int fd = socket(to->to.any.sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (fd >= 0 && tcp_prepare(fd) == 0) {
         bool at_once = connect(fd, &to->to.any, to->size) == 0;
-        if (at_once || errno == EINPROGRESS) {
-            (void)begin(wire, &wire->candidate[0], fd, at_once, now_us);
+        if ((at_once || errno == EINPROGRESS) &&
+            begin(wire, &wire->candidate[0], fd, at_once, now_us)) {
             return;
         }
     }
@@ -463,7 +467,7 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
     memset(wire, 0, sizeof *wire);
     wire->config = *config;
     wire->listener = -1;
-    wire->source.random = system_random;
+    wire->source.random = tcp_random;
     wire->answer_us = TCP_CALL_MIN_US;
     wire->prove_us = TCP_PROVE_MIN_US;
     tcp_pipe_init(&wire->tcp, -1);

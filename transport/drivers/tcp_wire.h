@@ -67,7 +67,13 @@ struct tcp_wire_config {
     /* Which nodes and ports are at its ends, as far as is known when a
      * connection is made; stays the caller's.  NULL: not at all. */
     const struct secure_ends *ends;
+    /* What its openings are drawn from; stays the caller's.  NULL: the system's
+     * random bytes. */
+    struct secure_source *source;
 };
+
+/* The system's random bytes, as secure_source asks for them; context: none. */
+bool tcp_random(void *context, uint8_t *bytes, size_t size);
 
 /* What an end without a key has said before it was taken. */
 struct tcp_first {
