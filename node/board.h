@@ -61,10 +61,6 @@ struct node_board {
     /* Sends and receives bytes on link i: 0 .. dimension - 1 to the neighbours;
      * node 0, and the one with host_port, have the host at link `dimension`. */
     struct link_pipe pipes[CUBE_LINKS_MAX];
-    /* Of what the openings of its wires with a key are made, which draw from
-     * it: random bytes, or, on a board that has none, its device and a number
-     * of this start that never comes again.  Not used where no wire has one. */
-    struct secure_source source;
     /* Microseconds since any fixed time, never going back. */
     uint64_t (*now_us)(void *context);
     /* Processor time that this node has used. */

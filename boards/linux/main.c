@@ -20,7 +20,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
-#include <sys/random.h>
 #include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
@@ -119,20 +118,14 @@ static bool open_wires(struct linux_board *linux_board,
     return true;
 }
 
-static bool random_bytes(void *context, uint8_t *bytes, size_t size)
-{
-    (void)context;
-    return getrandom(bytes, size, 0) == (ssize_t)size;
-}
-
 /* What the one who starts a node does otherwise. */
 static void start_alone(struct linux_options *options,
-                        struct linux_board *linux_board, char **argv)
+                        struct linux_board *linux_board,
+                        struct secure_source *source, char **argv)
 {
-    struct secure_source source = {.random = random_bytes};
     struct node_identity identity = {.epoch = 0};
     linux_board->again = argv;
-    if (options->epoch == 0 && node_identity_epoch(&identity, &source)) {
+    if (options->epoch == 0 && node_identity_epoch(&identity, source)) {
         options->epoch = identity.epoch;
     }
 #ifndef INCODE_SANITIZED
@@ -203,7 +196,6 @@ static void fill_in(struct node_board *board, struct linux_board *linux_board)
         board->pipes[i] = linux_wire_pipe(&linux_board->wire[i]);
     }
     board->context = linux_board;
-    board->source.random = random_bytes;
     board->now_us = now_us;
     board->busy_us = busy_us;
     board->idle = idle;
@@ -252,8 +244,9 @@ static int prepare(char **argv, struct linux_options *options,
     if (!linux_options_read(argv + 1, options, &fault)) {
         return complain(fault, 2);
     }
+    board->source.random = tcp_random;
     if (options->wires_count > 0 && options->memory > options->stack) {
-        start_alone(options, linux_board, argv);
+        start_alone(options, linux_board, &board->source, argv);
     }
     const char *why = take_memory(board, options, &net);
     if (why != NULL) {
@@ -264,7 +257,6 @@ static int prepare(char **argv, struct linux_options *options,
     }
     linux_board->links_count = options->links_count + options->wires_count;
     linux_board->awake_us = options->awake;
-    board->source.random = tcp_random;
     if (options->wires_count > 0 &&
         !open_wires(linux_board, options, &board->source, net, &fault)) {
         return complain(fault, 2);
