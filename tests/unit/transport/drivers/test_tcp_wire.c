@@ -412,6 +412,32 @@ static void without_a_key_only_if_it_is_meant(void **unused)
     tcp_wire_close(&wire);
 }
 
+/* A board without random bytes gives its device and the number of its start;
+ * one that has neither gets no wire, and nothing left open. */
+static void openings_are_drawn_from_the_board(void **unused)
+{
+    static struct end ends[2];
+    struct secure_source boards[2] = {{.device = "board 0", .boot = 7},
+                                      {.device = "board 1", .boot = 1}};
+    struct secure_source none = {.boot = 0};
+    struct tcp_address at = free_address(AF_INET);
+    (void)unused;
+    for (unsigned i = 0; i < 2; i++) {
+        open_end(&ends[i], i, &at, key);
+        ends[i].wire.config.source = i == 0 ? &none : &boards[i];
+    }
+    for (unsigned round = 0; round < 100; round++) {
+        step(&ends[0]);
+        step(&ends[1]);
+    }
+    assert_int_equal(ends[0].read + ends[1].read, 0);
+    ends[0].wire.config.source = &boards[0];
+    assert_true(exchange(ends, 20));
+    assert_true(boards[0].draws > 0 && boards[1].draws > 0);
+    close_end(&ends[0]);
+    close_end(&ends[1]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -427,6 +453,7 @@ int main(void)
         cmocka_unit_test(a_silent_caller_is_taken_for_want_of_a_better),
         cmocka_unit_test(a_lost_proof_is_asked_for_again),
         cmocka_unit_test(without_a_key_only_if_it_is_meant),
+        cmocka_unit_test(openings_are_drawn_from_the_board),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
