@@ -265,11 +265,19 @@ static void hear(struct linux_wire *wire, const struct pollfd *fds,
     }
 }
 
-/* Once, and at the end that calls: whoever calls the other may be a stranger.
- */
+/* Once, and of another key at the end that calls: whoever calls the other may
+ * be a stranger. */
 static void tell_of_key(struct linux_wire *wire)
 {
     bool calls = wire->kind == LINUX_NET && !wire->net->config.listens;
+    if (wire->kind == LINUX_NET && wire->net->lacks_key && !wire->told) {
+        wire->told = true;
+        fault_print(&(struct linux_fault){
+            .where = "--wire",
+            .value = wire->text,
+            .what = "is called by one who has a key, and this node has none",
+            .next = "give both ends the same key file, here with --key"});
+    }
     if (!calls || wire->told || wire->net->pause_us <= 2 * TCP_PAUSE_MIN_US) {
         return;
     }

@@ -134,6 +134,10 @@ END
         "$(last "$scratch/said")" grep -q \
         "^incode-node: --wire 0=listen:.*$((base + 50)): insecure: .*; make a key" \
         "$scratch/said"
+    check 'links/no key: the node says that it lacks it' \
+        "$(last "$scratch/said")" grep -q \
+        '^incode-node: --wire .*: is called by one who has a key, .*; ' \
+        "$scratch/said"
     check 'links/no output without a key' 'it left one' \
         test ! -e "$scratch/out.npy"
     rm "$scratch/said"

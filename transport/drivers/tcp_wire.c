@@ -204,7 +204,7 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
 
 /* Without a key: 1 when it has greeted as a link does, or has kept silent and
  * there is no better one; 0 not yet, -1 it says something else. */
-static int hear_first(const struct tcp_wire *wire, struct tcp_candidate *c,
+static int hear_first(struct tcp_wire *wire, struct tcp_candidate *c,
                       uint64_t now_us)
 {
     struct tcp_first *first = &c->heard.first;
@@ -214,6 +214,10 @@ static int hear_first(const struct tcp_wire *wire, struct tcp_candidate *c,
     first->end += got > 0 ? (size_t)got : 0;
     if (got > 0 && link_greets(first->bytes, first->end)) {
         return 1;
+    }
+    if (secure_greets(first->bytes, first->end)) {
+        wire->lacks_key = true;
+        return -1;
     }
     if (got < 0 || first->end == sizeof first->bytes) {
         return -1;

@@ -102,6 +102,7 @@ struct tcp_wire {
     bool other_key;              /* the last one called had another key, */
     uint64_t other_key_us;       /* and when it was met last */
     bool other_user;             /* or is run by another user */
+    bool lacks_key;              /* who called has one, and this end has none */
     struct secure_source source; /* of what makes each opening another */
     uint64_t call_us, pause_us;
     uint64_t answer_us, prove_us; /* patience with the peer's answer, and with
