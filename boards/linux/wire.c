@@ -270,7 +270,9 @@ static void hear(struct linux_wire *wire, const struct pollfd *fds,
 static void tell_of_key(struct linux_wire *wire)
 {
     bool calls = wire->kind == LINUX_NET && !wire->net->config.listens;
-    if (wire->kind == LINUX_NET && wire->net->lacks_key && !wire->told) {
+    bool lacks_key = wire->kind == LINUX_NET && wire->net->lone_key &&
+                     wire->net->config.key == NULL;
+    if (!calls && lacks_key && !wire->told) {
         wire->told = true;
         fault_print(&(struct linux_fault){
             .where = "--wire",
@@ -281,15 +283,13 @@ static void tell_of_key(struct linux_wire *wire)
     if (!calls || wire->told || wire->net->pause_us <= 2 * TCP_PAUSE_MIN_US) {
         return;
     }
-    if (wire->net->other_key || wire->net->other_user) {
+    struct tcp_wire_doubt doubt = tcp_wire_doubt(wire->net);
+    if (doubt.what != NULL) {
         wire->told = true;
-        fault_print(&(struct linux_fault){
-            .where = "--wire",
-            .value = wire->text,
-            .what = wire->net->other_key ? "answers, but with another key"
-                                         : "answers, but is another user's",
-            .next = wire->net->other_key ? "give both ends the same key file"
-                                         : "start both as the same user"});
+        fault_print(&(struct linux_fault){.where = "--wire",
+                                          .value = wire->text,
+                                          .what = doubt.what,
+                                          .next = doubt.next});
     }
 }
 
@@ -298,8 +298,8 @@ uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count)
     uint32_t refused = 0;
     for (unsigned i = 0; i < count; i++) {
         const struct tcp_wire *net = wires[i].net;
-        bool other =
-            wires[i].kind == LINUX_NET && net->tcp.fd < 0 && net->other_key;
+        bool other = wires[i].kind == LINUX_NET && net->tcp.fd < 0 &&
+                     (net->other_key || net->lone_key);
         refused |= (uint32_t)other << i;
     }
     return refused;

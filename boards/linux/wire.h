@@ -70,7 +70,7 @@ void linux_wires_end_with(const struct linux_wire *wires, unsigned count);
 struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 
 /* Bit i: nobody is connected by wire i, and who was there last could not prove
- * that it has the key. */
+ * that it has the key, or has one where this end has none. */
 uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count);
 
 /* Sleeps until bytes have come, or room for them where there was none, but no

@@ -114,14 +114,10 @@ int host_port_fault(const struct host_port *port)
                                                                : 0;
 }
 
-bool host_port_other_key(const struct host_port *port)
+struct tcp_wire_doubt host_port_doubt(const struct host_port *port)
 {
-    return port->kind == HOST_PORT_NET && port->net.other_key;
-}
-
-bool host_port_other_user(const struct host_port *port)
-{
-    return port->kind == HOST_PORT_NET && port->net.other_user;
+    return port->kind == HOST_PORT_NET ? tcp_wire_doubt(&port->net)
+                                       : (struct tcp_wire_doubt){NULL, NULL};
 }
 
 void host_port_close(struct host_port *port)

@@ -61,11 +61,8 @@ void host_port_rest(struct host_port *port, uint64_t rest_us);
 /* Why nobody is reached by it now, as errno has it; 0: that is not known. */
 int host_port_fault(const struct host_port *port);
 
-/* Whether what was last reached by it could not prove that it has our key. */
-bool host_port_other_key(const struct host_port *port);
-
-/* Whether it is run by another user, where the kernel says so. */
-bool host_port_other_user(const struct host_port *port);
+/* Why what was last reached by it is not the node, as tcp_wire_doubt. */
+struct tcp_wire_doubt host_port_doubt(const struct host_port *port);
 
 void host_port_close(struct host_port *port);
 

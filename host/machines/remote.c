@@ -181,16 +181,17 @@ static int port_to(const struct host_remote *r, unsigned node)
 
 static const char *machine_doubt(void *context, unsigned node)
 {
-    static char text[80];
+    static char text[120];
     const struct host_remote *r = context;
     int port = port_to(r, node);
-    int fault = port < 0 ? 0 : host_port_fault(&r->port[port]);
-    if (port >= 0 && host_port_other_key(&r->port[port])) {
-        return "answers, but with another key; give both ends the same key "
-               "file";
+    if (port < 0) {
+        return NULL;
     }
-    if (port >= 0 && host_port_other_user(&r->port[port])) {
-        return "answers, but is another user's; start it as the same user";
+    int fault = host_port_fault(&r->port[port]);
+    struct tcp_wire_doubt doubt = host_port_doubt(&r->port[port]);
+    if (doubt.what != NULL) {
+        snprintf(text, sizeof text, "%s; %s", doubt.what, doubt.next);
+        return text;
     }
     snprintf(text, sizeof text, "%s", fault == 0 ? "" : strerror(fault));
     text[0] = (char)tolower((unsigned char)text[0]);

@@ -130,6 +130,8 @@ END
     check 'links/another key: it says so' "$(last "$scratch/errors")" \
         grep -q 'link 0: answers, but with another key; ' "$scratch/errors"
     refused 'no key: exit 4' 's/--key [^ ]*/--insecure/'
+    check 'links/no key: the host says so' "$(last "$scratch/errors")" \
+        grep -q 'link 0: answers, but has no key; ' "$scratch/errors"
     check 'links/no key: the node says what that means' \
         "$(last "$scratch/said")" grep -q \
         "^incode-node: --wire 0=listen:.*$((base + 50)): insecure: .*; make a key" \
@@ -138,6 +140,12 @@ END
         "$(last "$scratch/said")" grep -q \
         '^incode-node: --wire .*: is called by one who has a key, .*; ' \
         "$scratch/said"
+    sed -i 's/^key = .*//; s/; } );/; insecure = true; } );/' \
+        "$scratch/one.cube"
+    refused 'a key at the node alone: exit 4' ''
+    check 'links/a key at the node alone: the host says so' \
+        "$(last "$scratch/errors")" \
+        grep -q 'link 0: answers, but wants a key; ' "$scratch/errors"
     check 'links/no output without a key' 'it left one' \
         test ! -e "$scratch/out.npy"
     rm "$scratch/said"

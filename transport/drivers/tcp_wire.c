@@ -193,7 +193,7 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
     if (getsockopt(c->fd, SOL_SOCKET, SO_ERROR, &fault, &size) != 0 ||
         fault != 0) {
         wire->fault = fault;
-        wire->other_key = false; /* it is gone */
+        wire->other_key = wire->lone_key = false; /* it is gone */
         return -1;
     }
     wire->answer_us = within(TCP_CALL_MIN_US, 8 * (now_us - c->since_us));
@@ -202,9 +202,10 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
     return 1;
 }
 
-/* Without a key: 1 when it has greeted as a link does, or has kept silent and
- * there is no better one; 0 not yet, -1 it says something else. */
-static int hear_first(struct tcp_wire *wire, struct tcp_candidate *c,
+/* Without a key: 1 when it has greeted as a link does, or there is no better
+ * one and it has kept silent, or greets as one with a key, which is to hear
+ * that there is none here; 0 not yet, -1 it says something else. */
+static int hear_first(const struct tcp_wire *wire, struct tcp_candidate *c,
                       uint64_t now_us)
 {
     struct tcp_first *first = &c->heard.first;
@@ -215,15 +216,24 @@ static int hear_first(struct tcp_wire *wire, struct tcp_candidate *c,
     if (got > 0 && link_greets(first->bytes, first->end)) {
         return 1;
     }
-    if (secure_greets(first->bytes, first->end)) {
-        wire->lacks_key = true;
-        return -1;
-    }
     if (got < 0 || first->end == sizeof first->bytes) {
         return -1;
     }
-    return first->end == 0 && !wire->proven &&
-           now_us - c->since_us > TCP_QUIET_US;
+    if (first->end > 0) {
+        return wire->tcp.fd < 0 && secure_greets(first->bytes, first->end);
+    }
+    return !wire->proven && now_us - c->since_us > TCP_QUIET_US;
+}
+
+/* What the end of a proof tells of who it was. */
+static void note_keys(struct tcp_wire *wire, int status,
+                      enum secure_fault fault, uint64_t now_us)
+{
+    if (status != 0) {
+        wire->other_key = status < 0 && fault == SECURE_OTHER_KEY;
+        wire->lone_key = status < 0 && fault == SECURE_NO_KEY;
+        wire->other_key_us = now_us;
+    }
 }
 
 static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
@@ -238,9 +248,7 @@ static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
         return wire->config.listens ? hear_first(wire, c, now_us) : 1;
     }
     int status = secure_shake(&c->heard.shake, &pipe);
-    wire->other_key = status < 0 ? c->heard.shake.fault == SECURE_OTHER_KEY
-                                 : wire->other_key && status == 0;
-    wire->other_key_us = status < 0 ? now_us : wire->other_key_us;
+    note_keys(wire, status, c->heard.shake.fault, now_us);
     bool elsewhere =
         status > 0 && wire->tcp.fd >= 0 && secure_shake_misled(&c->heard.shake);
     return elsewhere ? -1 : status;
@@ -257,7 +265,7 @@ static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
     wire->tcp = c->pipe;
     c->fd = -1;
     wire->connections++;
-    wire->pause_us = 0;
+    wire->pause_us = wire->lone_key ? wire->pause_us : 0;
     wire->fault = 0;
     wire->prove_us = within(TCP_PROVE_MIN_US, 8 * (now_us - c->since_us));
     wire->proven = wire->config.suite != NULL;
@@ -284,9 +292,8 @@ static uint64_t patience(const struct tcp_wire *wire,
 static void call_again(struct tcp_wire *wire, const struct tcp_candidate *c,
                        bool late, uint64_t now_us)
 {
-    bool crowded_out =
-        late ? !c->connected
-             : c->connected && !wire->other_key && !wire->other_user;
+    bool crowded_out = late ? !c->connected
+                            : c->connected && tcp_wire_doubt(wire).what == NULL;
     uint64_t *again = c->connected ? &wire->prove_us : &wire->answer_us;
     if (late) {
         *again = within(0, 2 * *again);
@@ -352,7 +359,7 @@ static void tick(struct tcp_wire *wire)
         }
     }
     if (now_us - wire->other_key_us > TCP_OTHER_KEY_US) {
-        wire->other_key = false;
+        wire->other_key = wire->lone_key = false;
     }
     bool in_use = wire->tcp.fd >= 0 && wire->proven;
     wire->look_us = met ? now_us + TCP_LOOK_US : 0;
@@ -412,6 +419,18 @@ static int receive_first(struct tcp_wire *wire, uint8_t *bytes, size_t size)
     return (int)have;
 }
 
+/* Without a key: whether the connection greets as a link does, or as one with a
+ * key. */
+static void hear_greeting(struct tcp_wire *wire, const uint8_t *bytes,
+                          size_t size)
+{
+    wire->proven = link_greets(bytes, size);
+    if (wire->proven || secure_greets(bytes, size)) {
+        wire->lone_key = !wire->proven;
+        wire->other_key_us = clock_us();
+    }
+}
+
 static int wire_receive(void *context, uint8_t *bytes, size_t size)
 {
     struct tcp_wire *wire = context;
@@ -425,9 +444,27 @@ static int wire_receive(void *context, uint8_t *bytes, size_t size)
                   ? receive_first(wire, bytes, size)
                   : pipe.receive(pipe.context, bytes, size);
     if (got > 0 && !wire->proven) {
-        wire->proven = link_greets(bytes, (size_t)got);
+        hear_greeting(wire, bytes, (size_t)got);
     }
     return got < 0 ? broken(wire) : got;
+}
+
+struct tcp_wire_doubt tcp_wire_doubt(const struct tcp_wire *wire)
+{
+    static const char same_key[] = "give both ends the same key file";
+    struct tcp_wire_doubt doubt = {NULL, NULL};
+    if (wire->other_key) {
+        doubt.what = "answers, but with another key";
+        doubt.next = same_key;
+    } else if (wire->lone_key) {
+        doubt.what = wire->config.suite != NULL ? "answers, but has no key"
+                                                : "answers, but wants a key";
+        doubt.next = same_key;
+    } else if (wire->other_user) {
+        doubt.what = "answers, but is another user's";
+        doubt.next = "start both as the same user";
+    }
+    return doubt;
 }
 
 struct link_pipe tcp_wire_pipe(struct tcp_wire *wire)

@@ -14,9 +14,10 @@
  * the others wait in the kernel.  The peer's own new connection, once proven,
  * takes the place of the old one; one that has the key and takes this wire for
  * another is taken only while there is none: the link says then who that is.
- * Without a key the proof is a link's greeting; who keeps silent is taken while
- * there is no better one.  While a connection is in use, others are looked at
- * every TCP_LOOK_US.
+ * Without a key the proof is a link's greeting; who keeps silent, or begins as
+ * one with a key, is taken while there is no better one: the latter learns from
+ * the link's greeting what is wrong.  While a connection is in use, others are
+ * looked at every TCP_LOOK_US.
  *
  * Memory: struct tcp_wire and in the kernel two buffers of TCP_BUFFER_BYTES a
  * connection.  Work: tcp_wire's pipe accepts at most TCP_ACCEPTS_MAX
@@ -55,7 +56,8 @@ enum {
     TCP_PAUSE_MIN_US = 20000,   /* before the next call, doubled each time */
     TCP_PAUSE_AWAY_US = 40000,  /* up to this by one who had no place, */
     TCP_PAUSE_MAX_US = 1000000, /* else up to this */
-    TCP_OTHER_KEY_US = 5000000  /* nobody with another key: it is gone */
+    TCP_OTHER_KEY_US = 5000000  /* nobody with another key, or with a key where
+                                   this end has none: it is gone */
 };
 
 struct tcp_wire_config {
@@ -99,10 +101,10 @@ struct tcp_wire {
     bool proven;                 /* it has shown who it is */
     bool replaced;               /* by a newer one: the link hears of a break */
     bool quiet;                  /* nobody called when it was last waited for */
-    bool other_key;              /* the last one called had another key, */
-    uint64_t other_key_us;       /* and when it was met last */
-    bool other_user;             /* or is run by another user */
-    bool lacks_key;              /* who called has one, and this end has none */
+    bool other_key;              /* the last one met has another key, */
+    bool lone_key;               /* or only one of both has a key; */
+    uint64_t other_key_us;       /* when that was met last */
+    bool other_user;             /* or it is run by another user */
     struct secure_source source; /* of what makes each opening another */
     uint64_t call_us, pause_us;
     uint64_t answer_us, prove_us; /* patience with the peer's answer, and with
@@ -124,6 +126,13 @@ void tcp_wire_close(struct tcp_wire *wire);
 /* At the end that calls: leaves the connection, and calls again after rest_us,
  * as whoever has the other end needs it for another. */
 void tcp_wire_rest(struct tcp_wire *wire, uint64_t rest_us);
+
+/* Why who was met last is not the peer, and what to do, as texts for the user;
+ * NULL: nothing is known against it. */
+struct tcp_wire_doubt {
+    const char *what, *next;
+};
+struct tcp_wire_doubt tcp_wire_doubt(const struct tcp_wire *wire);
 
 struct link_pipe tcp_wire_pipe(struct tcp_wire *wire);
 

@@ -128,6 +128,41 @@ static void another_key_never_connects(void **unused)
     close_end(&ends[1]);
 }
 
+/* Where only one of the two has a key, either hears of that, whichever calls;
+ * and forgets it when one comes who is right. */
+static void a_lone_key_is_told_of(void **unused)
+{
+    static struct end ends[2];
+    (void)unused;
+    for (unsigned keyed = 0; keyed < 2; keyed++) {
+        struct tcp_address at = free_address(AF_INET);
+        open_end(&ends[1], 1, &at, keyed == 1 ? key : NULL);
+        open_end(&ends[0], 0, &at, keyed == 0 ? key : NULL);
+        for (uint64_t begin = clock_us(); !ends[0].wire.lone_key ||
+                                          !ends[1].wire.lone_key ||
+                                          ends[0].wire.pause_us <= 80000;) {
+            step(&ends[0]);
+            step(&ends[1]);
+            assert_true(clock_us() - begin < 10000000);
+        }
+        for (unsigned who = 0; who < 2; who++) {
+            struct tcp_wire_doubt doubt = tcp_wire_doubt(&ends[who].wire);
+            assert_string_equal(doubt.what, who == keyed
+                                                ? "answers, but has no key"
+                                                : "answers, but wants a key");
+            assert_string_equal(doubt.next, "give both ends the same key file");
+        }
+        assert_int_equal(ends[keyed].wire.connections, 0);
+        close_end(&ends[0]);
+        open_end(&ends[0], 0, &at, keyed == 1 ? key : NULL);
+        assert_true(exchange(ends, 20));
+        assert_null(tcp_wire_doubt(&ends[0].wire).what);
+        assert_null(tcp_wire_doubt(&ends[1].wire).what);
+        close_end(&ends[0]);
+        close_end(&ends[1]);
+    }
+}
+
 /* One who has the key and takes the wire for another, as a cube file may be
  * wrong, or somebody has led his call elsewhere: while nobody better is there
  * he is heard, as the link tells then who he is; one who is right takes his
@@ -445,6 +480,7 @@ int main(void)
         cmocka_unit_test(paths),
         cmocka_unit_test(wires_that_break_go_on),
         cmocka_unit_test(another_key_never_connects),
+        cmocka_unit_test(a_lone_key_is_told_of),
         cmocka_unit_test(another_key_that_is_gone_is_forgotten),
         cmocka_unit_test(one_who_is_led_elsewhere_ends_nothing),
         cmocka_unit_test(strangers_change_nothing),
