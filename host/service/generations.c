@@ -35,13 +35,14 @@ uint16_t host_generation_gateway(const struct host_service *service,
                : next->gateway;
 }
 
-/* The gateway must be there, and what was given up must not be on the way. */
+/* The gateway must be there, and what was given up must not be on the way.
+ * What is dead only since is looked at later. */
 static int check_renewed(const struct host_service *s, struct host_error *error)
 {
     const struct cube_wiring *w = cube_wiring(s->cube);
     unsigned dimension = s->machine->dimension;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        bool dead = wiring_is_dead(w, w->dead_count, i, dimension, dimension);
+        bool dead = wiring_is_dead(w, w->settled, i, dimension, dimension);
         if (i == w->gateway ? dead : s->node[i].given_up && !dead) {
             return host_detector_doubt(s, i, error) != 0
                        ? error->code

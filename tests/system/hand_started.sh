@@ -86,6 +86,14 @@ ends() {
     fi
 }
 
+# --- none ---------------------------------------------------------------------
+
+begun=$(date +%s)
+begin --patience 7
+ends none 4
+check 'hand_started/none: no sooner than its patience' 'it gave up before' \
+    [ $(($(date +%s) - begun)) -ge 7 ]
+
 # --- late, then killed ---------------------------------------------------------
 
 begin --patience 60
