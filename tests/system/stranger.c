@@ -274,15 +274,16 @@ static void say(const struct call *c, const void *bytes, size_t size)
 
 static void speak(struct call *c)
 {
-    uint8_t bytes[BYTES_MAX];
+    static const uint8_t greeting[] = {'i', 'n', 'c', 'o', 'd', 'e', 's'};
+    uint8_t bytes[BYTES_MAX] = {0};
     size_t size = 1 + draw(sizeof bytes);
     for (size_t i = 0; i < size; i++) {
         bytes[i] = (uint8_t)draw(256);
     }
     if (c->manner == HALF) {
         /* As a greeting begins, in any version, and no more of it. */
-        memcpy(bytes, "incodes", 7);
-        bytes[7] = (uint8_t)draw(8);
+        memcpy(bytes, greeting, sizeof greeting);
+        bytes[sizeof greeting] = (uint8_t)draw(8);
         size = 1 + draw(40);
     }
     if (c->manner == NOISE || c->manner == HALF) {

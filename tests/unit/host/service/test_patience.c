@@ -180,7 +180,7 @@ static void test_never_started(void **unused)
             start_world();
             host_world_late(&world.sim, i, UINT64_MAX / 4);
             snprintf(text, sizeof text, "no answer for %u s, %u of 8 nodes are",
-                     (unsigned)patiences[k], i == 0 ? 0 : 7);
+                     (unsigned)patiences[k], i == 0 ? 0u : 7u);
             fails_with(text);
             uint64_t end_us = world.stopped_us;
             assert_in_range(end_us, patiences[k] * SECOND,
