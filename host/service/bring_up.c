@@ -9,6 +9,7 @@
 enum {
     STARTED_HERE_US = 9000000, /* the machine's own nodes need no more */
     TELL_US = 1500000,
+    NEWS_US = 1000000, /* in which who is there answers */
     TELL_AGAIN_US = 1000000
 };
 
@@ -110,7 +111,9 @@ static void describe(const struct host_service *s, char *line, size_t size)
 static void tell(struct host_service *s, uint64_t now_us)
 {
     char line[HOST_NOTICE_BYTES];
-    if (now_us - s->opened_us < TELL_US || s->machine->restarts != NULL ||
+    /* A generation begins without anybody, and all come again one by one. */
+    if (now_us - s->opened_us < TELL_US || now_us - s->news_us < NEWS_US ||
+        s->machine->restarts != NULL ||
         (s->waiting[0] != '\0' && now_us - s->waiting_us < TELL_AGAIN_US)) {
         return;
     }

@@ -18,11 +18,11 @@ static void no_seed_comes_twice(void **unused)
     static uint8_t parts[2 * SEEDS][SECURE_NONCE_BYTES];
     size_t count = 0;
     (void)unused;
-    for (uint8_t device = 0; device < DEVICES; device++) {
+    for (unsigned device = 0; device < DEVICES; device++) {
         for (uint64_t start = 1; start <= STARTS; start++) {
             struct secure_source source = {.boot = start};
             source.device[device % 2 == 0 ? 0 : SECURE_DEVICE_BYTES - 1] =
-                device;
+                (uint8_t)device;
             for (unsigned i = 0; i < DRAWS; i++) {
                 struct secure_seed seed;
                 assert_true(
@@ -104,8 +104,8 @@ static void the_vector(void **unused)
     struct secure_seed seed;
     uint8_t counted[SECURE_KEY_BYTES];
     (void)unused;
-    for (uint8_t i = 0; i < sizeof counted; i++) {
-        counted[i] = i;
+    for (size_t i = 0; i < sizeof counted; i++) {
+        counted[i] = (uint8_t)i;
     }
     assert_true(secure_seed_draw(&source, &secure_sodium, counted, &seed));
     expect_bytes(seed.nonce,

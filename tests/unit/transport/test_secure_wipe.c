@@ -4,7 +4,8 @@
 #include "own_stack.h"
 #include "secure_world.h"
 
-/* In this unit, so that the compiler sees all that it could leave out. */
+/* In this unit, so that the compiler sees all that it could leave out.
+ * NOLINTNEXTLINE(bugprone-suspicious-include) */
 #include "transport/secure_wipe.c"
 
 enum { SECRET_BYTES = 64 };
@@ -91,7 +92,8 @@ static bool toy_open(uint8_t *out, const uint8_t *in, size_t size,
                      const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
                      const uint8_t key[SECURE_KEY_BYTES])
 {
-    (void)out, (void)ad, (void)key;
+    (void)ad, (void)key;
+    memmove(out, in, size);
     return in[size] == counter + 1;
 }
 

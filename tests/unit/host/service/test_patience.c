@@ -207,7 +207,7 @@ static void test_late(void **unused)
     survives_as(&host_spatial);
     assert_int_equal(result.missing_wires, 0);
     told_at("node 4: no answer, nor of 2 more, 5 of 8 are known ", 1500000);
-    told_at("node 4: no answer, 7 of 8 are there; ", 3 * SECOND);
+    told_at("node 4: no answer, 7 of 8 are there; ", 3950000);
     told_at("host: all nodes are there; ", 5 * SECOND);
     assert_int_equal(world.told_count, 3);
 }
