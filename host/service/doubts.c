@@ -50,14 +50,19 @@ static void doubt(struct host_service *s, unsigned i)
     const struct host_machine *m = s->machine;
     const char *why = m->doubt == NULL ? NULL : m->doubt(m->context, i);
     bool next = why != NULL && strchr(why, ';') != NULL;
+    const char *start = m->restarts != NULL || m->start_line == NULL
+                            ? NULL
+                            : m->start_line(m->context, i);
     s->node[i].doubted = true;
     host_notice(s, i,
                 "no answer for %.1f s%s%s%s %s after %llu s without one, "
-                "look after that node",
+                "look after that node%s%s",
                 1e-6 * (double)s->node[i].silent_us, why == NULL ? "" : ": ",
                 why == NULL ? "" : why, next ? ", or" : "; it is",
                 m->restarts != NULL ? "ended and started again" : "given up",
-                (unsigned long long)s->patience_us / 1000000);
+                (unsigned long long)s->patience_us / 1000000,
+                start == NULL ? "" : ", it is started by: ",
+                start == NULL ? "" : start);
 }
 
 static void doubt_wire(struct host_service *s, unsigned i, unsigned d)
