@@ -123,8 +123,7 @@ static int take_spill(struct host_service *s,
     }
     memcpy(faces, message->data + sizeof header,
            header.count * sizeof faces[0]);
-    return host_spill_put(&s->spill, message->source, faces, header.count,
-                          error);
+    return host_results_spill(s, message->source, faces, header.count, error);
 }
 
 static int take_unspill_request(struct host_service *s,
@@ -137,11 +136,16 @@ static int take_unspill_request(struct host_service *s,
         return wrong_size(message, "request for a spilled list", sizeof header,
                           error);
     }
+    memcpy(&header, message->data, sizeof header);
+    if (header.brick >= s->order->bricks) {
+        return unsound(message, error,
+                       "spilled list of brick %u requested, out of range 0..%u",
+                       header.brick, s->order->bricks - 1);
+    }
     if (node->unspills_count == HOST_UNSPILLS_MAX) {
         return unsound(message, error, "more than %d spilled lists requested",
                        HOST_UNSPILLS_MAX);
     }
-    memcpy(&header, message->data, sizeof header);
     if (missing(s, node, header.sent)) {
         return 0; /* what was lost may have been part of the list */
     }
@@ -177,12 +181,11 @@ static int take_finished(struct host_service *s,
     }
     if (finished.epoch != 0 &&
         host_ledger_finish(&s->ledger, message->source) != 0) {
-        return host_fail(error, HOST_BROKEN,
-                         "node %u: finished with %u bricks of %u committed; "
-                         "please report this with the points",
-                         message->source,
-                         s->ledger.job[message->source].committed,
-                         node->job.job.last - node->job.job.first);
+        const struct host_job *job = &s->ledger.job[message->source];
+        char why[80];
+        snprintf(why, sizeof why, "finished with %u bricks of %u committed",
+                 job->committed, job->last - job->first);
+        return host_results_refuse(s, message->source, why, error);
     }
     if (finished.epoch != 0) {
         node->working = false;

@@ -63,16 +63,43 @@ static void describe(const struct host_service *s, const struct host_job *job,
                  : "which is not of its job");
 }
 
-/* The node is named, and does its job no more. */
-static int refuse(struct host_service *s, unsigned node, const char *why,
-                  struct host_error *error)
+int host_results_refuse(struct host_service *service, unsigned node,
+                        const char *why, struct host_error *error)
 {
-    return host_idle_leave(s, node, why)
+    return host_idle_leave(service, node, why)
                ? 0
                : host_fail(error, HOST_CUBE,
-                           "node %u: %s, and so before its new start; are host "
-                           "and node of one version? run make",
+                           "node %u: %s, and had its new start before; are "
+                           "host and node of one version? run make",
                            node, why);
+}
+
+static bool is_spilled(const struct host_service *s, const struct host_job *job,
+                       const uint32_t f[3])
+{
+    uint32_t brick = f[0] / INCODE_BRICK_POINTS;
+    bool mark = f[1] == INCODE_NONE && f[2] == INCODE_NONE &&
+                brick >= job->first && brick < job->last;
+    bool face = is_point(s->order, f[1]) && is_point(s->order, f[2]) &&
+                f[0] != f[1] && f[0] != f[2] && f[1] != f[2];
+    return is_point(s->order, f[0]) && (mark || face);
+}
+
+int host_results_spill(struct host_service *service, unsigned node,
+                       const struct incode_face *faces, uint32_t count,
+                       struct host_error *error)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t *f = faces[i].v;
+        if (!is_spilled(service, &service->ledger.job[node], f)) {
+            char why[WHY_BYTES];
+            snprintf(why, sizeof why,
+                     "spilled vertices %u, %u and %u, which are no face", f[0],
+                     f[1], f[2]);
+            return host_results_refuse(service, node, why, error);
+        }
+    }
+    return host_spill_put(&service->spill, node, faces, count, error);
 }
 
 /* Rows go straight to their place; a commit may follow any of them. */
@@ -97,12 +124,13 @@ int host_results_take(struct host_service *service,
         }
         event = node_result_read(&reader, rows, room, &count);
         if (event == NODE_RESULT_GARBAGE) {
-            return refuse(s, message->source, "invalid results", error);
+            return host_results_refuse(s, message->source, "invalid results",
+                                       error);
         }
         for (size_t i = 0; i < count; i++) {
             if (!is_sound(s, job, rows[i])) {
                 describe(s, job, rows[i], why);
-                return refuse(s, message->source, why, error);
+                return host_results_refuse(s, message->source, why, error);
             }
         }
         host_tetrahedra_keep(s->tets, count);
@@ -111,7 +139,7 @@ int host_results_take(struct host_service *service,
             s->strategy->commit(&s->work, message->source, reader.brick) != 0) {
             snprintf(why, sizeof why, "committed brick %u, not of its job",
                      reader.brick);
-            return refuse(s, message->source, why, error);
+            return host_results_refuse(s, message->source, why, error);
         }
     } while (event != NODE_RESULT_END);
     return 0;

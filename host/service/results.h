@@ -1,10 +1,10 @@
-/* NODE_RESULT: tetrahedra on their way into the list, and bricks committed.
- * Part of service.h.
+/* What a node says of its job: tetrahedra on their way into the list, bricks
+ * committed, faces that it spills.  Part of service.h.
  *
  * Nothing of it is believed: every vertex must be that of a point, the four
  * different, the brick that owns the tetrahedron one of the node's job and not
- * committed.  A node that says anything else is named, and its job is lost with
- * it (host_idle_leave); what it had committed stays.
+ * committed; so the three of a face.  A node that says anything else is named,
+ * and its job is lost with it (host_idle_leave); what it had committed stays.
  *
  * Memory: none of its own.  Work: about 10 ns a tetrahedron.
  *
@@ -20,5 +20,16 @@
 int host_results_take(struct host_service *service,
                       const struct cube_message *message,
                       struct host_error *error);
+
+/* Of a job that is current: `count` faces, and marks of vertices of the job
+ * that were reached (incode/front/job.h), into the store.  0, or an error. */
+int host_results_spill(struct host_service *service, unsigned node,
+                       const struct incode_face *faces, uint32_t count,
+                       struct host_error *error);
+
+/* The node is named, and does its job no more.  0, or HOST_CUBE where it had a
+ * new start before. */
+int host_results_refuse(struct host_service *service, unsigned node,
+                        const char *why, struct host_error *error);
 
 #endif

@@ -1,22 +1,6 @@
 /* The host believes no message: whatever a node sends, the host takes it as it
  * should be, or names the node and stops; it never writes where it must not. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include "host/service/handlers.h"
-#include "host/service/strategies/strategies.h"
-#include "node/result.h"
-#include "transport/drivers/sim.h"
-#include "small_order.h"
-
-enum { NODES = 4 };
+#include "given_messages.h"
 
 static uint64_t state = 88172645463325252u;
 
@@ -26,119 +10,6 @@ static uint32_t draw(uint32_t below)
     state ^= state >> 7;
     state ^= state << 17;
     return (uint32_t)(state >> 32) % below;
-}
-
-static struct host_service service;
-static struct host_machine machine;
-static struct host_order order;
-static struct host_tetrahedra tets;
-
-/* The host's end of a cube, which nobody polls: the link of a node is named
- * all the same. */
-static struct sim_end nowhere;
-
-static void *open_cube(void)
-{
-    struct cube_config config = {
-        .self = CUBE_HOST, .dimension = 2, .window = 1, .epoch = 1};
-    config.pipes[0] = sim_pipe(&nowhere);
-    void *arena = malloc(cube_arena_bytes(&config));
-    assert_non_null(arena);
-    service.cube = cube_init(arena, cube_arena_bytes(&config), &config);
-    assert_non_null(service.cube);
-    return arena;
-}
-
-static void *cube_arena;
-static char said[400]; /* the last line to the user */
-
-static void keep_told(void *context, const char *line)
-{
-    (void)context;
-    snprintf(said, sizeof said, "%s", line);
-}
-
-static int set_up(void **unused)
-{
-    (void)unused;
-    order = small_order(NODES);
-    return 0;
-}
-
-static int tear_down(void **unused)
-{
-    (void)unused;
-    host_order_free(&order);
-    return 0;
-}
-
-/* A service in the midst of its run, a job at each node. */
-static void begin(void)
-{
-    struct host_error error = {0};
-    memset(&service, 0, sizeof service);
-    memset(&tets, 0, sizeof tets);
-    cube_arena = open_cube();
-    machine.nodes = NODES;
-    machine.dimension = 2;
-    machine.told = keep_told;
-    said[0] = '\0';
-    service.machine = &machine;
-    service.order = &order;
-    service.tets = &tets;
-    service.strategy = &host_spatial;
-    service.work.ledger = &service.ledger;
-    service.work.lost = calloc(NODES, sizeof *service.work.lost);
-    assert_non_null(service.work.lost);
-    service.started = true;
-    service.node = calloc(NODES, sizeof *service.node);
-    service.report = calloc(NODES, sizeof *service.report);
-    assert_non_null(service.node);
-    assert_non_null(service.report);
-    assert_int_equal(
-        host_ledger_init(&service.ledger, order.bricks, NODES, &error), 0);
-    assert_int_equal(host_spill_init(&service.spill, 0, &error), 0);
-    for (uint32_t i = 0; i < NODES; i++) {
-        (void)host_ledger_open(&service.ledger, i, order.region[i].first,
-                               order.region[i].last);
-    }
-}
-
-static void end(void)
-{
-    free(cube_arena);
-    free(service.node);
-    free(service.report);
-    free(service.work.lost);
-    host_ledger_free(&service.ledger);
-    host_spill_free(&service.spill);
-    host_tetrahedra_free(&tets);
-}
-
-static bool gap; /* messages do not say how many went before them */
-
-static int send(uint16_t source, uint8_t type, const void *data, size_t size,
-                struct host_error *error)
-{
-    /* A copy of the right size, so that a sanitizer sees reads past it. */
-    uint8_t *copy = malloc(size + 1);
-    assert_non_null(copy);
-    if (size > 0) {
-        memcpy(copy, data, size);
-    }
-    if (type == NODE_RESULT && size >= 8 && source < NODES && !gap) {
-        memcpy(copy + 4, &service.node[source].received, 4);
-    }
-    if (type == NODE_UNSPILL_REQUEST && size >= 20 && source < NODES && !gap) {
-        memcpy(copy + 16, &service.node[source].received, 4);
-    }
-    if (type == NODE_FINISHED && size >= 16 && source < NODES && !gap) {
-        memcpy(copy + 8, &service.node[source].received, 4);
-    }
-    struct cube_message message = {source, (uint16_t)size, type, copy};
-    int status = host_handle(&service, &message, error);
-    free(copy);
-    return status;
 }
 
 static void test_any_bytes(void **unused)
@@ -214,81 +85,6 @@ static void test_epochs(void **unused)
     end();
 }
 
-/* A batch of one tetrahedron of node 1, and the commit of a brick of its job.
- */
-static size_t batch_of(uint8_t *data, const uint32_t v[4], uint32_t brick)
-{
-    struct node_result_writer writer;
-    struct node_result_header header = {service.ledger.job[1].epoch, 0};
-    const uint32_t apexes[1][3] = {{v[1], v[2], v[3]}};
-    memcpy(data, &header, sizeof header);
-    node_result_begin(&writer, data + sizeof header, 100);
-    assert_int_equal(node_result_star(&writer, v[0], apexes, 1), 1);
-    assert_int_equal(node_result_commit(&writer, brick), 1);
-    return sizeof header + writer.size;
-}
-
-/* What cannot be is refused before it is used: the node is named, and has no
- * part in the run any more; where it was ended and started again, it gets no
- * second start. */
-static bool ends_node(void *context, unsigned node)
-{
-    (void)context;
-    assert_int_equal(node, 1);
-    return true;
-}
-
-static void refuses(const uint32_t v[4], uint32_t brick, const char *text)
-{
-    uint8_t data[128];
-    struct host_error error = {0};
-    for (int anew = 0; anew < 3; anew++) {
-        begin();
-        machine.kill = anew > 0 ? ends_node : NULL;
-        service.node[1].started_anew = anew == 2;
-        size_t size = batch_of(data, v, brick);
-        assert_int_equal(send(1, NODE_RESULT, data, size, &error),
-                         anew == 2 ? HOST_CUBE : 0);
-        if (strstr(anew == 2 ? error.text : said, text) == NULL) {
-            fail_msg("no '%s' in: %s %s", text, said, error.text);
-        }
-        assert_int_equal(service.node[1].aside, anew == 0);
-        assert_int_equal(service.loss, anew == 0);
-        assert_int_equal(service.ledger.committed, 0);
-        /* Whatever else it says is of no interest. */
-        assert_int_equal(send(1, NODE_RESULT, data, 3, &error), 0);
-        machine.kill = NULL;
-        end();
-    }
-}
-
-static void test_refused_results(void **unused)
-{
-    (void)unused;
-    uint32_t first = order.region[1].first, v = first * INCODE_BRICK_POINTS;
-    uint32_t loose = first, last = order.bricks - 1;
-    char text[80];
-    while (order.fill[loose] == INCODE_BRICK_POINTS) {
-        assert_true(++loose < order.region[1].last);
-    }
-    uint32_t padding = loose * INCODE_BRICK_POINTS + order.fill[loose];
-    snprintf(text, sizeof text, "a result with vertex %u, which is no point",
-             padding);
-    for (unsigned i = 0; i < 4; i++) {
-        uint32_t row[4] = {v, v + 1, v + 2, v + 3};
-        row[i] = padding;
-        refuses(row, first, text);
-    }
-    refuses((uint32_t[]){v, v + 1, v + 2, v + 1}, first, " twice");
-    refuses((uint32_t[]){v, v + 1, v, v + 2}, first, " twice");
-    refuses((uint32_t[]){v, v, v + 1, v + 2}, first, " twice");
-    refuses((uint32_t[]){0, 1, 2, 3}, first,
-            "a result of brick 0, which is not of its job");
-    refuses((uint32_t[]){v, v + 1, v + 2, v + 3}, last, "committed brick ");
-    refuses((uint32_t[]){v, v + 1, v + 2, 64 * last + 64}, first,
-            "invalid results");
-}
-
 /* What comes after a message that was lost does not count, and is a loss. */
 static void test_gaps(void **unused)
 {
@@ -313,24 +109,6 @@ static void test_gaps(void **unused)
         assert_false(service.node[0].reported);
         end();
     }
-}
-
-/* A node that has not committed all its bricks is not done. */
-static void test_unfinished(void **unused)
-{
-    (void)unused;
-    static struct node_finished_message finished;
-    struct host_error error = {0};
-    begin();
-    finished.epoch = service.ledger.job[2].epoch;
-    assert_int_equal(send(2, NODE_FINISHED, &finished, sizeof finished, &error),
-                     HOST_BROKEN);
-    assert_non_null(strstr(error.text, "node 2: "));
-    assert_false(service.node[2].reported);
-    memset(&error, 0, sizeof error);
-    assert_int_equal(send(1, NODE_FINISHED, &finished, sizeof finished, &error),
-                     HOST_CUBE); /* that job is another node's */
-    end();
 }
 
 static void answer(uint32_t start, uint32_t pinged, uint32_t received,
@@ -480,6 +258,7 @@ static void test_texts(void **unused)
         struct node_spill_header header;
         struct incode_face faces[NODE_FACES_A_MESSAGE + 1];
     } spill = {.header = {.count = NODE_FACES_A_MESSAGE + 1}};
+    static struct node_spill_header beyond = {.brick = 1000000};
     uint32_t page = 1000000;
     const struct {
         uint8_t type;
@@ -506,6 +285,8 @@ static void test_texts(void **unused)
          "request for a spilled list in 24 bytes, expected 20"},
         {NODE_UNSPILL_REQUEST, &spill, 20,
          "more than 64 spilled lists requested"},
+        {NODE_UNSPILL_REQUEST, &beyond, 20,
+         "spilled list of brick 1000000 requested, out of range 0.."},
         {NODE_STOP, &ready, 0, "unknown type of message"},
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
@@ -528,16 +309,10 @@ static void test_texts(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_any_bytes),
-        cmocka_unit_test(test_epochs),
-        cmocka_unit_test(test_gaps),
-        cmocka_unit_test(test_unfinished),
-        cmocka_unit_test(test_answers),
-        cmocka_unit_test(test_starts),
-        cmocka_unit_test(test_refused_results),
-        cmocka_unit_test(test_fault),
-        cmocka_unit_test(test_strategy),
-        cmocka_unit_test(test_texts),
+        cmocka_unit_test(test_any_bytes), cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_gaps),      cmocka_unit_test(test_answers),
+        cmocka_unit_test(test_starts),    cmocka_unit_test(test_fault),
+        cmocka_unit_test(test_strategy),  cmocka_unit_test(test_texts),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
