@@ -142,8 +142,8 @@ static int command_gen(int argc, char **argv, struct host_error *error)
 {
     static const struct argp_option options[] = {
         {"seed", 's', "S", 0,
-         "Another seed makes other points of uniform, bubbles, sphere and hub; "
-         "the other kinds have no chance in them. Default: 1",
+         "Another seed makes other points; bluntfin, grid and rotated have no "
+         "chance in them. Default: 1",
          0},
         {"output", 'o', "FILE", 0,
          "Write to FILE, by its extension; -, the default, is .xyz on standard "
@@ -155,12 +155,14 @@ static int command_gen(int argc, char **argv, struct host_error *error)
     struct host_points points = {0};
     struct simple s = {.seed = 1, .output = "-"};
     uint64_t n;
-    if (parse(
-            argc, argv, options, "KIND N",
-            "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
-            "grid, rotated (a grid turned out of its axes), or hub (one point "
-            "amid N-1 on a sphere). N: 4 to 4294901760 (2^32 - 2^16).",
-            2, &s, error) != 0) {
+    if (parse(argc, argv, options, "KIND N",
+              "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
+              "grid, rotated (a grid turned out of its axes), hub (one point "
+              "amid N-1 on a sphere), shell (of thickness 0.001), cylinder, "
+              "torus, terrain (whole heights on a square grid), scales "
+              "(coordinates from 2^-1000 to 2^1000), or lines (two that do not "
+              "meet). N: 4 to 4294901760 (2^32 - 2^16).",
+              2, &s, error) != 0) {
         return error->code;
     }
     if (host_parse_number(s.argument[1], HOST_GEN_MIN, host_gen_max, &n) != 0) {
@@ -342,7 +344,8 @@ static int command_help(int argc, char **argv, struct host_error *error);
 static const struct command commands[] = {
     {"run", "POINTS -o OUT", "triangulate on a cube of nodes", command_run},
     {"gen", "KIND N -o FILE",
-     "make points: uniform, bubbles, bluntfin, sphere,\ngrid, rotated, hub",
+     "make points: uniform, bubbles, bluntfin, sphere,\ncylinder, torus, "
+     "shell, terrain and others",
      command_gen},
     {"verify", "POINTS TETS", "check a triangulation exactly", command_verify},
     {"digest", "TETS", "print what tells triangulations apart", command_digest},

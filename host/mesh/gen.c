@@ -187,17 +187,136 @@ static void bluntfin(struct maker *m)
     }
 }
 
+/* Uniform on the unit circle. */
+static void turn(struct random *r, double v[2])
+{
+    double square;
+    do {
+        v[0] = 2 * draw(r) - 1;
+        v[1] = 2 * draw(r) - 1;
+        square = v[0] * v[0] + v[1] * v[1];
+    } while (square > 1 || square < 0x1p-20);
+    double length = sqrt(square);
+    v[0] /= length;
+    v[1] /= length;
+}
+
+/* The side of radius 1 and height 4, without its ends. */
+static void cylinder(struct maker *m)
+{
+    double v[2], z;
+    do {
+        turn(&m->random, v);
+        z = 4 * draw(&m->random);
+    } while (put(m, v[0], v[1], z));
+}
+
+/* Of radii 1 and 1/4, uniform in both angles. */
+static void torus(struct maker *m)
+{
+    double about[2], across[2], r;
+    do {
+        turn(&m->random, about);
+        turn(&m->random, across);
+        r = 1 + 0.25 * across[0];
+    } while (put(m, r * about[0], r * about[1], 0.25 * across[1]));
+}
+
+static void shell(struct maker *m)
+{
+    double v[3], r;
+    do {
+        direction(&m->random, v);
+        r = 1 - 0.001 * draw(&m->random);
+    } while (put(m, r * v[0], r * v[1], r * v[2]));
+}
+
+/* At (i, j) of a lattice that the seed and the octave make, in [0, 1). */
+static double knot(const struct maker *m, uint64_t octave, uint64_t i,
+                   uint64_t j)
+{
+    struct random r = {m->seed ^ octave << 60 ^ i << 30 ^ j};
+    (void)next(&r);
+    return draw(&r);
+}
+
+/* Between the four knots about (x, y), smooth across each cell. */
+static double hill(const struct maker *m, uint64_t octave, double x, double y)
+{
+    uint64_t i = (uint64_t)x, j = (uint64_t)y;
+    double u = x - (double)i, v = y - (double)j;
+    u *= u * (3 - 2 * u);
+    v *= v * (3 - 2 * v);
+    double low =
+        (1 - u) * knot(m, octave, i, j) + u * knot(m, octave, i + 1, j);
+    double high =
+        (1 - u) * knot(m, octave, i, j + 1) + u * knot(m, octave, i + 1, j + 1);
+    return (1 - v) * low + v * high;
+}
+
+/* A square grid, a step of 10, of heights in whole units up to 1,000. */
+static void terrain(struct maker *m)
+{
+    uint64_t side = 2, i = 0;
+    double x, y, height;
+    while (side * side < m->n) {
+        side++;
+    }
+    do {
+        x = (double)(i % side);
+        y = (double)(i / side);
+        height = 0;
+        for (uint64_t octave = 0; octave < 6; octave++) {
+            double step = (double)(128 >> octave);
+            height += 4 * step * hill(m, octave, x / step, y / step);
+        }
+        i++;
+    } while (put(m, 10 * x, 10 * y, floor(height)));
+}
+
+/* Of either sign, from 2^-1000 to 2^1000, each power as likely. */
+static double scaled(struct random *r)
+{
+    int power = (int)(next(r) % 2000) - 1000;
+    double value = ldexp(1 + draw(r), power);
+    return draw(r) < 0.5 ? -value : value;
+}
+
+static void scales(struct maker *m)
+{
+    double x, y, z;
+    do {
+        x = scaled(&m->random);
+        y = scaled(&m->random);
+        z = scaled(&m->random);
+    } while (put(m, x, y, z));
+}
+
+/* Half of the points on each of two lines that do not meet. */
+static void lines(struct maker *m)
+{
+    double t;
+    bool more = true;
+    for (uint64_t i = 0; more; i++) {
+        t = draw(&m->random);
+        more = i % 2 == 0 ? put(m, t, 0, 0) : put(m, 0.5, t - 0.5, 1);
+    }
+}
+
 static const struct {
     const char *name;
     make *function;
 } kinds[] = {
     {"uniform", uniform}, {"bubbles", bubbles}, {"bluntfin", bluntfin},
     {"sphere", sphere},   {"grid", grid},       {"rotated", rotated},
-    {"hub", hub},
+    {"hub", hub},         {"shell", shell},     {"cylinder", cylinder},
+    {"torus", torus},     {"terrain", terrain}, {"scales", scales},
+    {"lines", lines},
 };
 
 const char host_gen_kinds[] =
-    "uniform, bubbles, bluntfin, sphere, grid, rotated, hub";
+    "uniform, bubbles, bluntfin, sphere, grid, rotated, hub, shell, cylinder, "
+    "torus, terrain, scales, lines";
 
 int host_gen(const char *kind, uint64_t n, uint64_t seed,
              struct host_points *points, struct host_error *error)
