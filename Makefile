@@ -221,12 +221,16 @@ $(BUILD)/tests/mpi_hops: $(obj)/tests/bench/mpi_hops.o \
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
-# CGAL, for comparison in `make bench` alone.  -frounding-math: its filters
-# are wrong without it.
-$(BUILD)/tests/cgal: tests/bench/cgal.cpp
+# The peers of `incode bench peers`, which makes those whose packages are there.
+# -frounding-math: CGAL's filters are wrong without it.
+peers = $(addprefix $(BUILD)/peers/,cgal tetgen qhull)
+$(BUILD)/peers/cgal:   peer = -frounding-math $< -lgmp -lnettle
+$(BUILD)/peers/tetgen: peer = $< -ltet
+$(BUILD)/peers/qhull:  peer = $< -lqhull_r
+$(peers): $(BUILD)/peers/%: tests/bench/%.cpp tests/bench/peer.hpp
 	@mkdir -p $(@D)
 	$(say) CXX $<
-	$(Q)$(CXX) -std=c++17 -O3 -march=$(ARCH) -frounding-math $< -lgmp -o $@
+	$(Q)$(CXX) -std=c++17 -O3 -march=$(ARCH) $(peer) -o $@
 
 # The freestanding rooms for bare processors, as archives.
 bare      = -std=c11 -I. $(WARNINGS) -Werror -Os -ffreestanding -ffp-contract=off \
@@ -350,7 +354,7 @@ run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev libpng-d
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps \
 	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi
-bench_packages = $(run_packages) g++ libcgal-dev jq
+bench_packages = $(run_packages) g++ libcgal-dev libtet1.5-dev libqhull-dev
 full_packages  = $(test_packages) $(bench_packages) debootstrap cpio \
 	qemu-system-arm gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "host/base/clock.h"
@@ -34,6 +35,14 @@ void host_run_defaults(struct host_run_options *options)
 static double seconds_since(uint64_t start_us)
 {
     return 1e-6 * (double)(host_now_us() - start_us);
+}
+
+/* Of this process, all its threads. */
+static double processor_seconds(void)
+{
+    struct timespec used;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+    return (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
 }
 
 /* The largest power of two of nodes that have a processor each. */
@@ -239,6 +248,7 @@ int host_triangulate_on(const struct host_run_options *options,
         result->points = order.points;
         result->duplicates = order.duplicates;
         result->negative_zeros = order.negative_zeros;
+        result->pages = order.tree.pages;
         status = check_memory(options, result->strategy, result->nodes,
                               order.bricks, order.cells, error);
     }
@@ -415,6 +425,7 @@ static int finish(const struct host_run_options *options,
     host_tetrahedra_sort(tets);
     host_digest(tets, &result->digest);
     result->time_write_s = seconds_since(start);
+    result->host_cpu_s += processor_seconds();
     if (options->verify && verify(points, tets, result, error) != 0) {
         return error->code;
     }
@@ -453,6 +464,7 @@ static int run_on(const struct host_run_options *options,
         return error->code;
     }
     result->time_io_s = result->time_read_s;
+    result->host_cpu_s = -processor_seconds();
     int status = host_triangulate(options, points, &tets, result, error);
     if (status == 0) {
         status = finish(options, points, &tets, result, error);

@@ -1,83 +1,77 @@
-// CGAL's Delaunay triangulation of the same points, for `make bench`: the time
-// of one call with the points in memory, its spatial sort included.
+// CGAL's Delaunay triangulation, its spatial sort included.
 //
-//     cgal POINTS.npy             {"tetrahedra": 134000, "time_s": 0.07}
-//     cgal POINTS.npy OUT.ele     also writes the tetrahedra; rows from 0
+//     cgal POINTS.npy           {"tetrahedra": 134000, "cpu_s": 0.07, ...}
+//     cgal POINTS.npy digest    also the digest of the tetrahedra
 //
 // Compiled with -frounding-math, as CGAL demands of gcc, so that its interval
 // filters hold; contraction is left as gcc has it.
 #include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Triangulation_vertex_base_with_info_3.h>
+#include <nettle/sha2.h>
 
-#include <chrono>
+#include <algorithm>
+#include <array>
 #include <cstdint>
-#include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <string>
-#include <utility>
+#include <unordered_map>
 #include <vector>
+
+#include "peer.hpp"
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
-using Plain = CGAL::Delaunay_triangulation_3<Kernel>;
-using Vertex = CGAL::Triangulation_vertex_base_with_info_3<uint32_t, Kernel>;
-using Numbered = CGAL::Delaunay_triangulation_3<
-    Kernel, CGAL::Triangulation_data_structure_3<
-                Vertex, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>>;
+using Delaunay = CGAL::Delaunay_triangulation_3<Kernel>;
 
-static std::vector<Point> read_npy(const char *path) {
-    std::ifstream in(path, std::ios::binary);
-    char magic[8];
-    uint16_t header = 0;
-    in.read(magic, 8);
-    in.read(reinterpret_cast<char *>(&header), 2);
-    in.seekg(10 + header);
-    std::vector<Point> points;
-    double p[3];
-    while (in.read(reinterpret_cast<char *>(p), sizeof p)) {
-        points.emplace_back(p[0], p[1], p[2]);
-    }
-    return points;
-}
-
-// A duplicate stands for its lowest row.
-static void write_ele(const std::vector<Point> &points, const char *path) {
-    std::map<Point, uint32_t> rows;
+// SHA-256 of the rows in ascending order, a duplicate standing for its lowest.
+static std::string digest(const std::vector<Point> &points,
+                          const Delaunay &t) {
+    std::map<Point, uint32_t> lowest;
     for (uint32_t i = 0; i < points.size(); i++) {
-        rows.emplace(points[i], i);
+        lowest.emplace(points[i], i);
     }
-    std::vector<std::pair<Point, uint32_t>> numbered(rows.begin(), rows.end());
-    Numbered t(numbered.begin(), numbered.end());
-    std::ofstream out(path);
-    out << t.number_of_finite_cells() << " 4 0\n";
-    uint64_t i = 0;
+    std::unordered_map<const void *, uint32_t> row;
+    for (auto vertex : t.finite_vertex_handles()) {
+        row[&*vertex] = lowest[vertex->point()];
+    }
+    std::vector<std::array<uint32_t, 4>> rows;
     for (auto cell : t.finite_cell_handles()) {
-        out << i++;
+        std::array<uint32_t, 4> v;
         for (int k = 0; k < 4; k++) {
-            out << ' ' << cell->vertex(k)->info();
+            v[static_cast<std::size_t>(k)] = row[&*cell->vertex(k)];
         }
-        out << '\n';
+        std::sort(v.begin(), v.end());
+        rows.push_back(v);
     }
+    std::sort(rows.begin(), rows.end());
+    struct sha256_ctx context;
+    uint8_t sum[SHA256_DIGEST_SIZE];
+    sha256_init(&context);
+    sha256_update(&context, rows.size() * sizeof rows[0],
+                  reinterpret_cast<const uint8_t *>(rows.data()));
+    sha256_digest(&context, sizeof sum, sum);
+    std::string text;
+    for (const uint8_t byte : sum) {
+        text += "0123456789abcdef"[byte >> 4];
+        text += "0123456789abcdef"[byte & 15];
+    }
+    return text;
 }
 
 int main(int argc, char **argv) {
     if (argc < 2) {
-        std::cerr << "usage: cgal POINTS.npy [OUT.ele]\n";
+        std::cerr << "usage: cgal POINTS.npy [digest]\n";
         return 2;
     }
-    const std::vector<Point> points = read_npy(argv[1]);
-    const auto start = std::chrono::steady_clock::now();
-    const Plain t(points.begin(), points.end());
-    const std::chrono::duration<double> time =
-        std::chrono::steady_clock::now() - start;
-    std::printf("{\"tetrahedra\": %zu, \"time_s\": %.6f}\n",
-                static_cast<std::size_t>(t.number_of_finite_cells()),
-                time.count());
-    if (argc > 2) {
-        write_ele(points, argv[2]);
+    const std::vector<double> numbers = peer::read_npy(argv[1]);
+    std::vector<Point> points;
+    for (std::size_t i = 0; i + 2 < numbers.size(); i += 3) {
+        points.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
     }
+    peer::Watch watch;
+    const Delaunay t(points.begin(), points.end());
+    watch.stop();
+    watch.print(t.number_of_finite_cells(), argc > 2 ? digest(points, t) : "");
     return 0;
 }
