@@ -12,6 +12,7 @@ SAN    ?=
 OPT    ?= $(if $(SAN),-O1,-O3)
 PREFIX ?= /usr/local
 POINTS ?=
+SETS   ?= $(wildcard ../shared/data ../shared/real)
 FUZZ_SECONDS ?= 60
 ifeq ($(origin CC),default)
 CC := gcc
@@ -280,7 +281,7 @@ test-full: deps-full
 
 bench: deps-bench
 	@$(MAKE) --no-print-directory all
-	@BUILD='$(BUILD)' bash tests/bench/run
+	@$(BUILD)/incode bench peers $(SETS)
 
 # The rooms that bare boards will share, compiled for their processors.
 firmware: deps-test
@@ -332,7 +333,8 @@ help:
 	@echo 'make deps                install missing Debian packages'
 	@echo 'make test-full           every combination, large sets, a clean'
 	@echo '                         chroot (hours)'
-	@echo 'make bench               ratios against CGAL and between sets'
+	@echo 'make bench [SETS=DIRS]   ratios against CGAL, TetGen and Qhull, and'
+	@echo '                         what they are held to (half an hour)'
 	@echo 'make firmware            compile the freestanding rooms for'
 	@echo '                         Cortex-M3 and M7, print their sizes'
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'

@@ -7,8 +7,7 @@
 #include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/base/text.h"
-#include "host/bench/bench_links.h"
-#include "host/bench/bench_paper.h"
+#include "host/bench/bench_arguments.h"
 #include "host/check/verify.h"
 #include "host/draw/draw.h"
 #include "host/files/output.h"
@@ -40,7 +39,6 @@ struct simple {
     const char *output;
     const char *format;
     uint64_t seed;
-    unsigned nodes;
     const char *wanted; /* names of the arguments */
     struct host_error *error;
 };
@@ -61,10 +59,6 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
             host_fail(s->error, HOST_USAGE,
                       "--seed %s: not a number; give 0 or more", value);
         }
-        return 0;
-    case 'n':
-        (void)host_parse_nodes(value, HOST_PROCESSES_MAX, "", &s->nodes,
-                               s->error);
         return 0;
     case ARGP_KEY_ARG:
         if (s->count == s->most) {
@@ -295,32 +289,6 @@ static int command_key(int argc, char **argv, struct host_error *error)
     return host_key_make(s.argument[0], error);
 }
 
-static int command_bench(int argc, char **argv, struct host_error *error)
-{
-    static const struct argp_option options[] = {
-        {"nodes", 'n', "N", 0, "Up to N nodes. Default: 8", 0}, {0}};
-    struct host_run_options run;
-    struct simple s = {.nodes = 8};
-    if (parse(argc, argv, options, "paper|links",
-              "Measures this machine: paper prints Tables 2 and 4 of Cignoni, "
-              "Laforenza, Perego, Scopigno and Montani (1995); links prints "
-              "what a link does over each driver.",
-              1, &s, error) != 0) {
-        return error->code;
-    }
-    if (strcmp(s.argument[0], "links") == 0) {
-        return host_bench_links(error);
-    }
-    if (strcmp(s.argument[0], "paper") != 0) {
-        return host_fail(error, HOST_USAGE,
-                         "bench %s: not in this version; allowed: "
-                         "paper, links",
-                         s.argument[0]);
-    }
-    host_run_defaults(&run);
-    return host_bench_paper(&run, s.nodes, error);
-}
-
 static int command_sim(int argc, char **argv, struct host_error *error)
 {
     struct host_sim_options options;
@@ -354,8 +322,10 @@ static const struct command commands[] = {
     {"cube", "FILE", "check a cube file, print what starts its nodes",
      command_cube},
     {"key", "FILE", "make a cube's key", command_key},
-    {"bench", "paper|links", "the paper's tables on this machine; its links",
-     command_bench},
+    {"bench", "paper|links|peers",
+     "the paper's tables on this machine; its links;\nother triangulators in "
+     "turn with this one",
+     host_bench},
     {"sim", "--seeds A..B", "whole cubes in virtual time, with faults",
      command_sim},
     {"help", "[COMMAND]", "this list, or what --help says of a command",

@@ -34,7 +34,10 @@ static void digests_are_known(void **unused)
         {"uniform", "93dad7296d99889e"},  {"bubbles", "1d3a6942e6d59fe0"},
         {"bluntfin", "c462303f05f2c400"}, {"sphere", "9dadb48db2822cbf"},
         {"grid", "fb8430c1f27107f2"},     {"rotated", "fbaf1f72975c122a"},
-        {"hub", "0d28c3a45ac13c23"},
+        {"hub", "0d28c3a45ac13c23"},      {"shell", "4e018de5e65e184a"},
+        {"cylinder", "c3ad1fd28045082f"}, {"torus", "e159813eb301437d"},
+        {"terrain", "7ffa62f86fd6a645"},  {"scales", "f47bae9e658f47d1"},
+        {"lines", "160c46caa63d51ac"},
     };
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
         struct host_points points = made(known[i][0], 1000, 42);
@@ -89,6 +92,50 @@ static void shapes_are_as_named(void **unused)
     host_points_free(&r);
 }
 
+static void surfaces_are_as_named(void **unused)
+{
+    (void)unused;
+    struct host_points s = made("shell", 5000, 1);
+    struct host_points c = made("cylinder", 5000, 1);
+    struct host_points t = made("torus", 5000, 1);
+    for (uint64_t i = 0; i < 5000; i++) {
+        double *p = c.xyz + 3 * i, *q = t.xyz + 3 * i;
+        assert_in_range(1e6 * length(s.xyz + 3 * i), 998999, 1000000);
+        assert_true(fabs(hypot(p[0], p[1]) - 1) < 1e-15);
+        assert_true(p[2] >= 0 && p[2] < 4);
+        assert_true(fabs(hypot(hypot(q[0], q[1]) - 1, q[2]) - 0.25) < 1e-15);
+    }
+    host_points_free(&s);
+    host_points_free(&c);
+    host_points_free(&t);
+}
+
+static void the_rest_is_as_named(void **unused)
+{
+    (void)unused;
+    struct host_points t = made("terrain", 400, 1);
+    struct host_points s = made("scales", 3000, 1);
+    struct host_points l = made("lines", 400, 1);
+    double most = 0, least = 1;
+    for (uint64_t i = 0; i < 400; i++) {
+        double *p = t.xyz + 3 * i, *q = l.xyz + 3 * i;
+        assert_true(p[0] >= 10. * (double)(i % 20) &&
+                    p[0] <= 10. * (double)(i % 20));
+        assert_true(p[2] >= floor(p[2]) && p[2] >= 0 && p[2] < 1008);
+        assert_true(i % 2 == 0 ? q[1] <= 0 && q[1] >= 0 && q[2] <= 0
+                               : q[0] <= 0.5 && q[0] >= 0.5 && q[2] >= 1);
+    }
+    for (uint64_t k = 0; k < 9000; k++) {
+        most = fmax(most, fabs(s.xyz[k]));
+        least = fmin(least, fabs(s.xyz[k]));
+    }
+    assert_true(least >= 0x1p-1000 && least < 0x1p-990);
+    assert_true(most <= 0x1p1000 && most > 0x1p990);
+    host_points_free(&t);
+    host_points_free(&s);
+    host_points_free(&l);
+}
+
 /* As --help says it. */
 static void some_kinds_have_no_chance_in_them(void **unused)
 {
@@ -96,9 +143,11 @@ static void some_kinds_have_no_chance_in_them(void **unused)
     static const struct {
         const char *kind;
         bool chance;
-    } kinds[] = {{"uniform", true}, {"bubbles", true},   {"sphere", true},
-                 {"hub", true},     {"bluntfin", false}, {"grid", false},
-                 {"rotated", false}};
+    } kinds[] = {{"uniform", true},  {"bubbles", true},   {"sphere", true},
+                 {"hub", true},      {"bluntfin", false}, {"grid", false},
+                 {"rotated", false}, {"shell", true},     {"cylinder", true},
+                 {"torus", true},    {"terrain", true},   {"scales", true},
+                 {"lines", true}};
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
         struct host_points a = made(kinds[i].kind, 500, 1);
         struct host_points b = made(kinds[i].kind, 500, 2);
@@ -115,7 +164,9 @@ static void some_kinds_have_no_chance_in_them(void **unused)
 static void seeds_differ_and_points_do_not_repeat(void **unused)
 {
     (void)unused;
-    static const char *const kinds[] = {"uniform", "bubbles", "sphere", "hub"};
+    static const char *const kinds[] = {
+        "uniform",  "bubbles", "sphere",  "hub",    "shell",
+        "cylinder", "torus",   "terrain", "scales", "lines"};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         struct host_points a = made(kinds[i], 2000, 1);
         struct host_points b = made(kinds[i], 2000, 2);
@@ -153,6 +204,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(digests_are_known),
         cmocka_unit_test(shapes_are_as_named),
+        cmocka_unit_test(surfaces_are_as_named),
+        cmocka_unit_test(the_rest_is_as_named),
         cmocka_unit_test(some_kinds_have_no_chance_in_them),
         cmocka_unit_test(seeds_differ_and_points_do_not_repeat),
         cmocka_unit_test(wrong_requests_are_refused),

@@ -1,0 +1,178 @@
+#include "bench_arguments.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench_class.h"
+#include "bench_links.h"
+#include "bench_paper.h"
+#include "bench_peers.h"
+#include "host/base/options.h"
+#include "host/base/parse.h"
+
+enum {
+    KEY_ROUNDS = 256,
+    KEY_CLASS,
+    KEY_PEERS,
+    KEY_LARGE,
+    KEY_LIMIT,
+    NODES = 8
+};
+
+struct arguments {
+    const char *what; /* the benchmark */
+    unsigned nodes;
+    const char *of_paper, *of_peers; /* options given that they alone have */
+    struct host_bench_peers_options peers;
+    struct host_error *error;
+};
+
+static const struct argp_option options[] = {
+    {NULL, 0, NULL, 0, "Of paper:", 1},
+    {"nodes", 'n', "N", 0, "Up to N nodes. Default: 8", 1},
+    {NULL, 0, NULL, 0, "Of peers:", 2},
+    {"rounds", KEY_ROUNDS, "N", 0, "Medians of N rounds. Default: 3", 2},
+    {"class", KEY_CLASS, "NAME", 0,
+     "One class alone: uniform, volumes, real, small, thin, growth, extremes "
+     "or cube; real, small and cube are of the files given",
+     2},
+    {"peers", KEY_PEERS, "LIST", 0,
+     "Some peers alone, with commas between: cgal, tetgen, qhull", 2},
+    {"large", KEY_LARGE, NULL, 0, "Sets of a million points too", 2},
+    {"limit", KEY_LIMIT, "S", 0,
+     "End a run after S seconds, and go on without. Default: 60", 2},
+    {0}};
+
+static void parse_whole(struct arguments *a, const char *name,
+                        const char *value, unsigned most, unsigned *number)
+{
+    uint64_t n = 0;
+    if (host_parse_number(value, 1, most, &n) != 0) {
+        host_fail(a->error, HOST_USAGE, "%s %s: not a number; give 1 to %u",
+                  name, value, most);
+    }
+    *number = (unsigned)n;
+}
+
+static void parse_argument(struct arguments *a, const char *value)
+{
+    if (a->what == NULL) {
+        a->what = value;
+    } else if (a->peers.names == HOST_BENCH_NAMES_MAX) {
+        host_fail(a->error, HOST_USAGE,
+                  "%s: more than %d names; give directories", value,
+                  HOST_BENCH_NAMES_MAX);
+    } else {
+        a->peers.name[a->peers.names++] = value;
+    }
+}
+
+static error_t parse_bench(int key, char *value, struct argp_state *state)
+{
+    struct arguments *a = state->input;
+    switch (key) {
+    case 'n':
+        a->of_paper = "--nodes";
+        (void)host_parse_nodes(value, HOST_PROCESSES_MAX, "", &a->nodes,
+                               a->error);
+        return 0;
+    case KEY_ROUNDS:
+        a->of_peers = "--rounds";
+        parse_whole(a, "--rounds", value, HOST_BENCH_ROUNDS_MAX,
+                    &a->peers.rounds);
+        return 0;
+    case KEY_LIMIT:
+        a->of_peers = "--limit";
+        parse_whole(a, "--limit", value, 1000000, &a->peers.limit_s);
+        return 0;
+    case KEY_CLASS:
+        a->of_peers = "--class";
+        a->peers.class = value;
+        if (host_bench_class_named(value) == NULL) {
+            host_fail(a->error, HOST_USAGE,
+                      "--class %s: not in this version; allowed: %s", value,
+                      host_bench_class_names());
+        }
+        return 0;
+    case KEY_PEERS:
+        a->of_peers = "--peers";
+        a->peers.peers = value;
+        return 0;
+    case KEY_LARGE:
+        a->of_peers = "--large";
+        a->peers.large = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        parse_argument(a, value);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp bench = {
+    options,
+    parse_bench,
+    "paper\nlinks\npeers [DIRECTORY|FILE]...",
+    "Measures this machine: paper prints Tables 2 and 4 of Cignoni, "
+    "Laforenza, Perego, Scopigno and Montani (1995); links prints what a link "
+    "does over each driver; peers, in the source tree, runs CGAL, TetGen and "
+    "Qhull in turn with this program on points that it makes and on those "
+    "given, and prints times, ratios and the goals of each class.",
+    NULL,
+    NULL,
+    NULL};
+
+/* Options and arguments that the benchmark has not. */
+static int check(const struct arguments *a, struct host_error *error)
+{
+    bool peers = strcmp(a->what, "peers") == 0;
+    bool paper = strcmp(a->what, "paper") == 0;
+    if (!peers && !paper && strcmp(a->what, "links") != 0) {
+        return host_fail(error, HOST_USAGE,
+                         "bench %s: not in this version; allowed: paper, "
+                         "links, peers",
+                         a->what);
+    }
+    const char *other = peers ? a->of_paper : a->of_peers;
+    if (other == NULL && !peers && !paper) {
+        other = a->of_paper;
+    }
+    if (other != NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "%s: no option of bench %s; see incode bench --help",
+                         other, a->what);
+    }
+    return peers || a->peers.names == 0
+               ? 0
+               : host_fail(error, HOST_USAGE,
+                           "%s: one argument too many; bench %s takes none",
+                           a->peers.name[0], a->what);
+}
+
+int host_bench(int argc, char **argv, struct host_error *error)
+{
+    struct host_run_options run;
+    struct arguments a = {
+        .nodes = NODES, .peers = {.rounds = 3, .limit_s = 60}, .error = error};
+    if (host_options_parse(&bench, argc, argv, 0, &a, error) != 0) {
+        return error->code;
+    }
+    if (a.what == NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "%s: too few arguments; give paper, links or peers, "
+                         "see --help",
+                         argv[0]);
+    }
+    if (check(&a, error) != 0) {
+        return error->code;
+    }
+    if (strcmp(a.what, "links") == 0) {
+        return host_bench_links(error);
+    }
+    if (strcmp(a.what, "peers") == 0) {
+        return host_bench_peers(&a.peers, error);
+    }
+    host_run_defaults(&run);
+    return host_bench_paper(&run, a.nodes, error);
+}

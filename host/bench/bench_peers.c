@@ -1,0 +1,357 @@
+#include "bench_peers.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "bench_build.h"
+#include "bench_set.h"
+#include "bench_table.h"
+#include "bench_trial.h"
+#include "host/base/progress.h"
+#include "host/formats/formats.h"
+#include "host/run/run.h"
+
+/* Who takes turns: this program in two ways, then the peers. */
+enum { MAIN, OTHER, PEER, TURNS = PEER + HOST_BENCH_PEERS, WORDS_MAX = 16 };
+
+struct turns {
+    unsigned rounds;
+    bool late, failed;
+    double cpu_s[HOST_BENCH_ROUNDS_MAX], host_s[HOST_BENCH_ROUNDS_MAX];
+    double wall_s[HOST_BENCH_ROUNDS_MAX];
+    struct host_trial trial; /* the first */
+};
+
+struct bench {
+    const struct host_bench_peers_options *options;
+    const struct host_bench_class *class;
+    struct host_bench_builds builds;
+    struct host_bench_table table;
+    struct turns turns[TURNS];
+    char *file[HOST_BENCH_ROWS_MAX]; /* those given, and in directories */
+    unsigned files, wrong;
+    bool left_out; /* the set at hand has no triangulation */
+};
+
+/* --- one set ---------------------------------------------------------------
+ */
+
+/* The command of a turn; false: it has none in this class. */
+static bool command(struct bench *b, unsigned turn,
+                    const struct host_bench_set *set,
+                    const char *words[WORDS_MAX])
+{
+    unsigned n = 0;
+    enum host_bench_way way = turn == MAIN ? b->class->way : b->class->other;
+    if (turn >= PEER) {
+        words[n++] = b->builds.path[turn - PEER];
+        words[n++] = set->path;
+        words[n++] = b->turns[turn].rounds == 0 ? "digest" : NULL;
+        words[n] = NULL;
+        return b->builds.there[turn - PEER];
+    }
+    static const char *const head[] = {
+        "/proc/self/exe", "run", NULL, "--format", "npy", "-q", "--stats", "-"};
+    for (; n < sizeof head / sizeof head[0]; n++) {
+        words[n] = head[n] == NULL ? set->path : head[n];
+    }
+    for (const char *const *o = host_bench_way_options(way); *o != NULL; o++) {
+        words[n++] = *o;
+    }
+    words[n] = NULL;
+    return way != HOST_WAY_NONE;
+}
+
+static const char *title_of(unsigned turn)
+{
+    return turn < PEER ? "incode" : host_bench_peer_titles[turn - PEER];
+}
+
+/* What went wrong in a turn; its set is left to the others. */
+static void note_failure(struct bench *b, unsigned turn,
+                         const struct host_bench_set *set,
+                         const struct host_trial *trial)
+{
+    b->turns[turn].failed = true;
+    if (turn < PEER && trial->status == HOST_INPUT) {
+        b->left_out = true;
+        host_note("%s: left out: %s", set->name, trial->said);
+        return;
+    }
+    b->wrong += turn < PEER ? 1 : 0;
+    host_note("%s: %s ended with status %d: %s", set->name, title_of(turn),
+              trial->status, trial->said);
+}
+
+static int take_turn(struct bench *b, unsigned turn, unsigned round,
+                     const struct host_bench_set *set, struct host_error *error)
+{
+    const char *words[WORDS_MAX];
+    char phase[64];
+    struct turns *t = &b->turns[turn];
+    struct host_trial trial;
+    if (t->late || t->failed || !command(b, turn, set, words)) {
+        return 0;
+    }
+    (void)snprintf(phase, sizeof phase, "%.14s %llu: %s %u/%u", set->name,
+                   (unsigned long long)set->points, title_of(turn), round + 1,
+                   b->options->rounds);
+    host_progress_phase(phase, NULL);
+    int status = host_trial_run((char *const *)words, b->options->limit_s,
+                                &trial, error);
+    host_progress_phase("", NULL);
+    t->late = trial.late;
+    if (status == 0 && !trial.late &&
+        (trial.status != 0 || trial.tetrahedra == 0)) {
+        note_failure(b, turn, set, &trial);
+    } else if (status == 0 && !trial.late) {
+        if (t->rounds == 0) {
+            t->trial = trial;
+        }
+        t->cpu_s[t->rounds] = trial.cpu_s;
+        t->host_s[t->rounds] = trial.host_s;
+        t->wall_s[t->rounds++] = trial.wall_s;
+    }
+    return status;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *s, unsigned n)
+{
+    qsort(s, n, sizeof *s, compare);
+    return n == 0 ? 0 : 0.5 * (s[(n - 1) / 2] + s[n / 2]);
+}
+
+static double time_of(const struct bench *b, struct turns *t)
+{
+    return t->late || t->failed
+               ? 0
+               : median(b->class->wall ? t->wall_s : t->cpu_s, t->rounds);
+}
+
+/* CGAL breaks ties as this program does: its tetrahedra are the same. */
+static void check_digests(struct bench *b, const struct host_bench_set *set)
+{
+    const char *first = b->turns[MAIN].trial.digest;
+    for (unsigned turn = OTHER; turn <= PEER; turn++) {
+        const char *other = b->turns[turn].trial.digest;
+        if (first[0] != '\0' && other[0] != '\0' && strcmp(first, other) != 0) {
+            b->wrong++;
+            host_note("%s: %s, where %s has %s", set->name, first,
+                      turn == OTHER ? "another memory" : "CGAL", other);
+        }
+    }
+}
+
+/* By turns, A B A B; then a row. */
+static int measure(struct bench *b, const struct host_bench_set *set,
+                   struct host_bench_result *r, struct host_error *error)
+{
+    memset(b->turns, 0, sizeof b->turns);
+    b->left_out = false;
+    for (unsigned round = 0; round < b->options->rounds; round++) {
+        for (unsigned turn = 0; turn < TURNS && !b->left_out; turn++) {
+            if (take_turn(b, turn, round, set, error) != 0) {
+                return error->code;
+            }
+        }
+    }
+    if (b->left_out) {
+        return 0;
+    }
+    struct turns *own = &b->turns[MAIN];
+    check_digests(b, set);
+    r->name = set->name;
+    r->points = set->points;
+    for (unsigned turn = TURNS; turn-- > 0;) {
+        if (b->turns[turn].trial.tetrahedra > 0) {
+            r->tetrahedra = b->turns[turn].trial.tetrahedra;
+        }
+    }
+    r->pages = own->trial.pages;
+    r->pages_asked = own->trial.pages_asked;
+    r->node = time_of(b, own);
+    r->host = own->late ? 0 : median(own->host_s, own->rounds);
+    r->late = own->late;
+    r->other = time_of(b, &b->turns[OTHER]);
+    r->other_late = b->turns[OTHER].late;
+    for (unsigned i = 0; i < HOST_BENCH_PEERS; i++) {
+        r->peer[i] = time_of(b, &b->turns[PEER + i]);
+        r->peer_late[i] = b->turns[PEER + i].late;
+    }
+    host_bench_table_row(&b->table, r);
+    return 0;
+}
+
+/* --- files -----------------------------------------------------------------
+ */
+
+static int add_file(struct bench *b, char *path, struct host_error *error)
+{
+    if (path == NULL || b->files == HOST_BENCH_ROWS_MAX) {
+        free(path);
+        return host_fail(error, HOST_USAGE,
+                         "bench peers: more than %d files; give fewer",
+                         HOST_BENCH_ROWS_MAX);
+    }
+    b->file[b->files++] = path;
+    return 0;
+}
+
+/* Of a directory, what has an extension of points. */
+static int add_directory(struct bench *b, const char *path,
+                         struct host_error *error)
+{
+    struct dirent **entry;
+    int count = scandir(path, &entry, NULL, alphasort);
+    if (count < 0) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %s; give a directory of point "
+                         "sets",
+                         path, strerror(errno));
+    }
+    for (int i = 0; i < count; i++) {
+        char *name = NULL;
+        if (error->code == 0 &&
+            host_format_of(entry[i]->d_name, HOST_READ_POINTS) != NULL) {
+            (void)add_file(b,
+                           asprintf(&name, "%s/%s", path, entry[i]->d_name) < 0
+                               ? NULL
+                               : name,
+                           error);
+        }
+        free(entry[i]);
+    }
+    free(entry);
+    return error->code;
+}
+
+static int find_files(struct bench *b, struct host_error *error)
+{
+    for (unsigned i = 0; i < b->options->names && error->code == 0; i++) {
+        const char *name = b->options->name[i];
+        struct stat status;
+        if (stat(name, &status) != 0) {
+            host_fail(error, HOST_INPUT, "%s: %s; give files or directories",
+                      name, strerror(errno));
+        } else if (S_ISDIR(status.st_mode)) {
+            (void)add_directory(b, name, error);
+        } else {
+            (void)add_file(b, strdup(name), error);
+        }
+    }
+    return error->code;
+}
+
+/* --- classes ---------------------------------------------------------------
+ */
+
+/* Those of the files that are of this class. */
+static int measure_files(struct bench *b, struct host_error *error)
+{
+    const struct host_bench_class *c = b->class;
+    for (unsigned i = 0; i < b->files && error->code == 0; i++) {
+        struct host_bench_set set;
+        struct host_bench_result result = {0};
+        struct host_error unreadable = {0};
+        bool named;
+        host_progress_phase("reading", NULL);
+        int status = host_bench_set_read(&set, b->file[i], &unreadable);
+        result.ratio = host_bench_goal(c, set.name, &named);
+        if (status != 0) {
+            host_note("left out: %s", unreadable.text);
+        } else if ((named || set.points >= HOST_BENCH_FEW) ==
+                   (c->files == HOST_FILES_MANY)) {
+            (void)measure(b, &set, &result, error);
+        }
+        host_bench_set_free(&set);
+    }
+    return error->code;
+}
+
+static int measure_made(struct bench *b, struct host_error *error)
+{
+    for (const struct host_bench_made *m = b->class->made;
+         m->kind != NULL && error->code == 0; m++) {
+        struct host_bench_set set;
+        struct host_bench_result result = {
+            .ratio = m->ratio, .seconds = m->seconds, .step = m->step};
+        if (m->large && !b->options->large) {
+            continue;
+        }
+        host_progress_phase("making points", NULL);
+        if (host_bench_set_made(&set, m->kind, m->n, error) == 0) {
+            (void)measure(b, &set, &result, error);
+        }
+        host_bench_set_free(&set);
+    }
+    return error->code;
+}
+
+static int measure_class(struct bench *b, const struct host_bench_class *c,
+                         struct host_error *error)
+{
+    if (c->files != HOST_FILES_NONE && b->files == 0) {
+        return 0;
+    }
+    b->class = c;
+    host_bench_table_begin(&b->table, c, b->builds.there, b->options->limit_s);
+    int status = c->files == HOST_FILES_NONE ? measure_made(b, error)
+                                             : measure_files(b, error);
+    host_progress_erase();
+    (void)host_bench_table_end(&b->table);
+    return status;
+}
+
+/* What the tables say of themselves. */
+static void print_notes(const struct bench *b)
+{
+    printf("Medians of %u rounds.  node: ns of processor time a tetrahedron, "
+           "of all nodes;\n+ host: and of the host, files apart; peers: of one "
+           "call with the points in memory.\nCGAL /: its time to the node's.  "
+           "!: a goal that is not reached.\n",
+           b->options->rounds);
+}
+
+int host_bench_peers(const struct host_bench_peers_options *options,
+                     struct host_error *error)
+{
+    static struct bench bench;
+    struct bench *b = &bench;
+    const struct host_bench_class *c;
+    memset(b, 0, sizeof *b);
+    b->options = options;
+    host_progress_begin(true);
+    if (find_files(b, error) == 0 &&
+        host_bench_build(&b->builds, options->peers, error) == 0) {
+        host_progress_erase();
+        print_notes(b);
+        for (unsigned i = 0;
+             error->code == 0 && (c = host_bench_class_row(i)) != NULL; i++) {
+            if (options->class == NULL ||
+                strcmp(options->class, c->name) == 0) {
+                (void)measure_class(b, c, error);
+            }
+        }
+    }
+    host_progress_end();
+    for (unsigned i = 0; i < b->files; i++) {
+        free(b->file[i]);
+    }
+    if (error->code == 0 && b->wrong > 0) {
+        host_fail(error, HOST_BROKEN,
+                  "bench peers: %u runs failed or differ from CGAL's "
+                  "tetrahedra; run those sets with --verify",
+                  b->wrong);
+    }
+    return error->code;
+}

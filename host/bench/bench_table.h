@@ -1,0 +1,49 @@
+/* A class of `incode bench peers` as a table: a row a set, goals beside what
+ * is held to them, and the ratios of all rows.
+ *
+ * Memory: struct host_bench_table.  Work: a line a row.
+ *
+ *     host_bench_table_begin(&table, class, peers, 60);
+ *     host_bench_table_row(&table, &result);
+ *     host_bench_table_end(&table);
+ */
+#ifndef HOST_BENCH_TABLE_H
+#define HOST_BENCH_TABLE_H
+
+#include "bench_class.h"
+
+enum { HOST_BENCH_ROWS_MAX = 4096 };
+
+/* Medians, in seconds; 0: not measured, or not brought to its end. */
+struct host_bench_result {
+    const char *name;
+    uint64_t points, tetrahedra, pages, pages_asked;
+    double node, host, other; /* of nodes, host, and nodes the other way */
+    double peer[HOST_BENCH_PEERS];
+    bool late, other_late, peer_late[HOST_BENCH_PEERS];
+    double ratio, seconds, step; /* goals; 0: none */
+};
+
+struct host_bench_table {
+    const struct host_bench_class *class;
+    bool peer[HOST_BENCH_PEERS]; /* those that have a column */
+    double limit_s;
+    unsigned rows, goals, reached;
+    double ratio[HOST_BENCH_PEERS][HOST_BENCH_ROWS_MAX], with_host;
+    unsigned ratios[HOST_BENCH_PEERS];
+    struct host_bench_result first, before; /* rows; for steps */
+    char before_name[64];
+};
+
+extern const char *const host_bench_peer_titles[HOST_BENCH_PEERS];
+
+void host_bench_table_begin(struct host_bench_table *table,
+                            const struct host_bench_class *c,
+                            const bool peer[HOST_BENCH_PEERS], double limit_s);
+void host_bench_table_row(struct host_bench_table *table,
+                          const struct host_bench_result *result);
+
+/* How many goals of the class are not reached. */
+unsigned host_bench_table_end(struct host_bench_table *table);
+
+#endif
