@@ -203,6 +203,21 @@ static bool wires_fit(const struct linux_options *options)
     return options->links_count == 0 && options->wires_count == links;
 }
 
+/* Whether every link that --insecure names goes over TCP, and one at least
+ * where it names none. */
+static bool insecure_fits(const struct linux_options *options)
+{
+    uint32_t net = 0, named = options->insecure;
+    for (unsigned i = 0; i < CUBE_LINKS_MAX; i++) {
+        const char *wire = options->wire[i];
+        const char *kind = wire == NULL ? "" : strchr(wire, '=') + 1;
+        bool tcp =
+            strncmp(kind, "call:", 5) == 0 || strncmp(kind, "listen:", 7) == 0;
+        net |= (uint32_t)tcp << i;
+    }
+    return named == UINT32_MAX ? net != 0 : (named & ~net) == 0;
+}
+
 bool linux_options_read(char **argv, struct linux_options *options,
                         struct linux_fault *fault)
 {
@@ -235,5 +250,11 @@ bool linux_options_read(char **argv, struct linux_options *options,
     fault->what = "not one for each link: those to neighbours, and to the host "
                   "from node 0 and with --host-port 1";
     fault->next = "incode cube FILE prints those of a cube";
-    return wires_fit(options);
+    if (!wires_fit(options)) {
+        return false;
+    }
+    fault->where = "--insecure";
+    fault->what = "does nothing for a link that does not go over TCP";
+    fault->next = "leave it out, or name links with call: or listen:";
+    return insecure_fits(options);
 }

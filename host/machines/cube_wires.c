@@ -134,6 +134,31 @@ static int read_end(const struct host_cube_file *file,
     return 0;
 }
 
+/* A setting that does nothing beside a wire of that kind was meant for another.
+ */
+static int check_beside(const struct host_cube_file *file,
+                        const config_setting_t *group, const char *kind,
+                        struct host_error *error)
+{
+    static const char *const of[][2] = {{"via", "tcp"},
+                                        {"insecure", "tcp"},
+                                        {"baud", "serial"},
+                                        {"rtscts", "serial"}};
+    for (size_t i = 0; i < sizeof of / sizeof of[0]; i++) {
+        const config_setting_t *setting =
+            config_setting_get_member(group, of[i][0]);
+        if (setting != NULL && strcmp(of[i][1], kind) != 0) {
+            char text[120];
+            snprintf(text, sizeof text,
+                     "%s: does nothing beside %s; leave it out, it is for "
+                     "links with %s",
+                     of[i][0], kind, of[i][1]);
+            return host_cube_wrong(file, setting, error, text);
+        }
+    }
+    return 0;
+}
+
 int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
                         struct host_error *error)
 {
@@ -162,6 +187,13 @@ int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
         return host_cube_wrong(
             file, group, error,
             "none or several of tcp, unix and serial; give one of them");
+    }
+    if (check_beside(file, group,
+                     serial  ? "serial"
+                     : local ? "unix"
+                             : "tcp",
+                     error) != 0) {
+        return error->code;
     }
     int status = serial  ? read_line(file, group, wire, error)
                  : local ? read_path(file, group, wire, error)

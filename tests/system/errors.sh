@@ -501,6 +501,11 @@ node 'no key to call with' '--wire 0=call:.*: a wire over TCP wants a key' \
     --node 0 --dimension 0 --wire 0=call:127.0.0.1:5
 node 'no links' '--insecure x: not links as in 0,2' \
     --node 0 --dimension 0 --wire 0=call:127.0.0.1:5 --insecure x
+node 'links without TCP' '--insecure: does nothing for a link' \
+    --node 0 --dimension 1 --wire 0=call:127.0.0.1:5 \
+    --wire 1=unix-call:/a --insecure 1
+node 'no link over TCP' '--insecure: does nothing for a link' \
+    --node 0 --dimension 0 --wire 0=unix-call:/a --insecure
 node 'a path that is too long' '--wire .*: not a path of 1 to 107 bytes' \
     --node 0 --dimension 0 --wire "0=unix-listen:/$(printf '%0107d' 0)"
 node 'a path of a file' '--wire 0=unix-listen:.*: cannot listen there: File exists' \
