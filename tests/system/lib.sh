@@ -9,7 +9,8 @@ BUILD=${BUILD:-build}
 INCODE=${INCODE:-$BUILD/incode}
 TOOL=${TOOL:-$BUILD/tests/points}
 INCODE_DATA=${INCODE_DATA:-../shared/data}
-export BUILD INCODE_DATA
+INCODE_REAL=${INCODE_REAL:-../shared/real}
+export BUILD INCODE_DATA INCODE_REAL
 scratch=$(mktemp -d "${TMPDIR:-/tmp}/incode-test.XXXXXX") || exit 1
 trap 'rm -rf "$scratch"' EXIT
 trap 'exit 130' INT TERM
@@ -39,14 +40,14 @@ succeeds() {
 # The last line of a file, for a failure's reason.
 last() { tail -n 1 "$1" 2>/dev/null | tr -d '\r' | cut -c 1-300; }
 
-# --- the real sets: data/INDEX.md --------------------------------------------
+# --- the real sets: data/INDEX.md; real/INDEX.md for what is hard -------------
 
 # has_data NAME: whether there is an index of real sets; one in which none is
 # found is a failure.
 has_data() {
     if [ ! -r "$INCODE_DATA/INDEX.md" ]; then
-        skip "$1" \
-            "there is no $INCODE_DATA/INDEX.md; INCODE_DATA names its folder"
+        skip "$1" "there is no $INCODE_DATA/INDEX.md;\
+ ${folder:-INCODE_DATA} names its folder"
     elif [ -z "$(list_sets)" ]; then
         fail "$1" "no set is found in $INCODE_DATA/INDEX.md: another layout"
     else

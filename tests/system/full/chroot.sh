@@ -37,6 +37,8 @@ enter() {
     git clone -q . "$root/src/incode"
     [ -d "$INCODE_DATA" ] && mkdir "$root/src/shared" &&
         cp -a "$INCODE_DATA" "$root/src/shared/data"
+    [ -d "$INCODE_REAL" ] && mkdir -p "$root/src/shared" &&
+        cp -a "$INCODE_REAL" "$root/src/shared/real"
     if [ "$1" != root ]; then
         chroot "$root" useradd -m "$1"
         echo "$1 ALL=(ALL) NOPASSWD: ALL" > "$root/etc/sudoers.d/$1"
