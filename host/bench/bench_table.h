@@ -29,7 +29,7 @@ struct host_bench_table {
     bool peer[HOST_BENCH_PEERS]; /* those that have a column */
     double limit_s;
     unsigned rows, goals, reached;
-    double ratio[HOST_BENCH_PEERS][HOST_BENCH_ROWS_MAX], with_host;
+    double ratio[HOST_BENCH_PEERS][HOST_BENCH_ROWS_MAX];
     unsigned ratios[HOST_BENCH_PEERS];
     struct host_bench_result first, before; /* rows; for steps */
     char before_name[64];

@@ -13,7 +13,6 @@
 #include <unistd.h>
 
 #include "host/base/clock.h"
-#include "host/base/progress.h"
 
 enum { LOOK_MS = 100 };
 
@@ -40,7 +39,6 @@ static void await(pid_t child, double limit_s, struct host_trial *trial)
     struct pollfd ended = {.fd = end, .events = POLLIN};
     while (poll(&ended, 1, LOOK_MS) <= 0) {
         double s = 1e-6 * (double)(host_now_us() - begin);
-        host_progress_show((uint64_t)(1e6 * s), (uint64_t)(1e6 * limit_s), 0);
         if (s > limit_s) {
             trial->late = true;
             (void)kill(child, SIGKILL);
@@ -93,9 +91,7 @@ static void read_said(FILE *out, struct host_trial *t)
                    digest == NULL ? "" : digest);
     json_array_foreach(nodes, i, node)
     {
-        double s = real(node, "cpu_s");
-        t->cpu_s += s;
-        t->busiest_s = s > t->busiest_s ? s : t->busiest_s;
+        t->cpu_s += real(node, "cpu_s");
         t->pages_asked += whole(node, "page_requests");
     }
     json_decref(said);

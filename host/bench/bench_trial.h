@@ -21,9 +21,8 @@ struct host_trial {
     bool late;  /* it was ended at the limit; nothing else is known then */
     int status; /* that it ended with; 128 and the number of a signal */
     uint64_t tetrahedra, pages_asked, pages;
-    double cpu_s;     /* processor time: of all nodes, or of a peer */
-    double busiest_s; /* of the busiest node */
-    double host_s;    /* of the host, files apart */
+    double cpu_s;  /* processor time: of all nodes, or of a peer */
+    double host_s; /* of the host, files apart */
     double wall_s;
     char digest[80]; /* empty: it says none */
     char said[400];  /* the last line on standard error */
