@@ -79,7 +79,9 @@ static void note_failure(struct bench *b, unsigned turn,
     b->turns[turn].failed = true;
     if (turn < PEER && trial->status == HOST_INPUT) {
         b->left_out = true;
-        host_note("%s: left out: %s", set->name, trial->said);
+        const char *why = strstr(trial->said, set->path);
+        host_note("%s: left out%s", set->name,
+                  why == NULL ? "" : why + strlen(set->path));
         return;
     }
     b->wrong += turn < PEER ? 1 : 0;
