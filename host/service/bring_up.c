@@ -10,8 +10,11 @@ enum {
     STARTED_HERE_US = 9000000, /* the machine's own nodes need no more */
     TELL_US = 1500000,
     NEWS_US = 1000000, /* in which who is there answers */
-    TELL_AGAIN_US = 1000000
+    TELL_AGAIN_US = 1000000,
+    START_BYTES = 400 /* of a line that an error has room for */
 };
+
+#define NO_ANSWER "no answer"
 
 uint64_t host_bring_up_patience(const struct host_service *service)
 {
@@ -58,6 +61,14 @@ static int refused_by(const struct host_service *s, unsigned node)
     return -1;
 }
 
+/* Whether the node at the host's wire says that a host has it already. */
+static bool is_with_another(const struct host_service *s, unsigned node)
+{
+    return node == cube_wiring(s->cube)->gateway &&
+           cube_link_peer(s->cube, host_detector_wire(s))->refusal ==
+               LINK_IN_USE;
+}
+
 /* Why the node is not heard, as "WHAT" or "WHAT; NEXT". */
 static const char *reason(const struct host_service *s, unsigned node,
                           char *text, size_t size)
@@ -71,8 +82,12 @@ static const char *reason(const struct host_service *s, unsigned node,
         snprintf(text, size,
                  "node %d meets another key there; give both the same key file",
                  other);
+    } else if (is_with_another(s, node)) {
+        snprintf(text, size,
+                 "is with another host, or one that has just ended; it is free "
+                 "some seconds after that");
     } else {
-        snprintf(text, size, "no answer");
+        snprintf(text, size, NO_ANSWER);
     }
     return text;
 }
@@ -128,21 +143,33 @@ static void tell(struct host_service *s, uint64_t now_us)
 
 static int fail(const struct host_service *s, struct host_error *error)
 {
+    const struct host_machine *m = s->machine;
+    char why[160], next[START_BYTES + 40];
     unsigned first = 0, missing = count_missing(s, &first);
-    if (host_detector_doubt(s, first, error) != 0) {
-        return error->code;
+    const char *start =
+        m->start_line == NULL ? NULL : m->start_line(m->context, first);
+    bool known = strcmp(reason(s, first, why, sizeof why), NO_ANSWER) != 0;
+    char *advice = strstr(why, "; ");
+    if (advice != NULL) {
+        snprintf(next, sizeof next, "%s", advice + 2);
+        *advice = '\0';
+    } else if (known && start != NULL && strlen(start) < START_BYTES) {
+        snprintf(next, sizeof next, "start it with: %s", start);
+    } else {
+        snprintf(next, sizeof next, "%s%s",
+                 known ? "look after that node and its wires"
+                 : m->start_line != NULL
+                     ? "start those that are missing, incode cube prints how"
+                     : "is the node's program of this version, and the machine "
+                       "not too busy?",
+                 m->keyed && !known ? ", with the same key file" : "");
     }
     return host_fail(
         error, HOST_CUBE,
-        "node %u link %u: no answer for %llu s, %u of %u nodes are there; %s%s",
-        first, host_detector_link(s, first),
+        "node %u link %u: %s for %llu s, %u of %u nodes are there; %s", first,
+        host_detector_link(s, first), why,
         (unsigned long long)host_bring_up_patience(s) / 1000000,
-        s->machine->nodes - missing, s->machine->nodes,
-        s->machine->start_line != NULL
-            ? "start those that are missing, incode cube prints how"
-            : "is the node's program of this version, and the machine not too "
-              "busy?",
-        s->machine->keyed ? ", with the same key file" : "");
+        m->nodes - missing, m->nodes, next);
 }
 
 int host_bring_up_check(struct host_service *service, uint64_t now_us,

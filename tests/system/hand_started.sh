@@ -91,6 +91,9 @@ ends() {
 begun=$(date +%s)
 begin --patience 7
 ends none 4
+check 'hand_started/none: the last line says how to start it' \
+    "$(last "$errors")" grep -qE "^incode: node 0 link 2: connection refused \
+for 7 s, 0 of 4 nodes are there; start it with: incode-node --node 0 " "$errors"
 check 'hand_started/none: no sooner than its patience' 'it gave up before' \
     [ $(($(date +%s) - begun)) -ge 7 ]
 
@@ -113,8 +116,13 @@ node3=$node
 told 'all are there' 'host: all nodes are there'
 end_node $node3
 told 'killed: in doubt' 'node 3 link [01]: no answer'
-kill -KILL $host
-wait $host 2> /dev/null
+kill -STOP $host
+held=$host
+begin --patience 60
+told 'held by an earlier host' \
+    "node 0 at 127.0.0.1:$base: is with another host.*; it is free "
+kill -KILL $held $host
+wait $held $host 2> /dev/null
 
 # once_more [OPTION...]: a run that is at work on all nodes.
 once_more() {
@@ -147,6 +155,9 @@ await grep -q 'another key' "$scratch/node"
 check 'hand_started/another key: the node says so' "$(last "$scratch/node")" \
     grep -qE '^incode-node: .*another key; ..*' "$scratch/node"
 ends 'another key' 4
+check 'hand_started/another key: the last line names it' "$(last "$errors")" \
+    grep -qE '^incode: node 3 .* meets another key .*, 3 of 4 .*key file$' \
+    <(last "$errors")
 end_node $node3
 
 # --- stopped, and cut off --------------------------------------------------------
