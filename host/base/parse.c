@@ -59,13 +59,23 @@ static bool read_exponent(const char *text, uint64_t *number)
     return good;
 }
 
+/* "k" or "M" behind a count: thousands, or millions. */
+static bool read_thousands(const char *text, uint64_t *value)
+{
+    uint64_t by = strcasecmp(text, "k") == 0   ? 1000
+                  : strcasecmp(text, "m") == 0 ? 1000000
+                                               : 0;
+    return by != 0 && !__builtin_mul_overflow(*value, by, value);
+}
+
 int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
                       uint64_t *number)
 {
     uint64_t value = 0;
     if (!read_digits(&text, &value) ||
-        (*text != '\0' && !read_exponent(text, &value)) || value < lo ||
-        value > hi) {
+        (*text != '\0' && !read_thousands(text, &value) &&
+         !read_exponent(text, &value)) ||
+        value < lo || value > hi) {
         return -1;
     }
     *number = value;

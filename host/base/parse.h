@@ -15,7 +15,8 @@
 
 #include "error.h"
 
-/* A whole number in decimal, lo to hi, also as 1e6 or 2.5e3.  0, or -1: *number
+/* A whole number in decimal, lo to hi, also as 1e6, 2.5e3, or 10k and 2M,
+ * thousands and millions.  0, or -1: *number
  * stays as it is. */
 int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
                       uint64_t *number);

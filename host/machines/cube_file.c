@@ -256,9 +256,10 @@ int host_cube_file_parse(struct host_cube_file *file, const char *path,
     if (config_read_string(&config, text) == CONFIG_TRUE) {
         status = read_settings(file, &config, error);
     } else {
-        status = host_fail(
-            error, HOST_INPUT, "%s:%d: %s; correct it, README.md has examples",
-            path, config_error_line(&config), config_error_text(&config));
+        status =
+            host_fail(error, HOST_INPUT,
+                      "%s:%d: %s; correct it as in boards/linux/examples", path,
+                      config_error_line(&config), config_error_text(&config));
     }
     config_destroy(&config);
     if (status != 0) {
