@@ -147,7 +147,7 @@ static int command_gen(int argc, char **argv, struct host_error *error)
          "What FILE is to be, where no extension tells:", 0},
         {0}};
     struct host_points points = {0};
-    struct simple s = {.seed = 1, .output = "-"};
+    struct simple s = {.seed = 1};
     uint64_t n;
     if (parse(argc, argv, options, "KIND N",
               "Makes N points of a KIND: uniform, bubbles, bluntfin, sphere, "
@@ -166,6 +166,12 @@ static int command_gen(int argc, char **argv, struct host_error *error)
                          s.argument[0], s.argument[1], HOST_GEN_MIN,
                          (unsigned long long)host_gen_max);
     }
+    if (s.output == NULL && isatty(STDOUT_FILENO)) {
+        return host_fail(error, HOST_USAGE,
+                         "gen: the points would go to the terminal; give -o "
+                         "FILE, or -o - to see them");
+    }
+    s.output = s.output == NULL ? "-" : s.output;
     int status = host_gen(s.argument[0], n, s.seed, &points, error);
     if (status == 0) {
         host_points_write_as(s.output, s.format, &points, error);

@@ -388,6 +388,10 @@ for memory in 4MB '4 MiB' 4m 4096K; do
     check "usage/--memory $memory, the bytes" 'not 4 MiB' \
         test "$(jq .memory_bytes "$scratch/memory.json")" = 4194304
 done
+script -qec "$INCODE gen uniform 9" /dev/null > "$scratch/output" < /dev/null
+check 'usage/points for a terminal' "$(last "$scratch/output")" \
+    grep -q '^incode: gen: the points would go to the terminal; give -o FILE' \
+    "$scratch/output"
 succeeds 'usage/gen uniform 1e3' \
     incode gen uniform 1e3 -o "$scratch/thousand.xyz"
 check 'usage/1e3 points' "$(wc -l < "$scratch/thousand.xyz")" \
