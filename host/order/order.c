@@ -10,6 +10,7 @@
 #include "incode/pages/cells.h"
 #include "incode/predicates/predicates.h"
 #include "kd_build.h"
+#include "lift.h"
 
 enum { FORK_POINTS = 1 << 13 };
 
@@ -89,10 +90,20 @@ static void cut_regions(void *argument)
 
 /* --- Bricks ----------------------------------------------------------- */
 
+struct spread {
+    struct host_order *order;
+    struct host_item *items;
+    struct host_lump *lump; /* of each brick */
+    uint32_t region, regions;
+    size_t first, n;
+    unsigned threads;
+};
+
 static void store_brick(void *context, uint32_t number,
                         const struct host_item *items, size_t count)
 {
-    struct host_order *order = context;
+    const struct spread *spread = context;
+    struct host_order *order = spread->order;
     struct incode_brick *brick = &order->brick[number];
     uint32_t *row = order->row + (size_t)number * INCODE_BRICK_POINTS;
     for (size_t i = 0; i < INCODE_BRICK_POINTS; i++) {
@@ -103,15 +114,8 @@ static void store_brick(void *context, uint32_t number,
         row[i] = i < count ? (uint32_t)item->row : INCODE_NONE;
     }
     order->fill[number] = (uint8_t)count;
+    host_lump_brick(&spread->lump[number], brick);
 }
-
-struct spread {
-    struct host_order *order;
-    struct host_item *items;
-    uint32_t region, regions;
-    size_t first, n;
-    unsigned threads;
-};
 
 /* Builds a run of regions, forking where there are threads and points. */
 static void build_regions(void *argument)
@@ -120,7 +124,7 @@ static void build_regions(void *argument)
     if (s->regions == 1) {
         host_kd_bricks(s->items + s->first, s->n,
                        s->order->region[s->region].first, s->threads,
-                       store_brick, s->order);
+                       store_brick, s);
         return;
     }
     struct spread lower = *s, upper = *s;
@@ -159,60 +163,73 @@ static uint64_t number_bricks(struct host_order *order)
 
 /* --- Box pages -------------------------------------------------------- */
 
-static void box_of_brick(const struct host_order *order, uint32_t b,
-                         struct incode_boxes *boxes, uint32_t child)
+/* A level of box pages, a share of it for each thread. */
+struct level {
+    struct host_order *order;
+    struct host_lump *lump; /* of each page of the tree */
+    uint32_t level;
+    unsigned parts;
+};
+
+static uint32_t share(uint32_t count, unsigned part, unsigned parts)
 {
-    const struct incode_brick *brick = &order->brick[b];
-    const double *axis[3] = {brick->x, brick->y, brick->z};
-    for (int d = 0; d < 3; d++) {
-        double lo = axis[d][0], hi = axis[d][0];
-        for (int i = 1; i < INCODE_BRICK_POINTS; i++) {
-            double c = axis[d][i];
-            lo = c < lo ? c : lo;
-            hi = c > hi ? c : hi;
+    return (uint32_t)((uint64_t)count * part / parts);
+}
+
+static struct incode_boxes *boxes_above(const struct level *l, uint32_t child)
+{
+    const struct incode_tree *tree = &l->order->tree;
+    return l->order->boxes + (tree->base[l->level] - tree->base[1]) +
+           child / INCODE_FANOUT;
+}
+
+static void make_pages(void *context, unsigned part)
+{
+    const struct level *l = context;
+    const struct incode_tree *tree = &l->order->tree;
+    const struct host_lump *below = l->lump + tree->base[l->level - 1];
+    uint32_t pages = tree->count[l->level],
+             children = tree->count[l->level - 1];
+    for (uint32_t i = share(pages, part, l->parts);
+         i < share(pages, part + 1, l->parts); i++) {
+        struct host_lump *all = &l->lump[tree->base[l->level] + i];
+        struct incode_boxes *boxes = boxes_above(l, i * INCODE_FANOUT);
+        const struct host_lump *first = below + i * INCODE_FANOUT;
+        uint32_t count = children - i * INCODE_FANOUT;
+        count = count > INCODE_FANOUT ? INCODE_FANOUT : count;
+        host_lump_join(all, first, count);
+        incode_boxes_init(boxes, all->lo, all->hi);
+        for (uint32_t c = 0; c < count; c++) {
+            incode_boxes_set(boxes, c, first[c].lo, first[c].hi);
         }
-        boxes->lo[d][child] = lo;
-        boxes->hi[d][child] = hi;
     }
 }
 
-static void box_of_boxes(const struct incode_boxes *from,
-                         struct incode_boxes *boxes, uint32_t child)
+static void lift_children(void *context, unsigned part)
 {
-    for (int d = 0; d < 3; d++) {
-        double lo = INFINITY, hi = -INFINITY;
-        for (int i = 0; i < INCODE_FANOUT; i++) {
-            lo = from->lo[d][i] < lo ? from->lo[d][i] : lo;
-            hi = from->hi[d][i] > hi ? from->hi[d][i] : hi;
-        }
-        boxes->lo[d][child] = lo;
-        boxes->hi[d][child] = hi;
-    }
-}
-
-static void make_boxes(struct host_order *order)
-{
+    const struct level *l = context;
+    const struct host_order *order = l->order;
     const struct incode_tree *tree = &order->tree;
-    for (uint32_t level = 1; level < tree->levels; level++) {
-        struct incode_boxes *to =
-            order->boxes + (tree->base[level] - tree->base[1]);
-        uint32_t children = tree->count[level - 1];
-        for (uint32_t c = 0; c < tree->count[level] * INCODE_FANOUT; c++) {
-            struct incode_boxes *boxes = &to[c / INCODE_FANOUT];
-            uint32_t child = c % INCODE_FANOUT;
-            if (c >= children) {
-                for (int d = 0; d < 3; d++) {
-                    boxes->lo[d][child] = INFINITY;
-                    boxes->hi[d][child] = -INFINITY;
-                }
-            } else if (level == 1) {
-                box_of_brick(order, c, boxes, child);
-            } else {
-                box_of_boxes(order->boxes +
-                                 (tree->base[level - 1] - tree->base[1] + c),
-                             boxes, child);
-            }
-        }
+    uint32_t children = tree->count[l->level - 1];
+    unsigned shift = 5 * (l->level - 1); /* to bricks */
+    for (uint32_t c = share(children, part, l->parts);
+         c < share(children, part + 1, l->parts); c++) {
+        uint64_t first = (uint64_t)c << shift, last = (c + UINT64_C(1))
+                                                      << shift;
+        last = last < order->bricks ? last : order->bricks;
+        host_lift(boxes_above(l, c), c % INCODE_FANOUT,
+                  &l->lump[tree->base[l->level - 1] + c], order->brick + first,
+                  (uint32_t)(last - first));
+    }
+}
+
+static void make_boxes(struct host_order *order, struct host_lump *lump)
+{
+    struct level l = {.order = order, .lump = lump};
+    l.parts = order->points >= FORK_POINTS ? host_threads() : 1;
+    for (l.level = 1; l.level < order->tree.levels; l.level++) {
+        host_fork_all(l.parts, make_pages, &l);
+        host_fork_all(l.parts, lift_children, &l);
     }
 }
 
@@ -359,13 +376,21 @@ static int build_items(struct host_order *order, struct host_item *items,
     if (allocate(order, error) != 0) {
         return error->code;
     }
+    size_t lumps =
+        order->tree.base[order->tree.levels] * sizeof(struct host_lump);
+    struct host_lump *lump = host_map(lumps);
+    if (lump == NULL) {
+        return host_fail_memory(error, "the boxes of the points");
+    }
     struct spread spread = {.order = order,
                             .items = items,
+                            .lump = lump,
                             .regions = order->regions,
                             .n = order->points,
                             .threads = host_threads()};
     build_regions(&spread);
-    make_boxes(order);
+    make_boxes(order, lump);
+    host_unmap(lump, lumps);
     return 0;
 }
 
@@ -431,11 +456,11 @@ static size_t copy_words(const uint32_t *from, size_t count, uint32_t page,
     size_t first = (size_t)page * INCODE_PAGE_WORDS;
     size_t n = first < count ? count - first : 0;
     n = n > INCODE_PAGE_WORDS ? INCODE_PAGE_WORDS : n;
-    memset(buffer, 0xff, INCODE_PAGE_BYTES);
+    memset(buffer, 0xff, sizeof(struct incode_words));
     if (n > 0) {
         memcpy(buffer, from + first, n * sizeof *from);
     }
-    return INCODE_PAGE_BYTES;
+    return sizeof(struct incode_words);
 }
 
 size_t host_page(const struct host_order *order, uint32_t page, void *buffer)
@@ -450,8 +475,9 @@ size_t host_page(const struct host_order *order, uint32_t page, void *buffer)
         return 3 * axis;
     }
     if (page < tree->base[tree->levels]) {
-        memcpy(buffer, &order->boxes[page - tree->base[1]], INCODE_PAGE_BYTES);
-        return INCODE_PAGE_BYTES;
+        const struct incode_boxes *boxes = &order->boxes[page - tree->base[1]];
+        memcpy(buffer, boxes, sizeof *boxes);
+        return sizeof *boxes;
     }
     if (page < tree->list_base) {
         size_t cells =

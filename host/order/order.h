@@ -3,7 +3,7 @@
  * points and leaves of 8 (see incode/pages/pages.h), with the pages that nodes
  * ask for.
  *
- * Memory: 28 bytes a point at the end, 60 at most while it works (input rows
+ * Memory: 28 bytes a point at the end, 63 at most while it works (input rows
  * not counted).  Work: O(n log n), about 100 ms a million points on two cores.
  *
  *     if (host_order_make(&order, "a.xyz", points.xyz, points.count,
@@ -65,7 +65,7 @@ int host_order_make(struct host_order *order, const char *where,
 void host_order_free(struct host_order *order);
 
 /* Copies page `page` into buffer (INCODE_PAGE_BYTES).  Returns its bytes:
- * INCODE_PAGE_BYTES, or 24 a point for a brick that is not full (x[count],
+ * those of its kind, or 24 a point for a brick that is not full (x[count],
  * y[count], z[count]); 0 where there is no such page. */
 size_t host_page(const struct host_order *order, uint32_t page, void *buffer);
 

@@ -217,7 +217,7 @@ int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
             return -1;
         load_brick(f, data, points);
     } else {
-        if (bytes != INCODE_PAGE_BYTES)
+        if (bytes != sizeof f->page.boxes && bytes != sizeof f->page.words)
             return -1;
         memcpy(&f->page, data, bytes);
         f->count = 0;

@@ -17,6 +17,7 @@
 #ifndef INCODE_PAGER_H
 #define INCODE_PAGER_H
 
+#include <assert.h>
 #include <stdalign.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -30,13 +31,22 @@ enum incode_frame_state {
     INCODE_FRAME_READY
 };
 
+/* Only a brick has leaves; where there is none, a page may end in theirs. */
 struct incode_frame {
-    alignas(64) union incode_page page;
-    alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES];
-    alignas(64) double leaf_hi[3][INCODE_BRICK_LEAVES];
+    union {
+        alignas(64) union incode_page page;
+        struct {
+            uint8_t brick_bytes[INCODE_BRICK_BYTES];
+            alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES];
+            alignas(64) double leaf_hi[3][INCODE_BRICK_LEAVES];
+        };
+    };
     uint32_t number; /* the page */
     uint8_t count;   /* points of a brick */
 };
+
+static_assert(offsetof(struct incode_frame, leaf_lo) == INCODE_BRICK_BYTES,
+              "the leaves follow the brick");
 
 /* What the pager looks at to find a frame, close together. */
 struct incode_slot {

@@ -1,13 +1,13 @@
 /* The points of a run as pages: bricks of 64 points in spatial order, and a
- * tree of boxes over them, 32 children a page.  Both kinds are 1,536 bytes, so
- * one pager serves both and the number of points has no bound but 2^32.
+ * tree of boxes over them, 32 children a page.  They are 1,536 and 1,568 bytes,
+ * so one pager serves both and the number of points has no bound but 2^32.
  *
  * Level 0 pages are bricks; page i of level k+1 holds the boxes of the
  * children [32 i, 32 i + 32) of level k.  The root is the one page of the
  * highest level, which is at least 1.
  *
- * Memory: struct incode_tree; a page is 1,536 bytes.  Work: constant, as there
- * are 8 levels at most.
+ * Memory: struct incode_tree; a page is 1,568 bytes at most.  Work: constant,
+ * as there are 8 levels at most.
  *
  *     struct incode_tree tree;
  *     incode_tree_init(&tree, bricks, 0);
@@ -16,17 +16,19 @@
 #ifndef INCODE_PAGES_H
 #define INCODE_PAGES_H
 
+#include <assert.h>
 #include <stdint.h>
 
+#include "boxes.h"
 #include "bricks.h"
 
 enum {
     INCODE_LEAF_POINTS = 8, /* points a leaf box inside a brick */
     INCODE_BRICK_LEAVES = 8,
-    INCODE_FANOUT = 32, /* children a box page, at most */
-    INCODE_PAGE_BYTES = 1536,
-    INCODE_LEVELS_MAX = 8,  /* bricks, then up to 7 levels of boxes */
-    INCODE_PAGE_WORDS = 384 /* uint32 a page of the uniform grid's lists */
+    INCODE_BRICK_BYTES = 1536,
+    INCODE_PAGE_BYTES = 1568, /* of the largest page */
+    INCODE_LEVELS_MAX = 8,    /* bricks, then up to 7 levels of boxes */
+    INCODE_PAGE_WORDS = 384   /* uint32 a page of the uniform grid's lists */
 };
 
 /* How points are searched: all of them in turn, by the uniform grid, whose
@@ -40,13 +42,6 @@ struct incode_brick {
     double z[INCODE_BRICK_POINTS];
 };
 
-/* Tight boxes of up to 32 children; absent children have lo > hi (+inf,-inf)
- * in every dimension. */
-struct incode_boxes {
-    double lo[3][INCODE_FANOUT];
-    double hi[3][INCODE_FANOUT];
-};
-
 /* A page of the uniform grid's two lists (index `grid` only): first[cell] and
  * the vertex numbers sorted by cell. */
 struct incode_words {
@@ -58,6 +53,12 @@ union incode_page {
     struct incode_boxes boxes;
     struct incode_words words;
 };
+
+static_assert(sizeof(struct incode_brick) == INCODE_BRICK_BYTES &&
+                  sizeof(struct incode_words) == INCODE_BRICK_BYTES &&
+                  sizeof(struct incode_boxes) == INCODE_PAGE_BYTES &&
+                  sizeof(union incode_page) == INCODE_PAGE_BYTES,
+              "pages are what a message carries");
 
 /* Page numbers: level k's page i is base[k] + i; then the uniform grid's cell
  * starts (cells + 1 words) from cells_base, its vertex list from list_base. */

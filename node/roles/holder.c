@@ -284,7 +284,7 @@ static void holder_map(const void *self, struct node_map *map)
 const struct node_role node_holder_role = {
     .name = "holder",
     .tables = {{"queue of requests", "pages"},
-               {"page frames", "pages of 1536 bytes"}},
+               {"page frames", "pages of 1568 bytes"}},
     .arena_min = holder_arena_min,
     .start = holder_start,
     .message = holder_message,

@@ -83,6 +83,21 @@ static inline uint32_t talk_points_of(uint32_t brick)
                                                      : INCODE_BRICK_POINTS;
 }
 
+/* Of vertices [first, last). */
+static inline void talk_box(double lo[3], double hi[3], uint32_t first,
+                            uint32_t last)
+{
+    for (unsigned d = 0; d < 3; d++) {
+        lo[d] = __builtin_inf();
+        hi[d] = -lo[d];
+        for (uint32_t v = first; v < last; v++) {
+            double a = talk_coordinate(v, d);
+            lo[d] = a < lo[d] ? a : lo[d];
+            hi[d] = a > hi[d] ? a : hi[d];
+        }
+    }
+}
+
 /* Bytes of the page: two bricks, and their boxes. */
 static inline size_t talk_page(uint32_t page, uint8_t *bytes)
 {
@@ -96,34 +111,16 @@ static inline size_t talk_page(uint32_t page, uint8_t *bytes)
         }
         return 3 * count * sizeof(double);
     }
-    for (unsigned d = 0; d < 3; d++) {
-        for (uint32_t c = 0; c < INCODE_FANOUT; c++) {
-            double lo = __builtin_inf(), hi = -lo;
-            for (uint32_t i = 0; c < TALK_BRICKS && i < talk_points_of(c);
-                 i++) {
-                double a = talk_coordinate(c * INCODE_BRICK_POINTS + i, d);
-                lo = a < lo ? a : lo;
-                hi = a > hi ? a : hi;
-            }
-            boxes.lo[d][c] = lo;
-            boxes.hi[d][c] = hi;
-        }
+    double lo[3], hi[3];
+    talk_box(lo, hi, 0, TALK_POINTS);
+    incode_boxes_init(&boxes, lo, hi);
+    for (uint32_t c = 0; c < TALK_BRICKS; c++) {
+        uint32_t first = c * INCODE_BRICK_POINTS;
+        talk_box(lo, hi, first, first + talk_points_of(c));
+        incode_boxes_set(&boxes, c, lo, hi);
     }
     memcpy(bytes, &boxes, sizeof boxes);
     return sizeof boxes;
-}
-
-static inline void talk_box(double lo[3], double hi[3])
-{
-    for (unsigned d = 0; d < 3; d++) {
-        lo[d] = __builtin_inf();
-        hi[d] = -lo[d];
-        for (uint32_t v = 0; v < TALK_POINTS; v++) {
-            double a = talk_coordinate(v, d);
-            lo[d] = a < lo[d] ? a : lo[d];
-            hi[d] = a > hi[d] ? a : hi[d];
-        }
-    }
 }
 
 /* ---- who talks ---- */
@@ -279,7 +276,7 @@ static inline struct node_setup_message talk_setup(uint8_t role)
     setup.role = role;
     setup.setup.bricks = TALK_BRICKS;
     setup.setup.index = INCODE_KD;
-    talk_box(setup.setup.lo, setup.setup.hi);
+    talk_box(setup.setup.lo, setup.setup.hi, 0, TALK_POINTS);
     return setup;
 }
 
@@ -289,7 +286,7 @@ static inline struct node_job_message talk_job(void)
     memset(&job, 0, sizeof job);
     job.epoch = 1;
     job.job.last = TALK_BRICKS;
-    talk_box(job.job.lo, job.job.hi);
+    talk_box(job.job.lo, job.job.hi, 0, TALK_POINTS);
     return job;
 }
 

@@ -358,13 +358,13 @@ static void setups_of_other_versions(void **unused)
         uint64_t more;
     } later = {setup, 0};
     (void)unused;
-    assert_int_equal(NODE_PROTOCOL, 5);
-    setup.protocol = later.setup.protocol = 4;
-    refuses(NODE_SETUP, &setup, sizeof setup, "protocol version 4, expected 5");
-    refuses(NODE_SETUP, &later, sizeof later, "protocol version 4, expected 5");
-    refuses(NODE_SETUP, &later, 4, "protocol version 4, expected 5");
+    assert_int_equal(NODE_PROTOCOL, 6);
+    setup.protocol = later.setup.protocol = 5;
+    refuses(NODE_SETUP, &setup, sizeof setup, "protocol version 5, expected 6");
+    refuses(NODE_SETUP, &later, sizeof later, "protocol version 5, expected 6");
+    refuses(NODE_SETUP, &later, 4, "protocol version 5, expected 6");
     refuses(NODE_SETUP, &later, 3, "setup in 3 bytes, expected 96");
-    later.setup.protocol = 5;
+    later.setup.protocol = 6;
     refuses(NODE_SETUP, &later, 100, "setup in 100 bytes, expected 96");
 }
 
@@ -493,11 +493,11 @@ static void pages_that_a_worker_refuses(void **unused)
     takes_no_page(points, 23);
     takes_no_page(points, 25);
     *last = NAN;
-    takes_no_page(points, INCODE_PAGE_BYTES);
+    takes_no_page(points, INCODE_BRICK_BYTES);
     *last = INFINITY;
-    takes_no_page(points, INCODE_PAGE_BYTES);
+    takes_no_page(points, INCODE_BRICK_BYTES);
     *last = 1.5; /* outside the box of all points */
-    takes_no_page(points, INCODE_PAGE_BYTES);
+    takes_no_page(points, INCODE_BRICK_BYTES);
 }
 
 static void what_a_holder_refuses(void **unused)
@@ -515,7 +515,7 @@ static void what_a_holder_refuses(void **unused)
     refuses(NODE_PAGE, &page, sizeof page - 4, "page 17 was not requested");
     (void)begin(NODE_HOLDER);
     refuses(NODE_PAGE, &page, sizeof page,
-            "page in 1544 bytes, expected 1540 at most");
+            "page in 1576 bytes, expected 1572 at most");
     (void)begin(NODE_HOLDER);
     memset(pages, 0, sizeof pages);
     refuses(NODE_PAGE_REQUEST, pages, sizeof pages,
@@ -535,7 +535,7 @@ static void what_a_holder_refuses(void **unused)
     say(NODE_PAGE_REQUEST, pages, 4);
     (void)hear(NODE_PAGE_REQUEST);
     refuses(NODE_PAGE, &page, sizeof page - 4,
-            "content of page 7 in 1536 bytes is out of its limits");
+            "content of page 7 in 1568 bytes is out of its limits");
 }
 
 /* Nothing moves when a role finds it, and the board would sleep. */

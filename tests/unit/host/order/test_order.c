@@ -140,12 +140,14 @@ static void check_regions(const struct host_order *order,
 static void check_boxes(const struct host_order *order)
 {
     const struct incode_tree *tree = &order->tree;
+    double box_lo[3][INCODE_FANOUT], box_hi[3][INCODE_FANOUT];
     union incode_page page;
     for (uint32_t l = 1; l < tree->levels; l++) {
         for (uint32_t c = 0; c < tree->count[l] * INCODE_FANOUT; c++) {
             uint32_t number = tree->base[l] + c / INCODE_FANOUT;
             assert_int_equal(incode_tree_level(tree, number), l);
-            assert_int_equal(host_page(order, number, &page), 1536);
+            assert_int_equal(host_page(order, number, &page), 1568);
+            incode_boxes_axes(&page.boxes, box_lo, box_hi);
             uint64_t width = 1;
             for (uint32_t k = 1; k < l; k++) {
                 width *= INCODE_FANOUT;
@@ -164,8 +166,12 @@ static void check_boxes(const struct host_order *order)
                 }
             }
             for (int d = 0; d < 3; d++) {
-                assert_true(page.boxes.lo[d][c % INCODE_FANOUT] == lo[d]);
-                assert_true(page.boxes.hi[d][c % INCODE_FANOUT] == hi[d]);
+                double slack = page.boxes.unit * 0x1p-22;
+                uint32_t i = c % INCODE_FANOUT;
+                assert_true(box_lo[d][i] <= lo[d]);
+                assert_true(box_hi[d][i] >= hi[d]);
+                assert_true(box_lo[d][i] >= lo[d] - slack);
+                assert_true(box_hi[d][i] <= hi[d] + slack);
             }
         }
     }
@@ -263,7 +269,7 @@ static void bricks_are_compact(void **unused)
         uint32_t i = c % INCODE_FANOUT;
         double e[3];
         for (int d = 0; d < 3; d++) {
-            e[d] = b->hi[d][i] - b->lo[d][i];
+            e[d] = b->unit * (double)(b->hi[d][i] - b->lo[d][i]);
         }
         surface += 2 * (e[0] * e[1] + e[1] * e[2] + e[2] * e[0]);
     }
@@ -272,8 +278,9 @@ static void bricks_are_compact(void **unused)
             &order.boxes[order.tree.base[2] - order.tree.base[1] +
                          c / INCODE_FANOUT];
         uint32_t i = c % INCODE_FANOUT;
-        pages += (b->hi[0][i] - b->lo[0][i]) * (b->hi[1][i] - b->lo[1][i]) *
-                 (b->hi[2][i] - b->lo[2][i]);
+        pages += pow(b->unit, 3) * (double)(b->hi[0][i] - b->lo[0][i]) *
+                 (double)(b->hi[1][i] - b->lo[1][i]) *
+                 (double)(b->hi[2][i] - b->lo[2][i]);
     }
     double cube = 6 * cbrt((double)order.bricks); /* perfect cubes */
     assert_true(surface < 1.15 * cube);
