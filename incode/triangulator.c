@@ -17,13 +17,18 @@ static size_t round_up(size_t bytes)
     return (bytes + 63) & ~(size_t)63;
 }
 
-/* Copies of points in single precision, near a vertex: one for 32 KB. */
-static uint32_t copies_of(size_t bytes)
+static uint32_t between(size_t least, size_t a, size_t most)
 {
-    size_t copies = bytes >> 15;
-    return copies < INCODE_COPIES_MIN          ? INCODE_COPIES_MIN
-           : copies > INCODE_NEIGHBOURS_COPIES ? INCODE_NEIGHBOURS_COPIES
-                                               : (uint32_t)copies;
+    return (uint32_t)(a < least ? least : a > most ? most : a);
+}
+
+/* The horizon of a maker: a box for 4 KB, a copy for 32 KB. */
+static struct incode_maker_share horizon_of(size_t bytes)
+{
+    size_t boxes = bytes >> 12, copies = bytes >> 15;
+    return (struct incode_maker_share){
+        between(INCODE_HORIZON_MIN, boxes / 64 * 64, INCODE_HORIZON_MAX),
+        between(16, copies, INCODE_HORIZON_COPIES), 0};
 }
 
 /* How an arena is divided. */
@@ -38,9 +43,9 @@ struct shares {
 static bool divide(struct shares *s, struct incode_map *map, size_t bytes)
 {
     memset(map, 0, sizeof *map);
-    s->maker = (struct incode_maker_share){copies_of(bytes), 0};
-    size_t copies = incode_maker_bytes(&s->maker);
-    map->control = round_up(sizeof(struct incode_triangulator)) + copies;
+    s->maker = horizon_of(bytes);
+    size_t horizon = incode_horizon_bytes(s->maker.boxes, s->maker.copies);
+    map->control = round_up(sizeof(struct incode_triangulator)) + horizon;
     map->local_points = sizeof(struct incode_local_points);
     map->tasks = (sizeof(struct incode_task) + sizeof(struct incode_search)) *
                  INCODE_TASKS;
@@ -63,10 +68,9 @@ static bool divide(struct shares *s, struct incode_map *map, size_t bytes)
     size_t used = map->control + round_up(both);
     if (bytes < used)
         return false;
-    s->maker.frames =
-        incode_maker_frames(s->maker.copies, bytes - used + copies);
+    s->maker.frames = incode_maker_frames(&s->maker, bytes - used + horizon);
     map->frame_count = s->maker.frames;
-    map->frames = incode_maker_bytes(&s->maker) - copies;
+    map->frames = incode_maker_bytes(&s->maker) - horizon;
     map->total = used + map->frames;
     return map->frame_count >= INCODE_FRAMES_MIN;
 }

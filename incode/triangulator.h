@@ -116,10 +116,10 @@ struct incode_triangulator *incode_triangulator_init(
 void incode_triangulator_start(struct incode_triangulator *t,
                                const struct incode_job *job);
 
-/* A page has arrived: `bytes` of it, INCODE_PAGE_BYTES or, for a brick, 24
- * times its number of points: x[count], y[count], z[count].  Returns 0, or one
- * of these where it was not asked for, or cannot be the page of that number
- * (pages/sound.h); it is dropped then. */
+/* A page has arrived: `bytes` of it, those of its kind (pages/pages.h) or, for
+ * a brick, 24 times its number of points: x[count], y[count], z[count].
+ * Returns 0, or one of these where it was not asked for, or cannot be the page
+ * of that number (pages/sound.h); it is dropped then. */
 enum { INCODE_PAGE_UNASKED = -1, INCODE_PAGE_UNSOUND = -2 };
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes);

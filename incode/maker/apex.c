@@ -164,19 +164,49 @@ static bool contest_first(struct incode_make *n, double *t)
     return false;
 }
 
-/* The best of all local points, by the predicates where bounds do not tell.
- * Of an irregular face's candidates none has been looked at. */
+/* The one of some points that is first in the pencil, as far as doubles tell:
+ * on a curve, where each point would beat the one before, it beats all. */
+static uint32_t deepest(const struct incode_make *n, const uint16_t *inside,
+                        uint32_t count)
+{
+    const struct incode_local_points *local = &n->maker->local;
+    uint32_t at = inside[0];
+    double most = -__builtin_inf();
+    for (uint32_t i = 0; i < count; i++) {
+        double r[3];
+        incode_local_relative(local, inside[i], r);
+        double level = incode_dot(n->sphere.n, r);
+        double depth = incode_sphere_value(&n->sphere, r) / level;
+        if (level > incode_plane_error(&n->sphere, r) && depth > most) {
+            most = depth;
+            at = inside[i];
+        }
+    }
+    return at;
+}
+
+/* The best of all local points, by the predicates where bounds do not tell:
+ * what is inside the sphere of each better one is chosen again.  Of an
+ * irregular face's candidates none has been looked at. */
 static void contest(struct incode_make *n)
 {
     const struct incode_local_points *local = &n->maker->local;
     uint16_t inside[INCODE_NEAR_ALL];
-    for (uint32_t i = 0; i < local->near && !n->regular; i++)
+    for (uint32_t i = 0; i < local->near && !n->regular; i++) {
         consider(n, local->at[i]);
+        if (n->best != INCODE_LOCAL_NONE)
+            break;
+    }
     if (n->best == INCODE_LOCAL_NONE)
         return;
-    uint32_t count = incode_local_inside(local, &n->sphere, inside);
-    for (uint32_t i = 0; i < count; i++)
-        consider(n, inside[i]);
+    for (uint32_t best = INCODE_LOCAL_NONE; best != n->best;) {
+        best = n->best;
+        uint32_t count = incode_local_inside(local, &n->sphere, inside);
+        if (count > 0)
+            consider(n, deepest(n, inside, count));
+        for (uint32_t i = 0; i < count && best == n->best; i++)
+            consider(n, inside[i]);
+    }
 }
 
 static enum incode_near contest_all(struct incode_make *n)
@@ -363,6 +393,7 @@ enum incode_near incode_apex_near(struct incode_maker *m, uint32_t b,
     n.degenerate.spread = 0;
     enum incode_near r = contest_all(&n);
     bool doubtful = r == INCODE_NEAR_SEARCH && is_doubtful(&n);
+    n.doubtful = doubtful;
     enum lie lie = doubtful ? lie_of(&n) : INTERIOR;
     bool degenerate = doubtful && n.best != INCODE_LOCAL_NONE;
     if ((degenerate || lie == COPLANAR) && contest_near_degenerate(&n))
@@ -379,7 +410,12 @@ enum incode_near incode_apex_near(struct incode_maker *m, uint32_t b,
             incode_query_half_space(&s->query, n.pv, n.sphere.n, local->scale);
         return INCODE_NEAR_SEARCH;
     }
-    incode_search_learn(m, &s->query);
+    incode_count_candidates(m, s->looked);
+    if (s->query.best == INCODE_NONE) {
+        incode_hull_learn(m, &s->query);
+        return INCODE_NEAR_HULL;
+    }
+    incode_search_learn(m, &s->query, s->looked);
     *apex = incode_local_find(local, s->query.best);
     if (*apex == INCODE_LOCAL_NONE)
         *apex = incode_local_append(local, s->query.best, s->query.best_p);
@@ -387,6 +423,5 @@ enum incode_near incode_apex_near(struct incode_maker *m, uint32_t b,
         incode_search_from(&n, s);
         return INCODE_NEAR_SEARCH;
     }
-    incode_count_candidates(m, s->looked);
     return INCODE_NEAR_FOUND;
 }

@@ -9,84 +9,273 @@
  * keeps all that lie in the ball of the first so far, and the predicates
  * compare only what is still in the last ball. */
 
-/* wall - p, infinite only where the wall is. */
-static double gap(double wall, double p)
+/* ---- what is left to be looked at ---- */
+
+/* One look over the horizon: what a cap reaches and was not looked at yet. */
+struct look {
+    struct incode_horizon_cap cap;
+    uint64_t done[INCODE_HORIZON_MAX / 64];
+    uint32_t index[INCODE_HORIZON_MAX + INCODE_HORIZON_PADDING];
+    uint32_t bricks, pages; /* indices of the former, then of the latter */
+};
+
+static void set_done(struct look *look, uint32_t index)
 {
-    double difference = wall - p;
-    return wall < __builtin_inf() && difference > DBL_MAX ? DBL_MAX
-                                                          : difference;
+    look->done[index / 64] |= UINT64_C(1) << (index % 64);
 }
 
-/* The box of the list as walls around the vertex. */
-static void set_walls(double wall[8], const struct incode_neighbours *list,
-                      const double pv[3], double scale)
+/* Bricks go first, those beside the vertex's own before others: they are near
+ * and draw the cap in. */
+static void reach(const struct incode_horizon *h, struct look *look)
 {
-    for (int d = 0; d < 3; d++) {
-        wall[d] = gap(list->box_hi[d], pv[d]) * scale;
-        wall[4 + d] = gap(-list->box_lo[d], -pv[d]) * scale;
+    uint32_t pages[INCODE_HORIZON_MAX];
+    uint32_t count =
+        incode_horizon_reached(h, &look->cap, look->done, look->index);
+    look->bricks = look->pages = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t at = look->index[i];
+        if (h->level[at] == 0)
+            look->index[look->bricks++] = at;
+        else
+            pages[look->pages++] = at;
     }
-    wall[3] = wall[7] = __builtin_inf();
+    memcpy(look->index + look->bricks, pages, look->pages * sizeof pages[0]);
 }
 
-/* Box after box, up to that of the list, for a first candidate. */
-static enum incode_walk find_first(struct incode_maker *m,
-                                   struct incode_search *s, incode_visit *visit,
-                                   void *context)
+enum { CROWD = 16 /* boxes: so many are many */ };
+
+/* Where a cap reaches many boxes, points may lie on one sphere up to rounding:
+ * empty spheres met before rule out others. */
+static void bound(const struct incode_maker *m, const struct incode_query *q,
+                  struct look *look, struct incode_radical_bound *radical)
 {
-    struct incode_query *q = &s->query;
-    enum incode_walk r = INCODE_WALK_DONE;
-    while (r == INCODE_WALK_DONE && q->best == INCODE_NONE && !q->round) {
-        s->radius *= 2;
-        incode_search_box(m, s);
-        if (!q->boxed || !incode_neighbours_holds(&m->neighbours, q->lo, q->hi))
-            return INCODE_WALK_STOP;
-        r = incode_neighbours_visit(&m->neighbours, &m->walker, q, visit,
-                                    context);
-        if (r != INCODE_WALK_DONE)
-            break;
-        q->done = true;
-        memcpy(q->done_lo, q->lo, sizeof q->lo);
-        memcpy(q->done_hi, q->hi, sizeof q->hi);
+    if (look->bricks + look->pages < CROWD || q->best == INCODE_NONE ||
+        look->cap.bounded)
+        return;
+    const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
+    incode_radical_bound_set(radical, &m->empty, p, q->scale, q->sphere.n);
+    if (!radical->set)
+        return;
+    incode_horizon_bound(&m->horizon, &look->cap, q->scale, radical);
+    reach(&m->horizon, look);
+}
+
+/* Splits the pages that the cap reaches; false: one is missing, or there is no
+ * room. */
+static bool split(struct incode_maker *m, struct look *look, uint32_t *missing)
+{
+    for (uint32_t i = 0; i < look->pages; i++) {
+        uint32_t at = look->index[look->bricks + i];
+        if (incode_horizon_split(&m->horizon, &m->walker, at, &look->cap,
+                                 missing) != INCODE_HORIZON_MADE)
+            return false;
+        set_done(look, at);
     }
-    return r;
+    return true;
 }
 
 /* ---- any face: by spheres ---- */
 
+/* A bound of the errors of a vector's components is small enough to vanish
+ * among the roundings to single precision. */
+static bool is_sure(const double a[3], const double bound[3])
+{
+    return INCODE_SPHERE_EPS * bound[0] < 0x1p-26 * incode_max_norm(a) &&
+           INCODE_SPHERE_EPS * bound[1] < 0x1p-26 * incode_max_norm(a) &&
+           INCODE_SPHERE_EPS * bound[2] < 0x1p-26 * incode_max_norm(a);
+}
+
+static bool sphere_cap(const struct incode_horizon *h,
+                       const struct incode_query *q,
+                       struct incode_horizon_cap *cap)
+{
+    const struct incode_sphere *s = &q->sphere;
+    double det = s->det - INCODE_SPHERE_EPS * s->pdet;
+    return s->has_apex && is_sure(s->m, s->pm) && is_sure(s->n, s->pn) &&
+           incode_horizon_cap(h, cap, q->pv, q->scale, s->m, det > 0 ? det : 0,
+                              s->n);
+}
+
+/* That of all spheres through the face. */
+static bool plane_cap(const struct incode_horizon *h,
+                      const struct incode_query *q,
+                      struct incode_horizon_cap *cap)
+{
+    const struct incode_sphere *s = &q->sphere;
+    return is_sure(s->n, s->pn) &&
+           incode_horizon_cap(h, cap, q->pv, q->scale, s->n, 0, s->n);
+}
+
+/* Where in the pencil of the face's circle the middle of a box is, about; what
+ * is not beyond the face comes last.  c0: centre of the circle, relative to the
+ * vertex in the horizon's units. */
+static float middle(const struct incode_horizon *h, const struct look *look,
+                    const float c0[3], uint32_t i)
+{
+    float square = 0, level = 0, along = 0;
+    for (int d = 0; d < 3; d++) {
+        float y = (h->lo[d][i] + h->hi[d][i]) * 0.5F - look->cap.v[d];
+        square += y * y;
+        level += y * look->cap.n[d];
+        along += y * c0[d];
+    }
+    float length = __builtin_sqrtf(square);
+    return level > 0.05F * length ? (square - 2 * along) / level
+                                  : 1e20F * (1 + length);
+}
+
+/* The centre of the face's circle, about, in the horizon's units. */
+static void set_middle(const struct incode_make *n, float c0[3])
+{
+    const struct incode_sphere *s = &n->sphere;
+    double cn[3], nb[3], nn = incode_dot(s->n, s->n);
+    double ratio = n->maker->horizon.scale / n->maker->local.scale;
+    incode_cross(cn, n->rc, s->n);
+    incode_cross(nb, s->n, n->rb);
+    for (int d = 0; d < 3; d++) {
+        double c = (s->bb * cn[d] + s->cc * nb[d]) * 0.5 / nn * ratio;
+        c0[d] = c > -1e15 && c < 1e15 ? (float)c : 0;
+    }
+}
+
+/* Puts what is first in the pencil first; where it is a page, that alone is
+ * left. */
+static void choose_first(const struct incode_horizon *h, struct look *look,
+                         const float c0[3])
+{
+    uint32_t count = look->bricks + look->pages, first = 0;
+    float least = __builtin_inff();
+    for (uint32_t i = 0; i < count; i++) {
+        float t = middle(h, look, c0, look->index[i]);
+        if (t < least) {
+            least = t;
+            first = i;
+        }
+    }
+    uint32_t at = look->index[first];
+    if (first >= look->bricks) {
+        look->bricks = 0;
+        look->pages = 1;
+    } else {
+        look->index[first] = look->index[0];
+    }
+    look->index[0] = at;
+}
+
+/* The points of a brick that the cap may hold, one bit each; false: the brick
+ * is missing.  *frame: set where there are any. */
+static bool points_of(struct incode_maker *m, struct look *look, uint32_t index,
+                      uint64_t *in, const struct incode_frame **frame,
+                      uint32_t *missing)
+{
+    struct incode_horizon *h = &m->horizon;
+    uint32_t brick = h->page[index];
+    const struct incode_frame *f = NULL;
+    *missing = brick;
+    m->counts.candidates += INCODE_BRICK_POINTS;
+    if (h->copy[index] == INCODE_NO_COPY) {
+        f = incode_pager_get(&m->pager, brick);
+        if (f == NULL)
+            return false;
+        incode_horizon_copy(h, index, f);
+    }
+    *in = incode_horizon_points(h, index, &look->cap);
+    set_done(look, index);
+    if (*in != 0 && f == NULL)
+        f = incode_pager_get(&m->pager, brick);
+    *frame = f;
+    return *in == 0 || f != NULL;
+}
+
+/* Considers the points of the bricks, up to a first candidate; false: one is
+ * missing, or the best's sphere tells nothing. */
+static bool visit_bricks(struct incode_maker *m, struct incode_query *q,
+                         struct look *look)
+{
+    bool none = q->best == INCODE_NONE;
+    for (uint32_t i = 0; i < look->bricks; i++) {
+        const struct incode_frame *f;
+        uint32_t leaves = 0, best = q->best;
+        uint64_t in;
+        if (!points_of(m, look, look->index[i], &in, &f, &q->missing))
+            return false;
+        for (unsigned k = 0; k < INCODE_BRICK_LEAVES; k++)
+            leaves |= (uint32_t)((in >> (k * INCODE_LEAF_POINTS) & 0xff) != 0)
+                      << k;
+        if (leaves != 0)
+            leaves &= (UINT32_C(1) << incode_frame_leaves(f)) - 1;
+        if (leaves != 0)
+            (void)incode_visit_points(&m->walker, q, f, f->number, leaves,
+                                      NULL);
+        if (q->best == best)
+            continue;
+        if (none)
+            break;
+        if (!sphere_cap(&m->horizon, q, &look->cap))
+            return false;
+    }
+    return true;
+}
+
+enum { TRIES = 8 /* boxes, for a first candidate */ };
+
+/* At first, only points that are clearly beyond the face count, so that those
+ * in its plane need not be told apart in vain.  What is coplanar up to rounding
+ * is left to those who know of half-spaces. */
 static bool search_spheres(struct incode_make *n, struct incode_search *s)
 {
     struct incode_maker *m = n->maker;
-    const struct incode_neighbours *list = &m->neighbours;
+    const struct incode_horizon *h = &m->horizon;
     struct incode_query *q = &s->query;
-    alignas(64) double wall[8];
-    enum incode_walk r = INCODE_WALK_DONE;
-    if (q->best == INCODE_NONE) {
-        r = find_first(m, s, incode_visit_points, NULL);
-        if (r == INCODE_WALK_DONE)
+    struct look look = {.done = {0}};
+    float c0[3];
+    struct incode_radical_bound radical = {.set = false};
+    bool strictly = q->best == INCODE_NONE;
+    uint32_t tries = 0;
+    if (strictly)
+        set_middle(n, c0);
+    q->done = q->boxed = q->round = false;
+    for (;;) {
+        uint32_t best = q->best;
+        q->strictly_beyond = strictly;
+        if (best == INCODE_NONE ? tries++ == TRIES
+                                : incode_sphere_is_near_degenerate(&q->sphere))
+            return false;
+        if (!(best == INCODE_NONE ? plane_cap(h, q, &look.cap)
+                                  : sphere_cap(h, q, &look.cap)))
+            return false;
+        reach(h, &look);
+        bound(m, q, &look, &radical);
+        if (look.bricks + look.pages == 0 && !strictly)
+            return true;
+        if (look.bricks + look.pages == 0) {
+            strictly = false;
+            memset(look.done, 0, sizeof look.done);
+            continue;
+        }
+        if (best == INCODE_NONE && strictly)
+            choose_first(h, &look, c0);
+        if (!visit_bricks(m, q, &look))
+            return false;
+        if (best == q->best || best != INCODE_NONE) {
+            if (!split(m, &look, &q->missing))
+                return false;
+            if (look.pages == 0 && best != INCODE_NONE)
+                return true;
+        }
+        if (q->best != best && strictly) {
+            strictly = false;
+            memset(look.done, 0, sizeof look.done);
             incode_search_last(s);
+        }
     }
-    bool whole = q->boxed && incode_neighbours_holds(list, q->lo, q->hi);
-    /* Without a ball of its own, a sphere does not fit. */
-    if (r != INCODE_WALK_DONE || (!whole && (!q->round || q->lens)) ||
-        incode_neighbours_visit(list, &m->walker, q, incode_visit_points,
-                                NULL) != INCODE_WALK_DONE)
-        return false;
-    if (whole)
-        return true;
-    set_walls(wall, list, q->pv, q->scale);
-    if (incode_sphere_fits(wall, &q->sphere))
-        return true;
-    q->done = true;
-    memcpy(q->done_lo, list->box_lo, sizeof q->done_lo);
-    memcpy(q->done_hi, list->box_hi, sizeof q->done_hi);
-    return false;
 }
 
 /* ---- a regular face: along its pencil ---- */
 
 enum {
-    HITS = 64, /* kept at a time */
-    BATCH = 8  /* bricks looked at before the ball is drawn in */
+    HITS = 128, /* kept at a time */
+    BATCH = 8   /* bricks looked at before the ball is drawn in */
 };
 
 /* Points in the ball, and where in the pencil: infinite where they are not
@@ -110,8 +299,9 @@ static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
     q->t = t;
     q->square = square * (1 + 4e-6);
     double far = 2 * pencil->size + __builtin_fabs(t); /* above the radius */
-    q->plane_slack =
-        INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 * q->sphere.pn[0] * far;
+    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 *
+                                              incode_max_norm(q->sphere.pn) *
+                                              far;
     q->round = true;
 }
 
@@ -163,30 +353,6 @@ static void place(struct incode_query *q, const struct incode_pencil *pencil,
     double first = incode_vd_least_of(least);
     if (first < q->t)
         draw_in(q, pencil, first);
-}
-
-/* Draws the ball in to the first of the points of some leaves (context: the
- * pencil); what repeats a brick's last point does no harm. */
-static bool visit_first(struct incode_walker *walker, struct incode_query *q,
-                        const struct incode_frame *frame, uint32_t brick,
-                        uint32_t leaves, void *context)
-{
-    const struct incode_pencil *pencil = context;
-    const struct incode_brick *b = &frame->page.brick;
-    const double *const xyz[3] = {b->x, b->y, b->z};
-    incode_vd least = incode_vd_all(__builtin_inf());
-    (void)brick;
-    *walker->candidates +=
-        (unsigned)__builtin_popcount(leaves) * INCODE_LEAF_POINTS;
-    for (; leaves != 0; leaves &= leaves - 1) {
-        uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
-        for (uint32_t i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES)
-            least = incode_vd_min(places(q, pencil, xyz, slot + i), least);
-    }
-    double first = incode_vd_least_of(least);
-    if (first < q->t)
-        draw_in(q, pencil, first);
-    return true;
 }
 
 /* Whether a hit may be the first, or tie with it. */
@@ -263,84 +429,116 @@ static uint64_t others(const struct incode_query *q,
                    bit_of(q->c, brick) | bit_of(q->best, brick));
 }
 
-/* Looks at some bricks of the list, and draws the query's ball in, which this
- * one holds.  False: one is missing, or too much lies in the ball. */
-static bool look_at(struct incode_make *n, struct incode_query *q,
-                    const struct incode_neighbours_ball *ball,
-                    const uint32_t *index, uint32_t count, struct hits *hits)
+/* The cap of the pencil's sphere at q->t, or of that of a best without a place
+ * there, or of all spheres. */
+static bool pencil_cap(const struct incode_make *n,
+                       const struct incode_query *q,
+                       struct incode_horizon_cap *cap)
 {
-    struct incode_neighbours *list = &n->maker->neighbours;
-    struct incode_pager *pager = &n->maker->pager;
-    uint32_t brick[BATCH], met = 0;
-    uint64_t in[BATCH];
-    n->maker->counts.candidates += (uint64_t)count * INCODE_BRICK_POINTS;
+    const struct incode_horizon *h = &n->maker->horizon;
+    const struct incode_pencil *pencil = &n->pencil;
+    double m[3], t = incode_pencil_later(pencil, q->t);
+    if (!(q->t < __builtin_inf()))
+        return sphere_cap(h, q, cap) || plane_cap(h, q, cap);
+    for (int d = 0; d < 3; d++)
+        m[d] = 2 * pencil->c0[d] + t * pencil->n[d];
+    return incode_horizon_cap(h, cap, q->pv, q->scale, m, 1, pencil->n);
+}
+
+/* Looks at some bricks, and draws the query's ball in.  False: one is missing,
+ * or too much lies in the cap. */
+static bool look_at(struct incode_make *n, struct incode_query *q,
+                    struct look *look, const uint32_t *index, uint32_t count,
+                    struct hits *hits)
+{
     for (uint32_t i = 0; i < count; i++) {
-        brick[met] = list->brick[index[i]];
-        if (list->copy[index[i]] == INCODE_NO_COPY) {
-            const struct incode_frame *f = incode_pager_get(pager, brick[met]);
-            if (f == NULL)
-                return false;
-            incode_neighbours_copy(list, index[i], f);
-        }
-        in[met] = incode_neighbours_points(list, index[i], ball);
-        met += in[met] != 0;
-    }
-    for (uint32_t i = 0; i < met; i++) {
-        const struct incode_frame *f = incode_pager_get(pager, brick[i]);
-        if (f == NULL || !add_hits(n, q, f, in[i] & others(q, f), hits))
+        const struct incode_frame *f;
+        uint64_t in;
+        if (!points_of(n->maker, look, index[i], &in, &f, &q->missing))
+            return false;
+        if (in != 0 && !add_hits(n, q, f, in & others(q, f), hits))
             return false;
     }
     place(q, &n->pencil, hits);
     return true;
 }
 
-/* Looks at the bricks of the list that meet the ball.  Of many, those beside
- * the vertex's own, by number, are near and go first: where they draw the ball
- * in, the rest are chosen again. */
-static bool look_around(struct incode_make *n, struct incode_query *q,
-                        struct hits *hits)
+/* The same for a better one, with the bound that holds for all before it. */
+static bool next_cap(const struct incode_make *n, const struct incode_query *q,
+                     struct look *look)
 {
-    const struct incode_neighbours *list = &n->maker->neighbours;
-    uint32_t index[INCODE_NEIGHBOURS_BRICKS + INCODE_NEIGHBOURS_PADDING];
-    struct incode_neighbours_ball ball;
-    uint32_t count = incode_neighbours_in_ball(list, q, &ball, index);
-    hits->count = hits->placed = 0;
-    while (count > BATCH) {
-        double square = q->square;
-        uint32_t first = 0;
-        while (first + BATCH < count &&
-               list->brick[index[first + BATCH / 2]] < list->centre)
-            first++;
-        if (!look_at(n, q, &ball, index + first, BATCH, hits))
+    struct incode_horizon_cap old = look->cap;
+    if (!pencil_cap(n, q, &look->cap))
+        return false;
+    look->cap.bounded = old.bounded;
+    memcpy(look->cap.g, old.g, sizeof old.g);
+    look->cap.level = old.level;
+    look->cap.slack = old.slack;
+    return true;
+}
+
+/* Looks at the bricks that the ball reaches, near ones first, and draws it in;
+ * *much: by so much that the rest is to be chosen again.  False: one is
+ * missing, or too much lies in the cap. */
+static bool look_at_bricks(struct incode_make *n, struct incode_query *q,
+                           struct look *look, struct hits *hits, bool *much)
+{
+    double square = q->square;
+    uint32_t batch = square < __builtin_inf() ? BATCH : 1;
+    *much = false;
+    for (uint32_t i = 0; i < look->bricks && !*much; i += batch) {
+        uint32_t left = look->bricks - i;
+        double t = q->t;
+        left = left < batch ? left : batch;
+        if (!look_at(n, q, look, look->index + i, left, hits))
             return false;
-        if (q->square > 0.7 * square) {
-            memmove(index + first, index + first + BATCH,
-                    (count - first - BATCH) * sizeof index[0]);
-            count -= BATCH;
-            break;
-        }
-        hits->count = hits->placed = 0;
-        count = incode_neighbours_in_ball(list, q, &ball, index);
-    }
-    for (uint32_t i = 0; i < count; i += BATCH) {
-        uint32_t left = count - i;
-        if (i > 0)
-            incode_neighbours_set_ball(list, q, &ball);
-        if (!look_at(n, q, &ball, index + i, left < BATCH ? left : BATCH, hits))
+        *much = q->square < 0.7 * square && i + left < look->bricks;
+        if (q->t < t && !next_cap(n, q, look))
             return false;
     }
     return true;
 }
 
+/* Looks at all that the ball reaches. */
+static bool look_around(struct incode_make *n, struct incode_query *q,
+                        struct hits *hits)
+{
+    struct incode_maker *m = n->maker;
+    struct look look = {.done = {0}};
+    struct incode_radical_bound radical = {.set = false};
+    float c0[3];
+    bool much;
+    set_middle(n, c0);
+    hits->count = hits->placed = 0;
+    if (!pencil_cap(n, q, &look.cap))
+        return false;
+    for (;;) {
+        bool none = q->best == INCODE_NONE && !(q->t < __builtin_inf());
+        reach(&m->horizon, &look);
+        bound(m, q, &look, &radical);
+        if (look.bricks + look.pages == 0)
+            return true;
+        /* Those who know of half-spaces do better. */
+        if (none && n->doubtful && look.bricks > CROWD)
+            return false;
+        if (none)
+            choose_first(&m->horizon, &look, c0);
+        if (!look_at_bricks(n, q, &look, hits, &much) ||
+            (!much && !split(m, &look, &q->missing)))
+            return false;
+        if (!much && look.pages == 0)
+            return true;
+    }
+}
+
 /* The first of the hits and of the best so far, at t, which does not count if a
- * hit's place is certainly before; false: it is not clearly beyond the face.
- */
-static bool settle(struct incode_make *n, struct incode_query *q, double t,
+ * hit's place is certainly before. */
+static void settle(struct incode_make *n, struct incode_query *q, double t,
                    const struct hits *hits)
 {
     struct incode_tally *tally = &n->maker->counts.tally;
     double last = incode_pencil_later(&n->pencil, q->t);
-    bool placed = t <= last, any = placed;
+    bool any = q->best != INCODE_NONE && t <= last;
     for (uint32_t i = 0; i < hits->count; i++) {
         const double p[3] = {hits->p[0][i], hits->p[1][i], hits->p[2][i]};
         bool beyond = hits->t[i] < __builtin_inf();
@@ -350,17 +548,17 @@ static bool settle(struct incode_make *n, struct incode_query *q, double t,
              incode_in_sphere(tally, n->pv, n->pb, n->pc, q->best_p, p) <= 0))
             continue;
         any = true;
-        placed = beyond;
         q->best = hits->id[i];
         memcpy(q->best_p, p, sizeof q->best_p);
     }
-    return placed;
 }
 
 static void set_query(struct incode_make *n, struct incode_query *q)
 {
     const struct incode_local_points *local = &n->maker->local;
     memcpy(q->pv, n->pv, sizeof q->pv);
+    memcpy(q->pb, n->pb, sizeof q->pb);
+    memcpy(q->pc, n->pc, sizeof q->pc);
     q->question = INCODE_QUERY_APEX;
     q->v = local->vertex;
     q->b = local->id[n->b];
@@ -373,7 +571,7 @@ static void set_query(struct incode_make *n, struct incode_query *q)
     memcpy(q->sphere.n, n->sphere.n, sizeof q->sphere.n);
     memcpy(q->sphere.pn, n->sphere.pn, sizeof q->sphere.pn);
     q->sphere.has_apex = q->large = false;
-    q->t = __builtin_inf();
+    q->t = q->square = __builtin_inf();
 }
 
 static bool search_pencil(struct incode_make *n, struct incode_search *s)
@@ -381,30 +579,28 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     struct incode_maker *m = n->maker;
     struct incode_query *q = &s->query;
     struct hits hits;
-    alignas(64) double wall[8];
-    double at = __builtin_inf();
+    double at = -__builtin_inf();
     set_query(n, q);
-    if (n->best == INCODE_LOCAL_NONE) {
-        double radius = m->local.radius;
-        s->radius = radius > DBL_MIN ? radius : DBL_MIN;
-        if (find_first(m, s, visit_first, &n->pencil) != INCODE_WALK_DONE)
-            return false;
-        draw_in(q, &n->pencil, incode_pencil_later(&n->pencil, q->t));
-    } else {
+    if (n->best != INCODE_LOCAL_NONE) {
         double r[3];
         for (int d = 0; d < 3; d++)
             q->best_p[d] = m->local.p[d][n->best];
         q->best = m->local.id[n->best];
         incode_query_relative(r, q, q->best_p);
-        if (!incode_pencil_place(&n->pencil, r, &at))
-            return false; /* too near the face's plane */
-        draw_in(q, &n->pencil, at);
+        if (incode_pencil_place(&n->pencil, r, &at)) {
+            draw_in(q, &n->pencil, at);
+        } else {
+            if (n->bare)
+                incode_make_sphere(n);
+            if (incode_sphere_is_near_degenerate(&n->sphere))
+                return false;
+            q->sphere = n->sphere;
+        }
     }
-    if (!look_around(n, q, &hits) || !settle(n, q, at, &hits))
+    if (!look_around(n, q, &hits))
         return false;
-    set_walls(wall, &m->neighbours, q->pv, q->scale);
-    return incode_cap_fits(wall, &n->pencil,
-                           incode_pencil_later(&n->pencil, q->t));
+    settle(n, q, at, &hits);
+    return true;
 }
 
 bool incode_apex_around(struct incode_make *n, struct incode_search *s)
@@ -412,11 +608,13 @@ bool incode_apex_around(struct incode_make *n, struct incode_search *s)
     struct incode_maker *m = n->maker;
     uint64_t before = m->counts.candidates;
     bool found = false;
-    if (m->neighbours.count > 0 && n->regular && !n->degenerate.known)
+    if (m->horizon.count > 0 && n->regular && !n->degenerate.known)
         found = search_pencil(n, s);
     if (!found) {
         incode_search_from(n, s);
-        if (m->neighbours.count > 0)
+        /* Of a face of the hull's side, half-spaces tell more. */
+        if (m->horizon.count > 0 &&
+            !(n->degenerate.known && n->best == INCODE_LOCAL_NONE))
             found = search_spheres(n, s);
     }
     s->looked = m->local.near + m->counts.candidates - before;

@@ -59,8 +59,8 @@ bool incode_sphere_fits(const double wall[8], const struct incode_sphere *s)
     if (!(error < 1e-7 * length))
         return false;
     /* Without a good normal, the whole sphere. */
-    if (!(nn > 1e-60) ||
-        !(INCODE_SPHERE_EPS * s->pn[0] < 1e-8 * incode_max_norm(s->n)))
+    if (!(nn > 1e-60) || !(INCODE_SPHERE_EPS * incode_max_norm(s->pn) <
+                           1e-8 * incode_max_norm(s->n)))
         t = unit = 0;
     for (int d = 0; d < 3; d++) {
         centre[d] = s->m[d] * half;

@@ -54,7 +54,7 @@ static enum incode_outcome copy_around_leaf(struct incode_maker *m,
     double radius = first_radius(m, lo, hi);
     for (int tries = 0;; tries++) {
         enum incode_local_outcome r =
-            incode_local_around(local, &m->walker, &m->neighbours,
+            incode_local_around(local, &m->walker, &m->horizon,
                                 v / INCODE_LEAF_POINTS, lo, hi, radius);
         s->page = local->query.missing;
         if (r == INCODE_LOCAL_WAIT)
@@ -66,10 +66,7 @@ static enum incode_outcome copy_around_leaf(struct incode_maker *m,
     }
 }
 
-enum {
-    NEIGHBOURS_WANTED = 64, /* bricks, at least */
-    NEIGHBOURS_TRIES = 12
-};
+enum { HORIZON_TRIES = 12 };
 
 /* Lists the bricks around that of a vertex: more of them where there are few,
  * none where there are too many whatever the box. */
@@ -77,12 +74,12 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
                                        struct incode_search *s, uint32_t brick,
                                        const struct incode_frame *f)
 {
-    struct incode_neighbours *list = &m->neighbours;
+    struct incode_horizon *h = &m->horizon;
     double lo[3], hi[3];
     bool full = false;
     incode_frame_box(f, lo, hi);
     double extent = longest_side(lo, hi);
-    for (int tries = 0; tries < NEIGHBOURS_TRIES; tries++) {
+    for (int tries = 0; tries < HORIZON_TRIES; tries++) {
         double radius = extent * m->reach, around_lo[3], around_hi[3];
         bool all = true;
         for (int d = 0; d < 3; d++) {
@@ -90,24 +87,24 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
             around_hi[d] = hi[d] + radius;
             all = all && around_lo[d] <= m->lo[d] && around_hi[d] >= m->hi[d];
         }
-        enum incode_listed r = incode_neighbours_make(
-            list, &m->walker, brick, around_lo, around_hi, &s->page);
-        if (r == INCODE_LIST_WAIT)
+        enum incode_horizon_made r = incode_horizon_make(
+            h, &m->walker, brick, around_lo, around_hi, &s->page);
+        if (r == INCODE_HORIZON_WAIT)
             return INCODE_WAIT;
-        if (r == INCODE_LISTED &&
-            (full || all || list->count >= NEIGHBOURS_WANTED))
+        if (r == INCODE_HORIZON_MADE &&
+            (full || all || h->count >= incode_horizon_near(h) / 3))
             break;
-        full = full || r == INCODE_LIST_FULL;
+        full = full || r == INCODE_HORIZON_FULL;
         m->reach *= full ? 0.75 : 1.25;
         m->reach = m->reach < 0x1p-10  ? 0x1p-10
                    : m->reach > 0x1p10 ? 0x1p10
                                        : m->reach;
     }
     for (int d = 0; d < 3; d++) {
-        if (list->box_lo[d] <= m->lo[d])
-            list->box_lo[d] = -__builtin_inf();
-        if (list->box_hi[d] >= m->hi[d])
-            list->box_hi[d] = __builtin_inf();
+        if (h->box_lo[d] <= m->lo[d])
+            h->box_lo[d] = -__builtin_inf();
+        if (h->box_hi[d] >= m->hi[d])
+            h->box_hi[d] = __builtin_inf();
     }
     return INCODE_OK;
 }
@@ -126,7 +123,7 @@ enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
         m->fault = INCODE_NO_VERTEX;
         return INCODE_WAIT;
     }
-    if (m->neighbours.centre != brick &&
+    if (m->horizon.centre != brick &&
         list_bricks(m, s, brick, f) == INCODE_WAIT)
         return INCODE_WAIT;
     if (local->leaf != v / INCODE_LEAF_POINTS &&

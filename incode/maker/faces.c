@@ -103,7 +103,7 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
     s->stage = INCODE_SEARCH_NONE;
     if (q->question == INCODE_QUERY_HALF_SPACE)
         return INCODE_MORE; /* the face is tried again with it */
-    incode_search_learn(m, q);
+    incode_search_learn(m, q, s->looked);
     if (q->best != INCODE_NONE)
         set_answer(a, m, near[0], near[1], (uint16_t)apex);
     else
@@ -116,7 +116,7 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
 static bool is_at_hand(const struct incode_maker *m, uint32_t v)
 {
     return m->local.vertex == v && m->local.leaf == v / INCODE_LEAF_POINTS &&
-           m->neighbours.centre == v / INCODE_BRICK_POINTS;
+           m->horizon.centre == v / INCODE_BRICK_POINTS;
 }
 
 static enum incode_outcome answer_near(struct incode_maker *m, unsigned slot,

@@ -56,7 +56,7 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
 enum incode_local_outcome
 incode_local_around(struct incode_local_points *local,
                     struct incode_walker *walker,
-                    const struct incode_neighbours *neighbours, uint32_t leaf,
+                    const struct incode_horizon *horizon, uint32_t leaf,
                     const double lo[3], const double hi[3], double radius)
 {
     struct incode_query *q = &local->query;
@@ -72,8 +72,8 @@ incode_local_around(struct incode_local_points *local,
         q->hi[d] = local->around_hi[d] = hi[d] + radius;
     }
     enum incode_walk r =
-        incode_neighbours_holds(neighbours, q->lo, q->hi)
-            ? incode_neighbours_visit(neighbours, walker, q, copy_leaves, local)
+        incode_horizon_holds(horizon, q->lo, q->hi)
+            ? incode_horizon_box(horizon, walker, q, copy_leaves, local)
             : incode_walk(walker, q, copy_leaves, local);
     local->count = local->around;
     local->per_unit = 0;

@@ -8,7 +8,7 @@
  * time in single precision, and leaves what its error bound cannot tell to the
  * exact predicates.
  *
- *     incode_local_around(&local, &walker, &neighbours, leaf, lo, hi, radius);
+ *     incode_local_around(&local, &walker, &horizon, leaf, lo, hi, radius);
  *     incode_local_centre(&local, v, p, radius, lo, hi);
  *     count = incode_local_first(&local, &pencil, &t, out);   // by distance
  *     count = incode_local_inside(&local, &sphere, out);
@@ -19,7 +19,7 @@
 #include <stdalign.h>
 #include <stdint.h>
 
-#include "neighbours.h"
+#include "horizon.h"
 
 enum {
     INCODE_AROUND_POINTS = 768, /* around a leaf */
@@ -75,7 +75,7 @@ void incode_local_reset(struct incode_local_points *local);
 enum incode_local_outcome
 incode_local_around(struct incode_local_points *local,
                     struct incode_walker *walker,
-                    const struct incode_neighbours *neighbours, uint32_t leaf,
+                    const struct incode_horizon *horizon, uint32_t leaf,
                     const double lo[3], const double hi[3], double radius);
 
 /* Selects the points of the box of half-width radius, at most that of the

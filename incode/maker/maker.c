@@ -9,24 +9,22 @@ enum { LOOKAHEAD_MAX = 48 /* bricks */ };
 
 /* ---- memory ---- */
 
-static size_t copies_bytes(uint32_t copies)
+static size_t horizon_bytes(const struct incode_maker_share *share)
 {
-    const struct incode_neighbours *list = NULL;
-    static_assert(sizeof *list->point % alignof(struct incode_frame) == 0,
-                  "frames behind the copies stay aligned");
-    return copies * sizeof *list->point;
+    return incode_horizon_bytes(share->boxes, share->copies);
 }
 
 size_t incode_maker_bytes(const struct incode_maker_share *share)
 {
-    return copies_bytes(share->copies) + incode_pager_bytes(share->frames);
+    return horizon_bytes(share) + incode_pager_bytes(share->frames);
 }
 
-uint32_t incode_maker_frames(uint32_t copies, size_t bytes)
+uint32_t incode_maker_frames(const struct incode_maker_share *share,
+                             size_t bytes)
 {
-    if (bytes < copies_bytes(copies))
+    if (bytes < horizon_bytes(share))
         return 0;
-    bytes -= copies_bytes(copies);
+    bytes -= horizon_bytes(share);
     size_t most = bytes / sizeof(struct incode_frame);
     uint32_t frames =
         most > INCODE_FRAMES_MAX ? INCODE_FRAMES_MAX : (uint32_t)most;
@@ -48,19 +46,14 @@ void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_points *points,
                        const struct incode_page_source *source)
 {
-    INCODE_ASSERT(share->copies >= INCODE_COPIES_MIN &&
-                  share->copies <= INCODE_NEIGHBOURS_COPIES &&
-                  share->frames >= INCODE_FRAMES_MIN && points->bricks > 0);
+    INCODE_ASSERT(share->frames >= INCODE_FRAMES_MIN && points->bricks > 0);
     memset(m, 0, sizeof *m);
     m->index = points->index;
     memcpy(m->lo, points->lo, sizeof m->lo);
     memcpy(m->hi, points->hi, sizeof m->hi);
     memcpy(m->cells, points->cells, sizeof m->cells);
-    m->neighbours.centre = INCODE_NONE;
-    m->neighbours.point = memory;
-    m->neighbours.room = share->copies;
-    incode_pager_init(&m->pager,
-                      (uint8_t *)memory + copies_bytes(share->copies),
+    incode_horizon_init(&m->horizon, memory, share->boxes, share->copies);
+    incode_pager_init(&m->pager, (uint8_t *)memory + horizon_bytes(share),
                       share->frames, points->bricks);
     m->pager.source = *source;
     m->pager.shuffle = points->shuffle_seed;

@@ -33,8 +33,6 @@ enum {
     INCODE_SEARCHES = 16, /* suspended at a time */
     INCODE_HULL_PLANES = 8,
     INCODE_HALF_SPACES = 8,
-    INCODE_COPIES_MIN = 16, /* of neighbour bricks; no more than
-                               INCODE_NEIGHBOURS_COPIES */
     INCODE_FRAMES_MIN = 48, /* a search needs no more at once */
     INCODE_FRAMES_MAX = INCODE_NO_FRAME - 1
 };
@@ -121,14 +119,14 @@ struct incode_maker {
     struct incode_maker_counts counts;
     const char *fault; /* NULL, or a static string */
     double spread;     /* radius of the local points, in the leaf's extent */
-    double reach;      /* of the neighbours, in the brick's extent */
+    double reach;      /* of the horizon, in the brick's extent */
     struct incode_search search[INCODE_SEARCHES];
     struct incode_hull_plane planes[INCODE_HULL_PLANES];
     uint32_t plane_count, plane_next;
     struct incode_half_space half_spaces[INCODE_HALF_SPACES];
     uint32_t half_space_count, half_space_next;
     struct incode_empty_spheres empty;
-    struct incode_neighbours neighbours;
+    struct incode_horizon horizon;
     struct incode_local_points local;
 };
 
@@ -136,15 +134,17 @@ struct incode_maker {
 
 /* What a maker is given beside its struct. */
 struct incode_maker_share {
-    uint32_t copies; /* INCODE_COPIES_MIN to INCODE_NEIGHBOURS_COPIES */
-    uint32_t frames; /* INCODE_FRAMES_MIN to INCODE_FRAMES_MAX */
+    uint32_t boxes, copies; /* of the horizon: incode_horizon_init */
+    uint32_t frames;        /* INCODE_FRAMES_MIN to INCODE_FRAMES_MAX */
 };
 
 /* Bytes of such a share. */
 size_t incode_maker_bytes(const struct incode_maker_share *share);
 
-/* The most frames that fit in so many bytes beside so many copies; 0: none. */
-uint32_t incode_maker_frames(uint32_t copies, size_t bytes);
+/* The most frames that fit in so many bytes beside the rest of a share; 0:
+ * none. */
+uint32_t incode_maker_frames(const struct incode_maker_share *share,
+                             size_t bytes);
 
 /* memory: aligned to 64 bytes, incode_maker_bytes of the share. */
 void incode_maker_init(struct incode_maker *m, void *memory,

@@ -1,6 +1,7 @@
 #include "query.h"
 
 #include <float.h>
+#include <stdalign.h>
 #include <string.h>
 
 #include "incode/predicates/check.h"
@@ -400,6 +401,60 @@ static uint64_t brick_end(uint32_t level, uint64_t index)
     return (index + 1) << (5 * level);
 }
 
+/* ---- which lifted boxes a question concerns ---- */
+
+/* A lower bound of det |r|^2 - m . r over a lifted box (incode/pages/boxes.h),
+ * less what rounding and the errors of det and m may do; of the plane where
+ * there is no sphere.  Not a number where something overflows. */
+static double least_value(const struct incode_query *q,
+                          const struct incode_boxes *page,
+                          const struct incode_lifted *lifted)
+{
+    const struct incode_sphere *s = &q->sphere;
+    const double *m = s->has_apex ? s->m : s->n;
+    const double *pm = s->has_apex ? s->pm : s->pn;
+    double det = s->has_apex ? s->det - INCODE_SPHERE_EPS * s->pdet : 0;
+    double unit = page->unit * q->scale, square = unit * unit;
+    double g[3], value, error = 0, steep = 0;
+    det = det > 0 ? det : 0; /* less holds more */
+    value = det * square * lifted->lid;
+    for (int d = 0; d < 3; d++) {
+        double at = (page->origin[d] - q->pv[d]) * q->scale;
+        double y = at + unit * lifted->o[d];
+        double far = __builtin_fabs(at) + 4 * unit;
+        value += (det * y - m[d]) * y;
+        g[d] = 2 * det * y - m[d];
+        error += (pm[d] + __builtin_fabs(m[d]) + 4 * det * far) * far;
+        steep += __builtin_fabs(g[d]);
+    }
+    for (int k = 0; k < 3; k++)
+        value -= __builtin_fabs(incode_dot(g, lifted->a[k]) * unit +
+                                det * square * lifted->slope[k]);
+    return value - 8 * INCODE_SPHERE_EPS * error - INCODE_SPHERE_TINY -
+           steep * unit * lifted->radius * 0x1p-19;
+}
+
+/* Whether a child's lifted box may hold what an APEX query looks for. */
+static bool may_reach(const struct incode_query *q,
+                      const struct incode_boxes *page, unsigned child)
+{
+    struct incode_lifted lifted;
+    return q->question != INCODE_QUERY_APEX ||
+           !incode_boxes_lifted(page, child, &lifted) ||
+           !(least_value(q, page, &lifted) > 0);
+}
+
+/* Its own frame of the stack: the boxes are not needed farther down. */
+static __attribute__((noinline)) uint32_t
+passing_children(const struct incode_query *q, const struct incode_boxes *page,
+                 unsigned count)
+{
+    alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
+    struct boxes boxes = {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
+    incode_boxes_axes(page, lo, hi);
+    return passing(q, &boxes, count);
+}
+
 static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
                                 const struct incode_frame *frame)
 {
@@ -408,12 +463,7 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
     uint32_t count = tree->count[level - 1] - first;
     if (count > INCODE_FANOUT)
         count = INCODE_FANOUT;
-    struct boxes boxes;
-    for (int d = 0; d < 3; d++) {
-        boxes.lo[d] = frame->page.boxes.lo[d];
-        boxes.hi[d] = frame->page.boxes.hi[d];
-    }
-    uint32_t mask = passing(w->q, &boxes, count);
+    uint32_t mask = passing_children(w->q, &frame->page.boxes, count);
     if (level == 1 && w->q->boxes_only)
         return mask == 0 ||
                        w->visit(w->walker, w->q, frame, first, mask, w->context)
@@ -424,6 +474,10 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
         uint64_t end = brick_end(level - 1, (uint64_t)first + child);
         if (end <= w->q->cursor)
             continue;
+        if (!may_reach(w->q, &frame->page.boxes, child)) {
+            w->q->cursor = end > UINT32_MAX ? UINT32_MAX : (uint32_t)end;
+            continue;
+        }
         uint32_t page = tree->base[level - 1] + first + child;
         if (w->q->pauses && w->visited && w->walker->left == 0) {
             w->q->missing = INCODE_NONE;

@@ -51,8 +51,7 @@ void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
         m->plane_count++;
 }
 
-/* Remembers a certified hull facet, if some local point is below it. */
-static void remember_plane(struct incode_maker *m, const struct incode_query *q)
+void incode_hull_learn(struct incode_maker *m, const struct incode_query *q)
 {
     const struct incode_local_points *local = &m->local;
     for (uint32_t i = 0; i < local->count; i++) {
@@ -123,12 +122,13 @@ void incode_count_candidates(struct incode_maker *m, uint64_t looked)
     m->counts.histogram[half < last ? half : last]++;
 }
 
-/* Where many points were looked at, the sphere found helps the next search. */
-void incode_search_learn(struct incode_maker *m, const struct incode_query *q)
+enum { MANY = 1024 /* points */ };
+
+void incode_search_learn(struct incode_maker *m, const struct incode_query *q,
+                         uint64_t looked)
 {
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
-    if (q->best != INCODE_NONE && q->shrinking &&
-        q->looked >= INCODE_QUERY_CROWD)
+    if (q->best != INCODE_NONE && looked >= MANY)
         incode_empty_spheres_add(&m->empty, p, q->scale);
 }
 
@@ -161,7 +161,7 @@ enum incode_outcome incode_search_run(struct incode_maker *m,
         if (s->final) {
             incode_count_candidates(m, s->looked);
             if (q->best == INCODE_NONE)
-                remember_plane(m, q);
+                incode_hull_learn(m, q);
             return INCODE_OK;
         }
         if (q->best != INCODE_NONE || !q->boxed) {

@@ -36,8 +36,10 @@ void incode_search_box(struct incode_maker *m, struct incode_search *s);
  * every point if there is none. */
 void incode_search_last(struct incode_search *s);
 
-/* Learns from the search of the apex of an open face that is over. */
-void incode_search_learn(struct incode_maker *m, const struct incode_query *q);
+/* Learns from the search of the apex of an open face that is over: where many
+ * points were looked at, the sphere found helps the next ones. */
+void incode_search_learn(struct incode_maker *m, const struct incode_query *q,
+                         uint64_t looked);
 
 /* Whether the face lies on a hull plane already certified, facing out. */
 bool incode_hull_known(struct incode_maker *m, const double pv[3],
@@ -46,6 +48,9 @@ bool incode_hull_known(struct incode_maker *m, const double pv[3],
 /* Remembers a hull facet; below: a point strictly on its known side. */
 void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
                           const double below[3]);
+
+/* The same for a hull facet that was searched, if some local point is below. */
+void incode_hull_learn(struct incode_maker *m, const struct incode_query *q);
 
 /* The coordinates of a vertex; false: *page is missing. */
 bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],

@@ -70,11 +70,58 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
     f->det = incode_dd_dot(ra.d, n.d);
 }
 
+/* ---- bounds of each component ---- */
+
+static void relative(double r[3], const double p[3], const double v[3],
+                     double scale)
+{
+    for (int d = 0; d < 3; d++)
+        r[d] = (p[d] - v[d]) * scale;
+}
+
+/* Of the components of a cross product: the sum of its two products. */
+static void cross_bound(double out[3], const double a[3], const double b[3])
+{
+    for (int d = 0; d < 3; d++) {
+        int j = (d + 1) % 3, k = (d + 2) % 3;
+        out[d] = __builtin_fabs(a[j] * b[k]) + __builtin_fabs(a[k] * b[j]);
+    }
+}
+
+/* Bounds that tell the axes apart: where these have different scales, the
+ * maximum norms are far too much. */
+static void sharpen(struct incode_sphere *s, const double b[3],
+                    const double c[3], const double *a)
+{
+    double bc[3], ca[3], ab[3];
+    cross_bound(bc, b, c);
+    if (a == NULL) {
+        for (int d = 0; d < 3; d++)
+            s->pn[d] = bc[d] + LOST;
+        return;
+    }
+    double aa = incode_dot(a, a), lost = LOST * (1 + s->bb + s->cc + aa);
+    cross_bound(ca, c, a);
+    cross_bound(ab, a, b);
+    for (int d = 0; d < 3; d++)
+        s->pm[d] = s->bb * ca[d] + s->cc * ab[d] + aa * bc[d] + lost;
+    s->pdet = incode_absolute_dot(bc, a) + LOST * (1 + incode_max_norm(a));
+}
+
 void incode_sphere_refine(struct incode_sphere *s, const double v[3],
                           const double b[3], const double c[3], const double *a,
                           double scale)
 {
     struct incode_fine fine;
+    double rb[3], rc[3], ra[3];
+    relative(rb, b, v, scale);
+    relative(rc, c, v, scale);
+    if (a != NULL)
+        relative(ra, a, v, scale);
+    sharpen(s, rb, rc, a == NULL ? NULL : ra);
+    if (!(a == NULL ? incode_plane_is_ill_conditioned(s)
+                    : incode_sphere_is_ill_conditioned(s)))
+        return;
     incode_sphere_fine(&fine, v, b, c, a, scale);
     for (int k = 0; k < 3; k++) {
         s->n[k] = fine.n[k].hi;

@@ -104,14 +104,14 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
 static inline bool
 incode_plane_is_ill_conditioned(const struct incode_sphere *s)
 {
-    return s->pn[0] > 1024 * incode_max_norm(s->n);
+    return incode_max_norm(s->pn) > 1024 * incode_max_norm(s->n);
 }
 
 static inline bool
 incode_sphere_is_ill_conditioned(const struct incode_sphere *s)
 {
     double det = __builtin_fabs(s->det), m = incode_max_norm(s->m);
-    return s->pdet > 1024 * det || s->pm[0] > 1024 * m;
+    return s->pdet > 1024 * det || incode_max_norm(s->pm) > 1024 * m;
 }
 
 /* So ill-conditioned, or so much larger than its face, that it tells nothing of
@@ -135,9 +135,10 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
                         const double b[3], const double c[3], const double *a,
                         double scale);
 
-/* Computes them again from absolute coordinates in twice the precision, so that
- * only the evaluation's own rounding is left in the bounds.  a: NULL for the
- * plane alone. */
+/* Sharpens the bounds of an ill-conditioned plane or sphere; where that is not
+ * enough, computes it again from absolute coordinates in twice the precision,
+ * so that only the evaluation's own rounding is left in the bounds.  a: NULL
+ * for the plane alone. */
 void incode_sphere_refine(struct incode_sphere *s, const double v[3],
                           const double b[3], const double c[3], const double *a,
                           double scale);

@@ -270,6 +270,19 @@ INCODE_INLINE incode_vf incode_vf_max(incode_vf a, incode_vf b)
 #endif
 }
 
+INCODE_INLINE incode_vf incode_vf_min(incode_vf a, incode_vf b)
+{
+#if defined(INCODE_AVX512)
+    return (incode_vf)_mm512_min_ps((__m512)a, (__m512)b);
+#elif defined(INCODE_AVX2)
+    return (incode_vf)_mm256_min_ps((__m256)a, (__m256)b);
+#elif defined(INCODE_SSE2)
+    return (incode_vf)_mm_min_ps((__m128)a, (__m128)b);
+#else
+    return incode_vf_select(a < b, a, b);
+#endif
+}
+
 INCODE_INLINE float incode_vf_least_of(incode_vf a)
 {
 #ifdef INCODE_AVX512

@@ -123,7 +123,7 @@ static void open_bench(struct bench *b, const struct host_points *set,
     memcpy(points.lo, order->lo, sizeof points.lo);
     memcpy(points.hi, order->hi, sizeof points.hi);
     memcpy(points.cells, order->cells, sizeof points.cells);
-    const struct incode_maker_share share = {INCODE_COPIES_MIN, frames};
+    const struct incode_maker_share share = {INCODE_HORIZON_MIN, 16, frames};
     const struct incode_page_source source = {b, request};
     b->bytes = incode_maker_bytes(&share);
     b->memory = aligned_alloc(64, (b->bytes + GUARD + 63) / 64 * 64);
@@ -378,10 +378,11 @@ static void memory(void **unused)
 {
     (void)unused;
     for (size_t bytes = 0; bytes < 3 << 20; bytes += 12345) {
-        for (uint32_t copies = INCODE_COPIES_MIN;
-             copies <= INCODE_NEIGHBOURS_COPIES; copies += 8) {
-            struct incode_maker_share share = {
-                copies, incode_maker_frames(copies, bytes)};
+        for (uint32_t copies = 16; copies <= INCODE_HORIZON_COPIES;
+             copies += 8) {
+            struct incode_maker_share share = {128 + 64 * (copies / 8 % 4),
+                                               copies, 0};
+            share.frames = incode_maker_frames(&share, bytes);
             if (share.frames > 0)
                 assert_true(incode_maker_bytes(&share) <= bytes);
             share.frames++;

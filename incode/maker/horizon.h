@@ -1,0 +1,160 @@
+/* The whole set as it looks from one brick: what is near brick by brick, what
+ * is farther off in boxes of the tree, split where searches come to look into
+ * them.  Most searches beyond the local points end here, without a walk, in one
+ * pass over the boxes, many at a time, and read the points themselves only
+ * where they matter.
+ *
+ * A search asks for what may lie in a cap: beyond the face and inside a sphere
+ * through it, as D |y|^2 - M . y < 0 relative to the face's vertex.  So spheres
+ * of any size, planes among them, keep their precision near the vertex.
+ *
+ * Memory: 106 bytes a box, for 128 to 320 of them, and 768 a copied brick,
+ * given by its owner.  Work: a brick's horizon is made by a walk over the box
+ * pages around it; a search looks at every box, and at the points of those
+ * bricks that it cannot rule out.
+ *
+ *     incode_horizon_make(&h, &walker, brick, lo, hi, &missing);
+ *     incode_horizon_cap(&h, &cap, pv, scale, m, det, n);
+ *     count = incode_horizon_reached(&h, &cap, index);
+ */
+#ifndef INCODE_HORIZON_H
+#define INCODE_HORIZON_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "query.h"
+
+enum {
+    INCODE_HORIZON_MIN = 128, /* boxes */
+    INCODE_HORIZON_MAX = 320, /* both multiples of 64 */
+    INCODE_HORIZON_PADDING = 16,
+    INCODE_HORIZON_COPIES = 128, /* at most */
+    INCODE_NO_COPY = 0xff
+};
+
+/* Boxes along the axes and lifted ones (incode/pages/boxes.h) in the horizon's
+ * units; the numbers of all boxes stand together. */
+struct incode_horizon {
+    float *lo[3], *hi[3]; /* rounded outward */
+    float *o[3], *a[3][3], *slope[3];
+    float *lid;     /* -inf: it is not lifted */
+    float *far;     /* coordinates are below */
+    float *doubt;   /* of a lifted box */
+    uint32_t *page; /* of the tree */
+    uint32_t *left; /* of a box page: the children that have no box of their own
+                       here */
+    uint8_t *level; /* of the page; 0: a brick */
+    uint8_t *copy;  /* of a brick's points, or INCODE_NO_COPY */
+    uint32_t boxes; /* room for so many, a multiple of 64 */
+    uint32_t count;
+    uint32_t near;   /* so many from the start; the rest is split off later */
+    uint32_t centre; /* brick, or INCODE_NONE */
+    uint32_t self;   /* its index */
+    double origin[3], scale;
+    double box_lo[3], box_hi[3]; /* bricks that meet this box are listed */
+    /* The points of some of the bricks, in the boxes' units. */
+    float (*point)[3][INCODE_BRICK_POINTS];
+    uint32_t room; /* for so many of them, up to INCODE_HORIZON_COPIES */
+    uint32_t next; /* copy to be given away */
+    uint16_t owner[INCODE_HORIZON_COPIES];
+};
+
+/* Bytes of so many boxes and copies, a multiple of 64. */
+size_t incode_horizon_bytes(uint32_t boxes, uint32_t copies);
+
+/* memory: so many bytes, aligned to 64.  boxes: INCODE_HORIZON_MIN to
+ * INCODE_HORIZON_MAX, a multiple of 64; copies: 1 to INCODE_HORIZON_COPIES. */
+void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
+                         uint32_t copies);
+
+/* Boxes that are listed from the start, at most; the others are for splitting.
+ */
+static inline uint32_t incode_horizon_near(const struct incode_horizon *h)
+{
+    return h->boxes / 8 * 5;
+}
+
+/* What is beyond a face and inside a sphere: D |y|^2 - M . y < 0 < n . y, with
+ * y = x - v in the horizon's units. */
+struct incode_horizon_cap {
+    float d, m[3], v[3], n[3];
+    float peak[3];     /* M / 2 D, where the least value is */
+    float m_sum, near; /* the sums of the components of M and v */
+    /* Where it is bounded: g . y > level + slack far is outside, too. */
+    bool bounded;
+    float g[3], level, slack;
+};
+
+enum incode_horizon_made {
+    INCODE_HORIZON_MADE,
+    INCODE_HORIZON_WAIT, /* for page *missing */
+    INCODE_HORIZON_FULL  /* too many bricks: the horizon is empty */
+};
+
+/* Makes the horizon of a brick; bricks that meet the box lo..hi are listed one
+ * by one. */
+enum incode_horizon_made incode_horizon_make(struct incode_horizon *h,
+                                             struct incode_walker *walker,
+                                             uint32_t brick, const double lo[3],
+                                             const double hi[3],
+                                             uint32_t *missing);
+
+/* The cap of the sphere det |r|^2 = m . r beyond the plane n . r = 0, with r =
+ * (x - pv) scale; det >= 0, of a half-space 0.  False: it is out of the range
+ * of single precision. */
+bool incode_horizon_cap(const struct incode_horizon *h,
+                        struct incode_horizon_cap *cap, const double pv[3],
+                        double scale, const double m[3], double det,
+                        const double n[3]);
+
+/* Bounds a cap by a radical plane (empty_spheres.h), for r as above. */
+void incode_horizon_bound(const struct incode_horizon *h,
+                          struct incode_horizon_cap *cap, double scale,
+                          const struct incode_radical_bound *radical);
+
+/* Indices of the boxes in which points may lie in the cap, bricks and pages,
+ * but for those of `done` (one bit each); returns how many.  Room for a vector
+ * more is needed. */
+uint32_t incode_horizon_reached(
+    const struct incode_horizon *h, const struct incode_horizon_cap *cap,
+    const uint64_t done[INCODE_HORIZON_MAX / 64],
+    uint32_t index[INCODE_HORIZON_MAX + INCODE_HORIZON_PADDING]);
+
+/* Looks into a box page: gives boxes of their own to those of its children that
+ * the cap reaches.  INCODE_HORIZON_WAIT: the page is missing;
+ * INCODE_HORIZON_FULL: there is no room for them. */
+enum incode_horizon_made
+incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
+                     uint32_t index, const struct incode_horizon_cap *cap,
+                     uint32_t *missing);
+
+/* Copies the points of a brick, which is in the frame; the oldest copy gives
+ * way. */
+void incode_horizon_copy(struct incode_horizon *h, uint32_t index,
+                         const struct incode_frame *frame);
+
+/* The points of a brick that has been copied, one bit each, that are not
+ * certainly outside the cap's sphere: all are looked at, without a branch on
+ * where they are.  The bits past the brick's last point mean nothing. */
+uint64_t incode_horizon_points(const struct incode_horizon *h, uint32_t index,
+                               const struct incode_horizon_cap *cap);
+
+/* Visits the leaves of listed bricks that meet the box of a query, which lies
+ * in the horizon's.  INCODE_WALK_WAIT: query.missing is not there. */
+enum incode_walk incode_horizon_box(const struct incode_horizon *h,
+                                    struct incode_walker *walker,
+                                    struct incode_query *q, incode_visit *visit,
+                                    void *context);
+
+/* Whether all bricks that meet a box are listed. */
+static inline bool incode_horizon_holds(const struct incode_horizon *h,
+                                        const double lo[3], const double hi[3])
+{
+    bool holds = true;
+    for (int d = 0; d < 3; d++)
+        holds = holds && lo[d] >= h->box_lo[d] && hi[d] <= h->box_hi[d];
+    return holds;
+}
+
+#endif
