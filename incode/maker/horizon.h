@@ -15,7 +15,7 @@
  *
  *     incode_horizon_make(&h, &walker, brick, lo, hi, &missing);
  *     incode_horizon_cap(&h, &cap, pv, scale, m, det, n);
- *     count = incode_horizon_reached(&h, &cap, index);
+ *     count = incode_horizon_reached(&h, &cap, done, index);
  */
 #ifndef INCODE_HORIZON_H
 #define INCODE_HORIZON_H
