@@ -32,6 +32,18 @@ static void mark(const struct scene *s, const struct reached *r, bool full,
     }
 }
 
+/* No coordinate in a box is beyond its farness, of which errors are parts. */
+static void check_far(const struct incode_horizon *h)
+{
+    for (uint32_t i = 0; i < h->count; i++) {
+        for (int d = 0; d < 3; d++) {
+            assert_true(h->lo[d][i] <= h->hi[d][i]);
+            assert_true(-h->lo[d][i] <= h->far[i]);
+            assert_true(h->hi[d][i] <= h->far[i]);
+        }
+    }
+}
+
 /* in: the points of each brick that are in the cap, one bit each.  False: there
  * was no room to look into all pages. */
 static bool check_cap(struct scene *s, const struct incode_horizon_cap *cap,
@@ -44,6 +56,7 @@ static bool check_cap(struct scene *s, const struct incode_horizon_cap *cap,
     assert_non_null(where);
     r.count = incode_horizon_reached(s->h, cap, none, r.index);
     assert_true(r.count <= s->h->count);
+    check_far(s->h);
     mark(s, &r, full, where);
     for (uint32_t b = 0; b < s->order.bricks; b++) {
         if (in[b] == 0)
@@ -312,11 +325,38 @@ static void no_point_is_lost_where_it_is_full(void **unused)
     assert_true(tried.full > 0 && tried.full < tried.caps);
 }
 
+/* Planes through the horizon, of sets in which most is beyond all bounds. */
+static void half_spaces_hold_what_is_far(void **unused)
+{
+    (void)unused;
+    struct scene s;
+    open_scene(&s, all_scales, 2000);
+    uint64_t *in = malloc(s.order.bricks * sizeof *in);
+    assert_non_null(in);
+    for (int i = 0; i < 100; i++) {
+        struct incode_horizon_cap cap;
+        struct ball q;
+        if (i % 5 == 0)
+            make_horizon(&s, below(s.order.bricks), 0.5);
+        draw_ball(&s, &q);
+        q.det = 0;
+        memcpy(q.n, q.m, sizeof q.n);
+        if (!incode_horizon_cap(s.h, &cap, q.v, q.scale, q.m, 0, q.n))
+            continue;
+        for (uint32_t b = 0; b < s.order.bricks; b++)
+            in[b] = points_of_ball(&s, &q, b);
+        assert_true(check_cap(&s, &cap, in, "half-spaces"));
+    }
+    free(in);
+    close_scene(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_point_is_lost),
         cmocka_unit_test(no_point_is_lost_where_it_is_full),
+        cmocka_unit_test(half_spaces_hold_what_is_far),
     };
     return cmocka_run_group_tests_name("horizon", tests, NULL, NULL);
 }

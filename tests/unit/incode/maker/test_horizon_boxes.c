@@ -233,8 +233,8 @@ static void a_cap_beside_a_surface_reaches_little(void **unused)
     (void)unused;
     static const struct {
         double radius, side, most; /* twice what was counted */
-    } balls[] = {{0.01, 1, 2.1}, {0.5, 1, 12}, {0.98, 1, 17},
-                 {0.5, -1, 6},   {10, -1, 8},  {1000, -1, 8}};
+    } balls[] = {{0.01, 1, 2.1}, {0.5, 1, 11},   {0.9, 1, 15},    {0.98, 1, 17},
+                 {0.5, -1, 6.1}, {10, -1, 10.4}, {1000, -1, 10.3}};
     struct scene s;
     open_scene(&s, sphere, 4096);
     for (size_t i = 0; i < sizeof balls / sizeof *balls; i++) {

@@ -112,7 +112,8 @@ static bool holds(double value, double bound)
 
 /* ---- faces and points ---- */
 
-/* Returns how much smaller the sphere's bound becomes. */
+/* Returns how much smaller the sphere's bound becomes without twice the
+ * precision, which leaves no more of a bound than the value. */
 static double check(double p[POINTS][3])
 {
     struct incode_sphere s;
@@ -136,12 +137,13 @@ static double check(double p[POINTS][3])
     incode_sphere_refine(&s, p[0], p[1], p[2], p[3], scale);
     double after = incode_sphere_error(&s, r[4]);
     assert_true(holds(incode_sphere_value(&s, r[4]), after));
-    return before / after;
+    assert_true(after < before * 1.01);
+    return s.pdet > 1.01 * fabs(s.det) ? before / after : 1;
 }
 
 /* Points of all kinds: drawn freely, or close to the face's vertices and to
- * each other.  Returns the share of the former whose bounds become much
- * smaller. */
+ * each other, the last now and then far off.  Returns the share of the former
+ * whose bounds become much smaller. */
 static double check_scales(const double axis[3], double offset)
 {
     enum { TRIES = 1500 };
@@ -154,11 +156,12 @@ static double check_scales(const double axis[3], double offset)
                               ? even()
                               : p[0][d] + even() * bend +
                                     (p[i - 2][d] - p[0][d]) * (tries % 3 - 1);
+        for (int d = 0; tries % 7 == 0 && d < 3; d++)
+            p[4][d] *= 0x1p30;
         for (int i = 0; i < POINTS; i++)
             for (int d = 0; d < 3; d++)
                 p[i][d] = (p[i][d] + offset) * axis[d];
         double gain = check(p);
-        assert_true(gain > 0.99);
         sharper += tries % 3 == 0 && gain > 1e3;
     }
     return 3. * sharper / TRIES;
@@ -174,7 +177,7 @@ static void bounds_hold(void **unused)
     for (size_t i = 0; i < sizeof axes / sizeof *axes; i++) {
         for (size_t k = 0; k < sizeof offsets / sizeof *offsets; k++) {
             double share = check_scales(axes[i], offsets[k]);
-            assert_true(i == 0 ? share < 0.1 : share > 0.9);
+            assert_true(i == 0 ? share < 0.1 : share > 0.8);
         }
     }
 }
