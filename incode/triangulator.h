@@ -74,7 +74,7 @@ struct incode_outside {
  * bricks, with the alignment of tables, are the total, which is at most the
  * arena. */
 struct incode_map {
-    size_t control; /* the triangulator itself, copies of points too */
+    size_t control;               /* the triangulator itself, the horizon too */
     size_t frames, frame_count;   /* of pages */
     size_t afl, afl_faces;        /* of the active face list */
     size_t bricks, brick_entries; /* that the front has touched */

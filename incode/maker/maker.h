@@ -1,7 +1,7 @@
 /* MakeTetra: which apexes some faces have.  The maker holds the points, in
  * pages that come on demand, and what it has learned of them: the local points
- * of the vertex at work, the bricks around it, empty spheres, half-spaces and
- * planes of the hull.  A search that misses a page is suspended, up to
+ * of the vertex at work, the horizon of its brick, empty spheres, half-spaces
+ * and planes of the hull.  A search that misses a page is suspended, up to
  * INCODE_SEARCHES of them at a time, and resumed when the page is there.  It
  * knows no list of faces and no order of work.
  *
@@ -11,8 +11,8 @@
  * step: incode_maker_centre, _apex and _resume with the index `kd`,
  * incode_maker_face with the others.
  *
- * Memory: struct incode_maker, about 68 KB, and the share of an arena that
- * incode_maker_bytes states: copies of neighbour bricks, frames of pages.
+ * Memory: struct incode_maker, about 63 KB, and the share of an arena that
+ * incode_maker_bytes states: the horizon's boxes and copies, frames of pages.
  * Work: a call takes one search as far as its next missing page; with the
  * indexes `naive` and `grid` it looks at no more than 256 pages of points or
  * about 4,096 rows of cells and points.
@@ -101,7 +101,7 @@ struct incode_hull_plane {
 struct incode_maker_counts {
     uint64_t calls;         /* of MakeTetra */
     uint64_t candidates;    /* points whose distance was evaluated */
-    uint64_t tree_searches; /* beyond the local points and neighbour bricks */
+    uint64_t tree_searches; /* beyond the local points and the horizon */
     struct incode_tally tally;
     uint64_t histogram[24]; /* calls by log2 of candidates, half octaves */
 };
