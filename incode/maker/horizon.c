@@ -587,12 +587,11 @@ uint64_t incode_horizon_points(const struct incode_horizon *h, uint32_t index,
 {
     const float(*point)[INCODE_BRICK_POINTS] = h->point[h->copy[index]];
     float far = h->far[index] + cap->near;
-    incode_vf d = incode_vf_all(cap->d);
     /* A half-space says nothing of points that are beyond all bounds. */
-    incode_vf most =
-        incode_vf_all(cap->d == 0 && far >= ANYWHERE
-                          ? __builtin_inff()
-                          : (cap->d * far + cap->m_sum) * far * DOUBT);
+    if (cap->d == 0 && far >= ANYWHERE)
+        return UINT64_MAX;
+    incode_vf d = incode_vf_all(cap->d);
+    incode_vf most = incode_vf_all((cap->d * far + cap->m_sum) * far * DOUBT);
     uint64_t out = 0;
     for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VF_LANES) {
         incode_vf value = incode_vf_all(0);
