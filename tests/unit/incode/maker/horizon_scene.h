@@ -342,20 +342,26 @@ static inline uint64_t bits_of(struct scene *s, uint32_t at,
 
 struct ball {
     double v[3], m[3], n[3], det, scale;
+    struct incode_radical_bound radical;
 };
 
 /* Certainly in it, with long doubles' rounding and range. */
 static inline bool is_in_ball(const struct ball *q, const double p[3])
 {
     long double value = 0, size = 0, level = 0, level_size = 0;
+    long double beyond = 0, far = 0;
     for (int d = 0; d < 3; d++) {
         long double r = ((long double)p[d] - q->v[d]) * q->scale;
         value += q->det * r * r - q->m[d] * r;
         size += q->det * r * r + fabsl(q->m[d] * r);
         level += q->n[d] * r;
         level_size += fabsl(q->n[d] * r);
+        beyond += q->radical.g[d] * r;
+        far += fabsl(r);
     }
-    return value < -0x1p-50L * size && level > 0x1p-50L * level_size;
+    return value < -0x1p-50L * size && level > 0x1p-50L * level_size &&
+           (!q->radical.set ||
+            beyond < q->radical.level + q->radical.slack * far);
 }
 
 static inline uint64_t points_of_ball(const struct scene *s,

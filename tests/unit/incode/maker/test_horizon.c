@@ -188,12 +188,24 @@ static void draw_ball(const struct scene *s, struct ball *q)
     q->scale = s->h->scale > 0x1p900 ? s->h->scale * ldexp(1, -(int)below(8))
                                      : s->h->scale * ldexp(1, (int)below(8));
     q->det = below(4) == 0 ? 0 : any;
+    q->radical = (struct incode_radical_bound){
+        below(2) == 0, {even(), even(), even()}, radius * draw(), 0x1p-40};
     for (int d = 0; d < 3; d++) {
         q->n[d] = even() * 1e-9;
         q->m[d] = even() * radius * any * (q->scale / s->h->scale);
     }
     if (below(2) == 0) /* the cap of a sphere that is cut low */
         memcpy(q->n, q->m, sizeof q->n);
+}
+
+static bool ball_cap(const struct scene *s, const struct ball *q,
+                     struct incode_horizon_cap *cap)
+{
+    if (!incode_horizon_cap(s->h, cap, q->v, q->scale, q->m, q->det, q->n))
+        return false;
+    if (q->radical.set)
+        incode_horizon_bound(s->h, cap, q->scale, &q->radical);
+    return true;
 }
 
 /* ---- no point is lost ---- */
@@ -217,7 +229,7 @@ static void try_cap(struct scene *s, uint64_t *in, const char *name,
         tried->spheres += made && apex;
     } else {
         draw_ball(s, &q);
-        made = incode_horizon_cap(s->h, &cap, q.v, q.scale, q.m, q.det, q.n);
+        made = ball_cap(s, &q, &cap);
     }
     for (uint32_t b = 0; made && b < s->order.bricks; b++)
         in[b] = kind < 3 ? points_of_face(s, &f, apex, b)
@@ -341,7 +353,7 @@ static void half_spaces_hold_what_is_far(void **unused)
         draw_ball(&s, &q);
         q.det = 0;
         memcpy(q.n, q.m, sizeof q.n);
-        if (!incode_horizon_cap(s.h, &cap, q.v, q.scale, q.m, 0, q.n))
+        if (!ball_cap(&s, &q, &cap))
             continue;
         for (uint32_t b = 0; b < s.order.bricks; b++)
             in[b] = points_of_ball(&s, &q, b);
