@@ -51,19 +51,12 @@ void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
 /* Rounding outward, a part of a coordinate. */
 #define OUTWARD 0x1p-22
 
-/* What rounding to single precision and its arithmetic may do to the value of a
- * cap at a point, as a part of far (D far + |M|): the coordinates of the point
- * and of the vertex, half a unit each, in a gradient of 2 D far + |M|; six
- * roundings of a term and of the sum. */
-#define DOUBT 0x1p-20F
-/* The same for the half axes, as a part of radius (D far + |M|), with the part
- * in 2^20 of the radius that a lifted box does not hold. */
+/* INCODE_HORIZON_DOUBT for the half axes, as a part of radius (D far + |M|),
+ * with the part in 2^20 of the radius that a lifted box does not hold. */
 #define AXES_DOUBT 0x1p-17
 
 /* Beyond that, a coordinate tells nothing. */
 #define FARTHEST 1e15
-/* The farness of what may be anywhere. */
-#define ANYWHERE 3e30F
 
 /* What is not a number may be anywhere. */
 static inline float below(double a)
@@ -126,7 +119,7 @@ static void set_anywhere(struct view *view)
             view->lo[d][i] = -1e30F;
             view->hi[d][i] = 1e30F;
         }
-        view->far[i] = ANYWHERE;
+        view->far[i] = INCODE_ANYWHERE;
     }
 }
 
@@ -372,7 +365,7 @@ void incode_horizon_bound(const struct incode_horizon *h,
     if (!cap->bounded)
         return;
     cap->level = (float)(level + 0x1p-22 * __builtin_fabs(level));
-    cap->slack = (float)(radical->slack / size) + DOUBT;
+    cap->slack = (float)(radical->slack / size) + INCODE_HORIZON_DOUBT;
     for (int k = 0; k < 3; k++)
         cap->g[k] = (float)(radical->g[k] / size);
 }
@@ -407,7 +400,7 @@ INCODE_INLINE uint32_t axes_outside(const struct sides *h,
                               level);
     }
     *weight = incode_vf_fma(d, far, incode_vf_all(cap->m_sum));
-    incode_vf doubt = far * incode_vf_all(DOUBT);
+    incode_vf doubt = far * incode_vf_all(INCODE_HORIZON_DOUBT);
     return incode_vm_bits(incode_vf_less(*weight * doubt, value) |
                           incode_vf_less(level, -doubt));
 }
@@ -449,8 +442,8 @@ INCODE_INLINE uint32_t lifted_outside(const struct incode_horizon *h,
         value -= incode_vf_abs(reach);
     }
     incode_vf far = incode_vf_load(h->far + i) + incode_vf_all(cap->near);
-    incode_vf doubt =
-        incode_vf_fma(far, incode_vf_all(DOUBT), incode_vf_load(h->doubt + i));
+    incode_vf doubt = incode_vf_fma(far, incode_vf_all(INCODE_HORIZON_DOUBT),
+                                    incode_vf_load(h->doubt + i));
     return incode_vm_bits(incode_vf_less(weight * doubt, value));
 }
 
@@ -540,70 +533,6 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
         h->left[index] &= ~(UINT32_C(1) << child);
     }
     return INCODE_HORIZON_MADE;
-}
-
-/* ---- copies ---- */
-
-void incode_horizon_copy(struct incode_horizon *h, uint32_t index,
-                         const struct incode_frame *frame)
-{
-    const struct incode_brick *b = &frame->page.brick;
-    const double *const axis[3] = {b->x, b->y, b->z};
-    uint32_t copy = h->next;
-    incode_vd scale = incode_vd_all(h->scale);
-    for (int d = 0; d < 3; d++) {
-        /* Scaled first: a difference of large numbers could overflow. */
-        incode_vd origin = incode_vd_all(h->origin[d] * h->scale);
-        for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES)
-            incode_vd_store_float(h->point[copy][d] + i,
-                                  incode_vd_load(axis[d] + i) * scale - origin);
-    }
-    uint8_t *old = &h->copy[h->owner[copy]];
-    if (*old == copy)
-        *old = INCODE_NO_COPY;
-    h->owner[copy] = (uint16_t)index;
-    h->copy[index] = (uint8_t)copy;
-    h->next = (copy + 1) % h->room;
-}
-
-static uint64_t points_beyond(const float (*point)[INCODE_BRICK_POINTS],
-                              const struct incode_horizon_cap *cap, float far)
-{
-    incode_vf most = incode_vf_all(cap->level + far * cap->slack);
-    uint64_t out = 0;
-    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VF_LANES) {
-        incode_vf value = incode_vf_all(0);
-        for (int k = 0; k < 3; k++)
-            value = incode_vf_fma(
-                incode_vf_all(cap->g[k]),
-                incode_vf_load(point[k] + i) - incode_vf_all(cap->v[k]), value);
-        out |= (uint64_t)incode_vm_bits(incode_vf_less(most, value)) << i;
-    }
-    return out;
-}
-
-uint64_t incode_horizon_points(const struct incode_horizon *h, uint32_t index,
-                               const struct incode_horizon_cap *cap)
-{
-    const float(*point)[INCODE_BRICK_POINTS] = h->point[h->copy[index]];
-    float far = h->far[index] + cap->near;
-    /* A half-space says nothing of points that are beyond all bounds. */
-    if (cap->d == 0 && far >= ANYWHERE)
-        return UINT64_MAX;
-    incode_vf d = incode_vf_all(cap->d);
-    incode_vf most = incode_vf_all((cap->d * far + cap->m_sum) * far * DOUBT);
-    uint64_t out = 0;
-    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VF_LANES) {
-        incode_vf value = incode_vf_all(0);
-        for (int k = 0; k < 3; k++) {
-            incode_vf y =
-                incode_vf_load(point[k] + i) - incode_vf_all(cap->v[k]);
-            value = incode_vf_fma(
-                incode_vf_fma(d, y, -incode_vf_all(cap->m[k])), y, value);
-        }
-        out |= (uint64_t)incode_vm_bits(incode_vf_less(most, value)) << i;
-    }
-    return ~out & ~(cap->bounded ? points_beyond(point, cap, far) : 0);
 }
 
 /* ---- by a box ---- */

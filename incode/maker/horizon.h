@@ -33,6 +33,14 @@ enum {
     INCODE_NO_COPY = 0xff
 };
 
+/* What rounding to single precision and its arithmetic may do to the value of a
+ * cap at a point, as a part of far (D far + |M|): the coordinates of the point
+ * and of the vertex, half a unit each, in a gradient of 2 D far + |M|; six
+ * roundings of a term and of the sum. */
+#define INCODE_HORIZON_DOUBT 0x1p-20F
+/* The farness of what may be anywhere. */
+#define INCODE_ANYWHERE 3e30F
+
 /* Boxes along the axes and lifted ones (incode/pages/boxes.h) in the horizon's
  * units; the numbers of all boxes stand together. */
 struct incode_horizon {
