@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "apex.h"
+#include "hits.h"
 #include "incode/predicates/simd.h"
 
 /* MakeTetra among the bricks around, where the local points do not suffice.
@@ -273,147 +274,13 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
 
 /* ---- a regular face: along its pencil ---- */
 
-enum {
-    HITS = 128, /* kept at a time */
-    BATCH = 8   /* bricks looked at before the ball is drawn in */
-};
-
-/* Points in the ball, and where in the pencil: infinite where they are not
- * clearly beyond the face. */
-struct hits {
-    alignas(64) double p[3][HITS];
-    alignas(64) double t[HITS];
-    uint32_t id[HITS], count;
-    uint32_t placed; /* so many of them, at least, have a place */
-};
-
-/* The ball of the pencil's sphere at t, widened by 1e-6 of its size. */
-static void draw_in(struct incode_query *q, const struct incode_pencil *pencil,
-                    double t)
-{
-    double square = 0.25 * t * t;
-    for (int d = 0; d < 3; d++) {
-        q->centre[d] = pencil->c0[d] + 0.5 * t * pencil->n[d];
-        square += pencil->c0[d] * pencil->c0[d];
-    }
-    q->t = t;
-    q->square = square * (1 + 4e-6);
-    double far = 2 * pencil->size + __builtin_fabs(t); /* above the radius */
-    q->plane_slack = INCODE_SPHERE_TINY + INCODE_SPHERE_EPS * 6 *
-                                              incode_max_norm(q->sphere.pn) *
-                                              far;
-    q->round = true;
-}
-
-INCODE_INLINE incode_vd dot(const double a[3], const incode_vd b[3])
-{
-    return incode_vd_all(a[0]) * b[0] + incode_vd_all(a[1]) * b[1] +
-           incode_vd_all(a[2]) * b[2];
-}
-
-/* incode_pencil_place for a vector of points at x, y and z; infinite where it
- * is false. */
-INCODE_INLINE incode_vd places(const struct incode_query *q,
-                               const struct incode_pencil *pencil,
-                               const double *const xyz[3], uint32_t i)
-{
-    incode_vd r[3], square = incode_vd_all(0);
-    incode_vd far = incode_vd_all(INCODE_PENCIL_LEAST);
-    for (int d = 0; d < 3; d++) {
-        /* Scaled first: a difference of large numbers could overflow. */
-        r[d] = incode_vd_load(xyz[d] + i) * incode_vd_all(q->scale) -
-               incode_vd_all(q->pv[d] * q->scale);
-        far = incode_vd_max(incode_vd_abs(r[d]), far);
-        square += r[d] * r[d];
-    }
-    incode_vd beyond = dot(pencil->n, r);
-    incode_vd t = (square - incode_vd_all(2) * dot(pencil->c0, r)) / beyond;
-    return incode_vd_select(beyond > incode_vd_all(2e-3) * far, t,
-                            incode_vd_all(__builtin_inf()));
-}
-
-/* Sets the places that are missing, and draws the ball in to the first of them.
- */
-static void place(struct incode_query *q, const struct incode_pencil *pencil,
-                  struct hits *hits)
-{
-    if (hits->placed == hits->count)
-        return;
-    const double *const xyz[3] = {hits->p[0], hits->p[1], hits->p[2]};
-    incode_vd infinite = incode_vd_all(__builtin_inf()), least = infinite;
-    incode_vd end = incode_vd_all(hits->count), lane = incode_vd_count();
-    for (uint32_t i = hits->placed / INCODE_VD_LANES * INCODE_VD_LANES;
-         i < hits->count; i += INCODE_VD_LANES) {
-        incode_vd t = places(q, pencil, xyz, i);
-        t = incode_vd_select(incode_vd_all(i) + lane < end, t, infinite);
-        *(incode_vd *)(hits->t + i) = t;
-        least = incode_vd_min(t, least);
-    }
-    hits->placed = hits->count;
-    double first = incode_vd_least_of(least);
-    if (first < q->t)
-        draw_in(q, pencil, first);
-}
-
-/* Whether a hit may be the first, or tie with it. */
-static bool contends(const struct incode_query *q, const struct hits *hits,
-                     uint32_t i, double last)
-{
-    double square = 0;
-    if (hits->t[i] < __builtin_inf())
-        return hits->t[i] <= last;
-    for (int d = 0; d < 3; d++) {
-        double r = hits->p[d][i] * q->scale - q->pv[d] * q->scale;
-        square += (r - q->centre[d]) * (r - q->centre[d]);
-    }
-    return !(square > q->square);
-}
-
-/* Drops what has fallen out of the ball. */
-static void thin_out(const struct incode_query *q,
-                     const struct incode_pencil *pencil, struct hits *hits)
-{
-    double last = incode_pencil_later(pencil, q->t);
-    uint32_t kept = 0;
-    for (uint32_t i = 0; i < hits->count; i++) {
-        if (!contends(q, hits, i, last))
-            continue;
-        for (int d = 0; d < 3; d++)
-            hits->p[d][kept] = hits->p[d][i];
-        hits->id[kept] = hits->id[i];
-        hits->t[kept++] = hits->t[i];
-    }
-    hits->count = hits->placed = kept;
-}
+enum { BATCH = 8 /* bricks looked at before the ball is drawn in */ };
 
 /* The bit of a vertex in its brick, 0 in others. */
 static uint64_t bit_of(uint32_t id, uint32_t brick)
 {
     return (uint64_t)(id / INCODE_BRICK_POINTS == brick)
            << id % INCODE_BRICK_POINTS;
-}
-
-/* false: there are too many. */
-static bool add_hits(struct incode_make *n, struct incode_query *q,
-                     const struct incode_frame *frame, uint64_t in,
-                     struct hits *hits)
-{
-    const struct incode_brick *b = &frame->page.brick;
-    for (; in != 0; in &= in - 1) {
-        uint32_t slot = (uint32_t)__builtin_ctzll(in);
-        if (hits->count == HITS) {
-            place(q, &n->pencil, hits);
-            thin_out(q, &n->pencil, hits);
-            if (hits->count == HITS)
-                return false;
-        }
-        uint32_t i = hits->count++;
-        hits->p[0][i] = b->x[slot];
-        hits->p[1][i] = b->y[slot];
-        hits->p[2][i] = b->z[slot];
-        hits->id[i] = frame->number * INCODE_BRICK_POINTS + slot;
-    }
-    return true;
 }
 
 /* The bits of a brick's points, but for the face's and the best so far, which
@@ -449,17 +316,18 @@ static bool pencil_cap(const struct incode_make *n,
  * or too much lies in the cap. */
 static bool look_at(struct incode_make *n, struct incode_query *q,
                     struct look *look, const uint32_t *index, uint32_t count,
-                    struct hits *hits)
+                    struct incode_hits *hits)
 {
     for (uint32_t i = 0; i < count; i++) {
         const struct incode_frame *f;
         uint64_t in;
         if (!points_of(n->maker, look, index[i], &in, &f, &q->missing))
             return false;
-        if (in != 0 && !add_hits(n, q, f, in & others(q, f), hits))
+        if (in != 0 &&
+            !incode_hits_add(&n->pencil, q, f, in & others(q, f), hits))
             return false;
     }
-    place(q, &n->pencil, hits);
+    incode_hits_place(q, &n->pencil, hits);
     return true;
 }
 
@@ -481,7 +349,8 @@ static bool next_cap(const struct incode_make *n, const struct incode_query *q,
  * *much: by so much that the rest is to be chosen again.  False: one is
  * missing, or too much lies in the cap. */
 static bool look_at_bricks(struct incode_make *n, struct incode_query *q,
-                           struct look *look, struct hits *hits, bool *much)
+                           struct look *look, struct incode_hits *hits,
+                           bool *much)
 {
     double square = q->square;
     uint32_t batch = square < __builtin_inf() ? BATCH : 1;
@@ -501,7 +370,7 @@ static bool look_at_bricks(struct incode_make *n, struct incode_query *q,
 
 /* Looks at all that the ball reaches. */
 static bool look_around(struct incode_make *n, struct incode_query *q,
-                        struct hits *hits)
+                        struct incode_hits *hits)
 {
     struct incode_maker *m = n->maker;
     struct look look = {.done = {0}};
@@ -534,7 +403,7 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
 /* The first of the hits and of the best so far, at t, which does not count if a
  * hit's place is certainly before. */
 static void settle(struct incode_make *n, struct incode_query *q, double t,
-                   const struct hits *hits)
+                   const struct incode_hits *hits)
 {
     struct incode_tally *tally = &n->maker->counts.tally;
     double last = incode_pencil_later(&n->pencil, q->t);
@@ -542,7 +411,7 @@ static void settle(struct incode_make *n, struct incode_query *q, double t,
     for (uint32_t i = 0; i < hits->count; i++) {
         const double p[3] = {hits->p[0][i], hits->p[1][i], hits->p[2][i]};
         bool beyond = hits->t[i] < __builtin_inf();
-        if (!contends(q, hits, i, last) ||
+        if (!incode_hits_contends(q, hits, i, last) ||
             (!beyond && incode_orient3d(tally, n->pv, n->pb, n->pc, p) <= 0) ||
             (any &&
              incode_in_sphere(tally, n->pv, n->pb, n->pc, q->best_p, p) <= 0))
@@ -578,7 +447,7 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
 {
     struct incode_maker *m = n->maker;
     struct incode_query *q = &s->query;
-    struct hits hits;
+    struct incode_hits hits;
     double at = -__builtin_inf();
     set_query(n, q);
     if (n->best != INCODE_LOCAL_NONE) {
@@ -588,7 +457,7 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
         q->best = m->local.id[n->best];
         incode_query_relative(r, q, q->best_p);
         if (incode_pencil_place(&n->pencil, r, &at)) {
-            draw_in(q, &n->pencil, at);
+            incode_hits_draw_in(q, &n->pencil, at);
         } else {
             if (n->bare)
                 incode_make_sphere(n);
