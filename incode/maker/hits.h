@@ -7,8 +7,8 @@
  *
  *     room = incode_hits_add(&pencil, &q, frame, in, &hits);
  *     incode_hits_place(&q, &pencil, &hits);
- *     if (incode_hits_contends(&q, &hits, 0, incode_pencil_later(&pencil,
- * q.t))) v = hits.id[0];
+ *     if (incode_hits_contends(&q, &hits, 0, t))
+ *         v = hits.id[0];
  */
 #ifndef INCODE_HITS_H
 #define INCODE_HITS_H
