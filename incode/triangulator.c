@@ -22,10 +22,10 @@ static uint32_t between(size_t least, size_t a, size_t most)
     return (uint32_t)(a < least ? least : a > most ? most : a);
 }
 
-/* The horizon of a maker: a box for 4 KB, a copy for 32 KB. */
+/* The horizon of a maker: a box for 4 KB, a copy for 64 KB. */
 static struct incode_maker_share horizon_of(size_t bytes)
 {
-    size_t boxes = bytes >> 12, copies = bytes >> 15;
+    size_t boxes = bytes >> 12, copies = bytes >> 16;
     return (struct incode_maker_share){
         between(INCODE_HORIZON_MIN, boxes / 64 * 64, INCODE_HORIZON_MAX),
         between(16, copies, INCODE_HORIZON_COPIES), 0};
