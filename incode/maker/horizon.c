@@ -490,6 +490,8 @@ static uint32_t reached_children(const struct view *view,
     return reached;
 }
 
+enum { SPARE = 32 /* boxes: for what is reached for certain */ };
+
 /* Whether the cap reaches the lifted box of the last one added. */
 static bool last_is_reached(const struct incode_horizon *h,
                             const struct incode_horizon_cap *cap)
@@ -524,7 +526,8 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
         uint32_t at = tree->base[level - 1] + first + child;
         uint32_t i = add_box(h, &view, child, at, level - 1);
         set_lifted(h, i, &view, child);
-        if (!last_is_reached(h, cap)) {
+        /* It is likely to be looked at again, which costs less here. */
+        if (h->count > h->boxes - SPARE && !last_is_reached(h, cap)) {
             h->count--;
             continue;
         }
