@@ -43,7 +43,7 @@ static void reach(const struct incode_horizon *h, struct look *look)
     memcpy(look->index + look->bricks, pages, look->pages * sizeof pages[0]);
 }
 
-enum { CROWD = 16 /* boxes: so many are many */ };
+enum { CROWD = 32 /* boxes: so many are many */ };
 
 /* Where a cap reaches many boxes, points may lie on one sphere up to rounding:
  * empty spheres met before rule out others. */
