@@ -482,9 +482,8 @@ bool incode_apex_around(struct incode_make *n, struct incode_search *s)
     if (!found) {
         incode_search_from(n, s);
         /* Of a face of the hull's side, half-spaces tell more. */
-        if (m->horizon.count > 0 &&
-            !(n->degenerate.known && n->regular &&
-              n->best == INCODE_LOCAL_NONE))
+        if (m->horizon.count > 0 && !(n->degenerate.known && n->regular &&
+                                      n->best == INCODE_LOCAL_NONE))
             found = search_spheres(n, s);
     }
     s->looked = m->local.near + m->counts.candidates - before;
