@@ -32,12 +32,10 @@
 
 enum { INCODE_FANOUT = 32 /* children a box page, at most */ };
 
-/* Coordinates are origin + unit x, unit a normal power of two, about half the
- * longest side of all children; |x| <= 2.  Absent children have lo > hi (+inf,
- * -inf) in every dimension. */
+/* Rows begin at multiples of 64 bytes.  Coordinates are origin + unit x, unit a
+ * normal power of two, about half the longest side of all children; |x| <= 2.
+ * Absent children have lo > hi (+inf, -inf) in every dimension. */
 struct incode_boxes {
-    double origin[3];
-    double unit;
     float lo[3][INCODE_FANOUT];
     float hi[3][INCODE_FANOUT];
     /* Of the lifted boxes; the axes' box has centre m and size e, half its
@@ -52,6 +50,8 @@ struct incode_boxes {
     uint8_t
         is_lifted[INCODE_FANOUT]; /* 0: it says no more than the axes' box */
     int16_t lid[INCODE_FANOUT];   /* e^2 / 8192 each */
+    double origin[3];
+    double unit;
 };
 
 /* A lifted box, relative to the page's origin and in its units. */
