@@ -392,7 +392,7 @@ static void pipe_lost(struct link *link)
 {
     link->statistics.pipe_closed += link->pipe_up;
     link->pipe_up = false;
-    link->up = false;
+    link->up = link->bye_due = false;
     link_forget_bytes(link);
     link_forget_staged(link);
 }
@@ -472,11 +472,13 @@ int link_poll_send(struct link *link, uint64_t now_us)
 {
     int count = 0, most = link->config.window + 2;
     link->now_us = now_us;
-    if (link->closing && !link->closed && now_us >= link->deadline_us) {
+    if (link->closing && now_us >= link->deadline_us) {
         link->closed = true;
-        link->up = false;
+        link->up = link->bye_due = false;
+        link_forget_staged(link);
     }
-    if (!link->pipe_up || (link->closing && link->closed) || !flush(link)) {
+    if (!link->pipe_up || (link->closing && link_has_parted(link)) ||
+        !flush(link)) {
         return 0;
     }
     link_run_timer(link);
@@ -515,7 +517,7 @@ bool link_idle(const struct link *link)
 enum link_state link_state(const struct link *link)
 {
     if (link->closed) {
-        return LINK_CLOSED;
+        return link_has_parted(link) ? LINK_CLOSED : LINK_CLOSING;
     }
     if (link_refuses(link)) {
         return LINK_REFUSED;

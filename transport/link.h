@@ -232,7 +232,7 @@ bool link_take_datagram(struct link *link, struct link_message *datagram,
                         bool *ask);
 
 /* Says farewell once all is acknowledged; after deadline_us, or when the peer
- * says farewell too, the state is LINK_CLOSED. */
+ * has said farewell and its answer has left, the state is LINK_CLOSED. */
 void link_close(struct link *link, uint64_t deadline_us);
 
 /* True when the peer has acknowledged all that was written. */

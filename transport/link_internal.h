@@ -146,6 +146,13 @@ static inline bool link_refuses(const struct link *link)
     return link->peer.refusal != LINK_FITS;
 }
 
+/* Whether the peer has said farewell, and its answer has left, for which it
+ * waits: this end's own farewell may not have gone before. */
+static inline bool link_has_parted(const struct link *link)
+{
+    return link->closed && !link->bye_due && link->out.end == 0;
+}
+
 /* Slots of the send window that hold frames. */
 static inline unsigned link_used(const struct link *link)
 {

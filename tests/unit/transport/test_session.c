@@ -280,6 +280,40 @@ static void farewell(void **unused)
     }
 }
 
+/* The other end's farewell comes before this one has begun its own, on a wire
+ * with room for it, or for less than the answer. */
+static void farewells_that_cross_are_answered(void **unused)
+{
+    (void)unused;
+    for (unsigned held = 0; held < 2; held++) {
+        struct pair *p = new_pair(&small, &perfect, 1);
+        p->ends[0].most = p->ends[1].most = 0;
+        for (unsigned i = 0; i < 50; i++) {
+            step(p, 100);
+        }
+        struct link *one = p->ends[0].link, *other = p->ends[1].link;
+        struct sim_direction *out =
+            host_sim_cube_port(&p->cube, 1, 0)->end->out;
+        uint64_t deadline = p->now_us + 10000000;
+        uint32_t room = out->quality.room;
+        link_close(one, deadline);
+        link_close(other, deadline);
+        link_poll(one, p->now_us);
+        p->now_us += 1000;
+        out->quality.room = held ? 5 : room;
+        link_poll(other, p->now_us);
+        assert_true(link_state(other) == (held ? LINK_CLOSING : LINK_CLOSED));
+        out->quality.room = room;
+        p->now_us += 1000;
+        link_poll(other, p->now_us);
+        assert_true(link_state(other) == LINK_CLOSED);
+        p->now_us += 1000;
+        link_poll(one, p->now_us);
+        assert_true(link_state(one) == LINK_CLOSED);
+        free_pair(p);
+    }
+}
+
 static void farewell_to_the_dead_ends_in_time(void **unused)
 {
     (void)unused;
@@ -498,6 +532,7 @@ int main(void)
         cmocka_unit_test(sizes_that_do_not_fit_are_refused),
         cmocka_unit_test(a_wire_to_itself_is_refused),
         cmocka_unit_test(farewell),
+        cmocka_unit_test(farewells_that_cross_are_answered),
         cmocka_unit_test(farewell_to_the_dead_ends_in_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -317,6 +317,36 @@ static void test_wrong_wire(void **unused)
     fails_with("host link 0 is wired to node 3, expected node 0");
 }
 
+/* However the ends of nodes and host fall together, nobody waits for a farewell
+ * in vain: half a second at a node, two at the host. */
+static void test_ends_at_once(void **unused)
+{
+    (void)unused;
+    for (unsigned k = 0; k < 100; k++) {
+        struct host_run_options options;
+        struct host_tetrahedra tets = {0};
+        struct host_points few = points;
+        struct host_error error = {0};
+        few.count = 30;
+        host_run_defaults(&options);
+        options.quiet = true;
+        options.memory = MEMORY;
+        prepare();
+        start_world();
+        memset(&result, 0, sizeof result);
+        result.nodes = NODES;
+        result.strategy = &host_spatial;
+        struct host_machine machine = host_world_machine(&world.sim);
+        assert_int_equal(host_triangulate_on(&options, &machine, &few, &tets,
+                                             &result, &error),
+                         0);
+        assert_true(machine.ended(machine.context));
+        assert_in_range(world.sim.now_us, 1, 100000);
+        host_tetrahedra_free(&tets);
+        end_world();
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -334,6 +364,7 @@ int main(void)
         cmocka_unit_test(test_late_node),
         cmocka_unit_test(test_late_wire),
         cmocka_unit_test(test_missing_host_port),
+        cmocka_unit_test(test_ends_at_once),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
