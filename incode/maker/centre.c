@@ -1,3 +1,5 @@
+#include <stdalign.h>
+
 #include "search.h"
 
 /* The points around a vertex, brought to hand, and the bricks around its own.
@@ -46,10 +48,13 @@ static enum incode_outcome copy_around_leaf(struct incode_maker *m,
 {
     struct incode_local_points *local = &m->local;
     uint32_t leaf = v % INCODE_BRICK_POINTS / INCODE_LEAF_POINTS;
+    alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
+        leaf_hi[3][INCODE_BRICK_LEAVES];
     double lo[3], hi[3];
+    incode_frame_leaf_boxes(f, leaf_lo, leaf_hi);
     for (int d = 0; d < 3; d++) {
-        lo[d] = f->leaf_lo[d][leaf];
-        hi[d] = f->leaf_hi[d][leaf];
+        lo[d] = leaf_lo[d][leaf];
+        hi[d] = leaf_hi[d][leaf];
     }
     double radius = first_radius(m, lo, hi);
     for (int tries = 0;; tries++) {
@@ -77,7 +82,7 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
     struct incode_horizon *h = &m->horizon;
     double lo[3], hi[3];
     bool full = false;
-    incode_frame_box(f, lo, hi);
+    (void)incode_frame_box(f, lo, hi);
     double extent = longest_side(lo, hi);
     for (int tries = 0; tries < HORIZON_TRIES; tries++) {
         double radius = extent * m->reach, around_lo[3], around_hi[3];

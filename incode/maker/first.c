@@ -27,7 +27,7 @@ static void begin_walk(struct incode_maker *m, struct incode_search *search,
     q->b = q->c = q->best = INCODE_NONE;
     memcpy(q->pv, p, sizeof q->pv);
     q->limit = __builtin_inf();
-    double extent = incode_frame_extent(frame);
+    double lo[3], hi[3], extent = incode_frame_box(frame, lo, hi);
     q->scale = incode_scale_for(extent > 0 ? extent : m->hi[0]);
     if (question == INCODE_QUERY_CIRCLE) {
         q->b = search->first.u;
@@ -48,10 +48,8 @@ static void look(struct incode_maker *m, struct incode_search *search,
     uint32_t v = search->query.v;
     const struct incode_frame *f =
         incode_pager_get(&m->pager, v / INCODE_BRICK_POINTS);
-    double radius = 0;
+    double lo[3], hi[3], radius = f == NULL ? 0 : incode_frame_box(f, lo, hi);
     for (int d = 0; d < 3; d++) {
-        double e = f == NULL ? 0 : f->leaf_hi[d][0] - f->leaf_lo[d][0];
-        radius = e > radius ? e : radius;
         double du = __builtin_fabs(s->pu[d] - pv[d]);
         radius = 4 * du > radius ? 4 * du : radius;
     }

@@ -17,6 +17,26 @@ void incode_local_reset(struct incode_local_points *local)
 
 /* ---- around a leaf ---- */
 
+struct sides {
+    incode_vd lo[3], hi[3];
+};
+
+/* Which points of a leaf lie in a box, one bit each. */
+INCODE_INLINE uint32_t inside(const struct sides *box,
+                              const double *const axis[3], uint32_t slot)
+{
+    uint32_t in = 0;
+    for (uint32_t i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
+        incode_vl here = incode_vl_ones();
+        for (int d = 0; d < 3; d++) {
+            incode_vd p = incode_vd_load(axis[d] + slot + i);
+            here &= (p >= box->lo[d]) & (p <= box->hi[d]);
+        }
+        in |= incode_vd_mask(here) << i;
+    }
+    return in;
+}
+
 static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
                         const struct incode_frame *frame, uint32_t brick,
                         uint32_t leaves, void *context)
@@ -24,30 +44,29 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
     struct incode_local_points *local = context;
     (void)walker;
     const struct incode_brick *b = &frame->page.brick;
+    const double *const axis[3] = {b->x, b->y, b->z};
+    struct sides box;
+    for (int d = 0; d < 3; d++) {
+        box.lo[d] = incode_vd_all(q->lo[d]);
+        box.hi[d] = incode_vd_all(q->hi[d]);
+    }
     for (; leaves != 0; leaves &= leaves - 1) {
         uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
-        uint32_t end = slot + INCODE_LEAF_POINTS;
+        uint32_t in = inside(&box, axis, slot), n = frame->count - slot;
+        if (n < INCODE_LEAF_POINTS)
+            in &= (UINT32_C(1) << n) - 1;
+        if (in == 0)
+            continue;
         if (local->around + INCODE_LEAF_POINTS > INCODE_AROUND_POINTS)
             return false;
-        for (; slot < end && slot < frame->count; slot += INCODE_VD_LANES) {
-            incode_vd x = incode_vd_load(b->x + slot),
-                      y = incode_vd_load(b->y + slot),
-                      z = incode_vd_load(b->z + slot);
-            uint32_t n = frame->count - slot;
-            uint32_t in = incode_vd_mask((x >= incode_vd_all(q->lo[0])) &
-                                         (x <= incode_vd_all(q->hi[0])) &
-                                         (y >= incode_vd_all(q->lo[1])) &
-                                         (y <= incode_vd_all(q->hi[1])) &
-                                         (z >= incode_vd_all(q->lo[2])) &
-                                         (z <= incode_vd_all(q->hi[2])));
-            if (n < INCODE_VD_LANES)
-                in &= (UINT32_C(1) << n) - 1;
-            incode_vd_pack(local->p[0] + local->around, in, x);
-            incode_vd_pack(local->p[1] + local->around, in, y);
-            incode_vd_pack(local->p[2] + local->around, in, z);
-            incode_pack_count(local->id + local->around, in,
+        for (; in != 0; in >>= INCODE_VD_LANES, slot += INCODE_VD_LANES) {
+            uint32_t here = in & INCODE_VD_ALL;
+            for (int d = 0; d < 3; d++)
+                incode_vd_pack(local->p[d] + local->around, here,
+                               incode_vd_load(axis[d] + slot));
+            incode_pack_count(local->id + local->around, here,
                               brick * INCODE_BRICK_POINTS + slot);
-            local->around += (uint32_t)__builtin_popcount(in);
+            local->around += (uint32_t)__builtin_popcount(here);
         }
     }
     return true;

@@ -126,8 +126,7 @@ bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
     memset(&q, 0, sizeof q);
     q.question = INCODE_QUERY_BOX;
     q.boxed = q.ahead = true;
-    incode_frame_box(f, q.lo, q.hi);
-    double extent = incode_frame_extent(f);
+    double extent = incode_frame_box(f, q.lo, q.hi);
     for (int d = 0; d < 3; d++) {
         q.lo[d] -= extent * m->spread;
         q.hi[d] += extent * m->spread;

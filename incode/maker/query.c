@@ -379,18 +379,28 @@ static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
     return INCODE_WALK_WAIT;
 }
 
+/* The leaves of a brick that a question concerns.  Boxes are made for those
+ * questions that take more of a point than what a box takes to make. */
+static __attribute__((noinline)) uint32_t
+passing_leaves(const struct incode_query *q, const struct incode_frame *frame)
+{
+    alignas(64) double lo[3][INCODE_BRICK_LEAVES], hi[3][INCODE_BRICK_LEAVES];
+    struct boxes boxes = {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
+    unsigned leaves = incode_frame_leaves(frame);
+    if (q->question == INCODE_QUERY_BOX)
+        return (UINT32_C(1) << leaves) - 1;
+    incode_frame_leaf_boxes(frame, lo, hi);
+    return passing(q, &boxes, leaves);
+}
+
 static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
                                     const struct incode_frame *frame)
 {
-    struct boxes boxes;
-    for (int d = 0; d < 3; d++) {
-        boxes.lo[d] = frame->leaf_lo[d];
-        boxes.hi[d] = frame->leaf_hi[d];
-    }
-    uint32_t mask = passing(w->q, &boxes, incode_frame_leaves(frame));
+    uint32_t leaves = passing_leaves(w->q, frame);
     incode_walker_spend(w->walker, 1);
     w->visited = true;
-    if (mask != 0 && !w->visit(w->walker, w->q, frame, brick, mask, w->context))
+    if (leaves != 0 &&
+        !w->visit(w->walker, w->q, frame, brick, leaves, w->context))
         return INCODE_WALK_STOP;
     return INCODE_WALK_DONE;
 }

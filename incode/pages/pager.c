@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
+#include "incode/predicates/simd.h"
 
 enum { GROUP = 32 }; /* frames of which a least time of use is noted */
 
@@ -169,26 +170,6 @@ uint32_t incode_pager_awaited(const struct incode_pager *pager)
     return INCODE_NONE;
 }
 
-static void leaf_boxes(struct incode_frame *f)
-{
-    const double *axis[3] = {f->page.brick.x, f->page.brick.y, f->page.brick.z};
-    for (int d = 0; d < 3; d++) {
-        for (int leaf = 0; leaf < INCODE_BRICK_LEAVES; leaf++) {
-            int first = leaf * INCODE_LEAF_POINTS;
-            double lo = __builtin_inf(), hi = -__builtin_inf();
-            for (int i = first; i < first + INCODE_LEAF_POINTS; i++) {
-                if (i >= f->count)
-                    break;
-                double a = axis[d][i];
-                lo = a < lo ? a : lo;
-                hi = a > hi ? a : hi;
-            }
-            f->leaf_lo[d][leaf] = lo;
-            f->leaf_hi[d][leaf] = hi;
-        }
-    }
-}
-
 static void load_brick(struct incode_frame *f, const uint8_t *data,
                        size_t points)
 {
@@ -200,7 +181,6 @@ static void load_brick(struct incode_frame *f, const uint8_t *data,
             axis[d][i] = axis[d][points - 1];
     }
     f->count = (uint8_t)points;
-    leaf_boxes(f);
 }
 
 int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
@@ -247,4 +227,53 @@ bool incode_pager_release(struct incode_pager *pager, bool now)
         return true;
     }
     return false;
+}
+
+/* What is past the last point repeats it, so that no leaf is empty. */
+void incode_frame_leaf_boxes(const struct incode_frame *f,
+                             double lo[3][INCODE_BRICK_LEAVES],
+                             double hi[3][INCODE_BRICK_LEAVES])
+{
+    const struct incode_brick *b = &f->page.brick;
+    const double *const axis[3] = {b->x, b->y, b->z};
+    for (int d = 0; d < 3; d++) {
+        const double *p = axis[d];
+        for (int leaf = 0; leaf < INCODE_BRICK_LEAVES;
+             leaf += INCODE_VD_LANES) {
+            incode_vd least[INCODE_VD_LANES], most[INCODE_VD_LANES];
+            for (int k = 0; k < INCODE_VD_LANES; k++) {
+                least[k] = incode_vd_load(p);
+                most[k] = -least[k];
+                p += INCODE_VD_LANES;
+                for (int i = INCODE_VD_LANES; i < INCODE_LEAF_POINTS;
+                     i += INCODE_VD_LANES) {
+                    least[k] = incode_vd_min(least[k], incode_vd_load(p));
+                    most[k] = incode_vd_min(most[k], -incode_vd_load(p));
+                    p += INCODE_VD_LANES;
+                }
+            }
+            *(incode_vd *)(lo[d] + leaf) = incode_vd_least_of_each(least);
+            *(incode_vd *)(hi[d] + leaf) = -incode_vd_least_of_each(most);
+        }
+    }
+}
+
+double incode_frame_box(const struct incode_frame *f, double lo[3],
+                        double hi[3])
+{
+    alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
+        leaf_hi[3][INCODE_BRICK_LEAVES];
+    double extent = 0;
+    incode_frame_leaf_boxes(f, leaf_lo, leaf_hi);
+    for (int d = 0; d < 3; d++) {
+        lo[d] = leaf_lo[d][0];
+        hi[d] = leaf_hi[d][0];
+        for (int i = 0; i < INCODE_BRICK_LEAVES; i++) {
+            double side = leaf_hi[d][i] - leaf_lo[d][i];
+            extent = side > extent ? side : extent;
+            lo[d] = leaf_lo[d][i] < lo[d] ? leaf_lo[d][i] : lo[d];
+            hi[d] = leaf_hi[d][i] > hi[d] ? leaf_hi[d][i] : hi[d];
+        }
+    }
+    return extent;
 }

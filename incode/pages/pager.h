@@ -1,10 +1,11 @@
 /* Pages in fixed frames, replaced least recently used first.  A frame is
  * reserved before its page is asked for, so that a reply always has room.
  *
- * Memory: incode_pager_bytes(frames).  Work: constant for a page that is there;
- * where one is replaced, a look at the times of use of one group of frames in
- * 32, and of some groups as a rule; where a brick arrives, the boxes of its 8
- * leaves.
+ * Memory: incode_pager_bytes(frames), 1,600 of them a frame: a node that holds
+ * a surface in few frames asks for pages the oftener the larger they are, so
+ * boxes of leaves are made where they are wanted.  Work: constant for a page
+ * that is there; where one is replaced, a look at the times of use of one group
+ * of frames in 32, and of some groups as a rule; for a box of points, these.
  *
  *     struct incode_frame *f = incode_pager_get(&pager, page);
  *     if (f != NULL)
@@ -31,22 +32,14 @@ enum incode_frame_state {
     INCODE_FRAME_READY
 };
 
-/* Only a brick has leaves; where there is none, a page may end in theirs. */
 struct incode_frame {
-    union {
-        alignas(64) union incode_page page;
-        struct {
-            uint8_t brick_bytes[INCODE_BRICK_BYTES];
-            alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES];
-            alignas(64) double leaf_hi[3][INCODE_BRICK_LEAVES];
-        };
-    };
+    alignas(64) union incode_page page;
     uint32_t number; /* the page */
     uint8_t count;   /* points of a brick */
 };
 
-static_assert(offsetof(struct incode_frame, leaf_lo) == INCODE_BRICK_BYTES,
-              "the leaves follow the brick");
+static_assert(sizeof(struct incode_frame) == 1600,
+              "a frame holds its page and little else");
 
 /* What the pager looks at to find a frame, close together. */
 struct incode_slot {
@@ -61,34 +54,15 @@ static inline unsigned incode_frame_leaves(const struct incode_frame *f)
     return (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
 }
 
-/* The longest side of a brick's leaves. */
-static inline double incode_frame_extent(const struct incode_frame *f)
-{
-    unsigned leaves = incode_frame_leaves(f);
-    double extent = 0;
-    for (int d = 0; d < 3; d++) {
-        for (unsigned i = 0; i < leaves; i++) {
-            double e = f->leaf_hi[d][i] - f->leaf_lo[d][i];
-            extent = e > extent ? e : extent;
-        }
-    }
-    return extent;
-}
+/* The tight boxes of a brick's leaves, in absolute coordinates; those past its
+ * last leaf are that of its last point.  lo, hi: aligned to 64 bytes. */
+void incode_frame_leaf_boxes(const struct incode_frame *f,
+                             double lo[3][INCODE_BRICK_LEAVES],
+                             double hi[3][INCODE_BRICK_LEAVES]);
 
-/* The tight box of a brick. */
-static inline void incode_frame_box(const struct incode_frame *f, double lo[3],
-                                    double hi[3])
-{
-    unsigned leaves = incode_frame_leaves(f);
-    for (int d = 0; d < 3; d++) {
-        lo[d] = f->leaf_lo[d][0];
-        hi[d] = f->leaf_hi[d][0];
-        for (unsigned i = 1; i < leaves; i++) {
-            lo[d] = f->leaf_lo[d][i] < lo[d] ? f->leaf_lo[d][i] : lo[d];
-            hi[d] = f->leaf_hi[d][i] > hi[d] ? f->leaf_hi[d][i] : hi[d];
-        }
-    }
-}
+/* The tight box of a brick; returns the longest side of its leaves. */
+double incode_frame_box(const struct incode_frame *f, double lo[3],
+                        double hi[3]);
 
 /* Where pages come from. */
 struct incode_page_source {

@@ -23,7 +23,7 @@
 #include "bricks.h"
 
 enum {
-    INCODE_LEAF_POINTS = 8, /* points a leaf box inside a brick */
+    INCODE_LEAF_POINTS = 8, /* points a leaf of a brick */
     INCODE_BRICK_LEAVES = 8,
     INCODE_BRICK_BYTES = 1536,
     INCODE_PAGE_BYTES = 1568, /* of the largest page */

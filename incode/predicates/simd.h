@@ -307,6 +307,38 @@ INCODE_INLINE double incode_vd_least_of(incode_vd a)
 #endif
 }
 
+/* The least of each of as many vectors as one has lanes, in their order. */
+INCODE_INLINE incode_vd
+incode_vd_least_of_each(const incode_vd a[INCODE_VD_LANES])
+{
+#if defined(INCODE_AVX512)
+    __m512d b[4], c[2];
+    for (int i = 0; i < 4; i++) {
+        __m512d even = (__m512d)a[2 * i], odd = (__m512d)a[2 * i + 1];
+        b[i] = _mm512_min_pd(_mm512_unpacklo_pd(even, odd),
+                             _mm512_unpackhi_pd(even, odd));
+    }
+    for (int i = 0; i < 2; i++)
+        c[i] =
+            _mm512_min_pd(_mm512_shuffle_f64x2(b[2 * i], b[2 * i + 1], 0x88),
+                          _mm512_shuffle_f64x2(b[2 * i], b[2 * i + 1], 0xdd));
+    return (incode_vd)_mm512_min_pd(_mm512_shuffle_f64x2(c[0], c[1], 0x88),
+                                    _mm512_shuffle_f64x2(c[0], c[1], 0xdd));
+#elif defined(INCODE_AVX2)
+    __m256d b[2];
+    for (int i = 0; i < 2; i++) {
+        __m256d even = (__m256d)a[2 * i], odd = (__m256d)a[2 * i + 1];
+        b[i] = _mm256_min_pd(_mm256_unpacklo_pd(even, odd),
+                             _mm256_unpackhi_pd(even, odd));
+    }
+    return (incode_vd)_mm256_min_pd(_mm256_permute2f128_pd(b[0], b[1], 0x20),
+                                    _mm256_permute2f128_pd(b[0], b[1], 0x31));
+#else
+    incode_vd even = {a[0][0], a[1][0]}, odd = {a[0][1], a[1][1]};
+    return incode_vd_min(even, odd);
+#endif
+}
+
 INCODE_INLINE incode_vf incode_vf_abs(incode_vf a)
 {
     return (incode_vf)((incode_vi)a & incode_vi_all(INT32_MAX));

@@ -574,7 +574,7 @@ const struct node_role node_worker_role = {
                {"triangulator, its local points and tasks", NULL},
                {"active face list", "faces"},
                {"open bricks", "entries"},
-               {"page frames", "pages of 1568 bytes and their boxes"}},
+               {"page frames", "pages of 1568 bytes"}},
     .arena_min = worker_arena_min,
     .start = worker_start,
     .message = worker_message,

@@ -1,5 +1,6 @@
 /* The pager against a plain model: a list of pages, the most recently used
  * first, and a set of those that are on their way. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -87,9 +88,11 @@ static bool model_get(struct model *m, uint32_t page)
 
 /* ---- pages ---- */
 
+/* In no order within a leaf. */
 static double coordinate(uint32_t page, uint32_t slot, int d)
 {
-    return (double)((page * 64 + slot) * 3 + (uint32_t)d) * 0.37 - 1000;
+    uint32_t mixed = (page * 64 + slot) * UINT32_C(2654435761);
+    return (double)(mixed * (uint32_t)(2 * d + 1) >> 8) * 0.37 - 2000000;
 }
 
 static uint32_t points_of(uint32_t page)
@@ -113,20 +116,33 @@ static size_t fill(uint32_t page, uint8_t *data)
     return 24 * (size_t)n;
 }
 
-static void check_leaves(const struct incode_frame *f)
+/* Boxes made of the frame's points against those of the points sent. */
+static void check_boxes(const struct incode_frame *f, uint32_t page)
 {
-    const double *axis[3] = {f->page.brick.x, f->page.brick.y, f->page.brick.z};
+    _Alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
+        leaf_hi[3][INCODE_BRICK_LEAVES];
+    double lo[3], hi[3], extent = 0;
+    uint32_t n = points_of(page);
+    incode_frame_leaf_boxes(f, leaf_lo, leaf_hi);
+    double longest = incode_frame_box(f, lo, hi);
     for (int d = 0; d < 3; d++) {
-        for (uint32_t leaf = 0; 8 * leaf < f->count; leaf++) {
-            double lo = axis[d][8 * leaf], hi = lo;
-            for (uint32_t i = 8 * leaf; i < 8 * leaf + 8 && i < f->count; i++) {
-                lo = axis[d][i] < lo ? axis[d][i] : lo;
-                hi = axis[d][i] > hi ? axis[d][i] : hi;
+        double least = INFINITY, most = -INFINITY;
+        for (uint32_t leaf = 0; leaf < incode_frame_leaves(f); leaf++) {
+            double from = INFINITY, to = -INFINITY;
+            for (uint32_t i = 8 * leaf; i < 8 * leaf + 8 && i < n; i++) {
+                from = fmin(from, coordinate(page, i, d));
+                to = fmax(to, coordinate(page, i, d));
             }
-            assert_true(f->leaf_lo[d][leaf] == lo);
-            assert_true(f->leaf_hi[d][leaf] == hi);
+            assert_true(leaf_lo[d][leaf] == from);
+            assert_true(leaf_hi[d][leaf] == to);
+            least = fmin(least, from);
+            most = fmax(most, to);
+            extent = fmax(extent, to - from);
         }
+        assert_true(lo[d] == least);
+        assert_true(hi[d] == most);
     }
+    assert_true(longest == extent);
 }
 
 static void check_frame(const struct incode_frame *f, uint32_t page)
@@ -146,7 +162,7 @@ static void check_frame(const struct incode_frame *f, uint32_t page)
         assert_true(f->page.brick.y[i] == coordinate(page, slot, 1));
         assert_true(f->page.brick.z[i] == coordinate(page, slot, 2));
     }
-    check_leaves(f);
+    check_boxes(f, page);
 }
 
 /* ---- traces ---- */

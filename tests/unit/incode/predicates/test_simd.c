@@ -91,6 +91,26 @@ static void doubles(void **unused)
     assert_true(same(incode_vd_all(-0.0)[D - 1], -0.0));
 }
 
+static void rows(void **unused)
+{
+    (void)unused;
+    for (int round = 0; round < ROUNDS; round++) {
+        incode_vd row[D];
+        double least[D];
+        for (int k = 0; k < D; k++) {
+            least[k] = INFINITY;
+            for (int i = 0; i < D; i++) {
+                double x = draw_double();
+                row[k][i] = isnan(x) ? 0 : x;
+                least[k] = row[k][i] < least[k] ? row[k][i] : least[k];
+            }
+        }
+        incode_vd each = incode_vd_least_of_each(row);
+        for (int k = 0; k < D; k++)
+            assert_true(each[k] == least[k]);
+    }
+}
+
 static void products(void **unused)
 {
     (void)unused;
@@ -218,6 +238,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(doubles, begin),
+        cmocka_unit_test_setup(rows, begin),
         cmocka_unit_test_setup(products, begin),
         cmocka_unit_test_setup(floats, begin),
         cmocka_unit_test_setup(whole_numbers, begin),
