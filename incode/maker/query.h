@@ -21,7 +21,7 @@
 #include "half_space.h"
 
 enum incode_question {
-    INCODE_QUERY_BOX,     /* leaves that meet a box */
+    INCODE_QUERY_BOX,     /* bricks that meet a box, all their leaves */
     INCODE_QUERY_APEX,    /* the apex of a face: first in Delaunay distance */
     INCODE_QUERY_NEAREST, /* the nearest neighbour of v */
     INCODE_QUERY_HALF_SPACE, /* the half-space of a normal that holds all points

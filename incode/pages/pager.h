@@ -1,11 +1,12 @@
 /* Pages in fixed frames, replaced least recently used first.  A frame is
  * reserved before its page is asked for, so that a reply always has room.
  *
- * Memory: incode_pager_bytes(frames), 1,600 of them a frame: a node that holds
- * a surface in few frames asks for pages the oftener the larger they are, so
- * boxes of leaves are made where they are wanted.  Work: constant for a page
- * that is there; where one is replaced, a look at the times of use of one group
- * of frames in 32, and of some groups as a rule; for a box of points, these.
+ * Memory: incode_pager_bytes(frames), 1,600 and 16 a frame.  Small nodes ask
+ * for a surface's pages again and again where frames are few, so that boxes of
+ * leaves are not kept but made where they are wanted.  Work: constant for a
+ * page that is there; where one is replaced, a look at the times of use of one
+ * group of frames in 32, and of some groups as a rule; for a box of points,
+ * these.
  *
  *     struct incode_frame *f = incode_pager_get(&pager, page);
  *     if (f != NULL)
