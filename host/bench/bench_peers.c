@@ -1,5 +1,6 @@
 #include "bench_peers.h"
 
+#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
@@ -46,6 +47,7 @@ static bool command(struct bench *b, unsigned turn,
                     const char *words[WORDS_MAX])
 {
     unsigned n = 0;
+    assert(turn < TURNS);
     enum host_bench_way way = turn == MAIN ? b->class->way : b->class->other;
     if (turn >= PEER) {
         words[n++] = b->builds.path[turn - PEER];

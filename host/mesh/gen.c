@@ -263,8 +263,9 @@ static void terrain(struct maker *m)
         side++;
     }
     do {
-        x = (double)(i % side);
-        y = (double)(i / side);
+        const uint64_t column = i % side, row = i / side;
+        x = (double)column;
+        y = (double)row;
         height = 0;
         for (uint64_t octave = 0; octave < 6; octave++) {
             double step = (double)(128 >> octave);

@@ -128,10 +128,10 @@ END
     rm -f "$scratch/out.npy"
     refused 'another key: exit 4' 's/cube.key/other.key/'
     check 'links/another key: it says so' "$(last "$scratch/errors")" \
-        grep -q 'link 0: answers, but with another key; ' "$scratch/errors"
+        grep -q 'link 0: answers, but with another key for .*; give both ends the' "$scratch/errors"
     refused 'no key: exit 4' 's/--key [^ ]*/--insecure/'
     check 'links/no key: the host says so' "$(last "$scratch/errors")" \
-        grep -q 'link 0: answers, but has no key; ' "$scratch/errors"
+        grep -q 'link 0: answers, but has no key for .*; give both ends the' "$scratch/errors"
     check 'links/no key: the node says what that means' \
         "$(last "$scratch/said")" grep -q \
         "^incode-node: --wire 0=listen:.*$((base + 50)): insecure: .*; make a key" \
@@ -145,7 +145,7 @@ END
     refused 'a key at the node alone: exit 4' ''
     check 'links/a key at the node alone: the host says so' \
         "$(last "$scratch/errors")" \
-        grep -q 'link 0: answers, but wants a key; ' "$scratch/errors"
+        grep -q 'link 0: answers, but wants a key for .*; give both ends the' "$scratch/errors"
     check 'links/no output without a key' 'it left one' \
         test ! -e "$scratch/out.npy"
     rm "$scratch/said"
