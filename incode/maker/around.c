@@ -120,9 +120,10 @@ static float middle(const struct incode_horizon *h, const struct look *look,
         level += y * look->cap.n[d];
         along += y * c0[d];
     }
-    float length = __builtin_sqrtf(square);
-    return level > 0.05F * length ? (square - 2 * along) / level
-                                  : 1e20F * (1 + length);
+    /* Less than 3 degrees above the face tells nothing. */
+    return level > 0 && level * level > 0.0025F * square
+               ? (square - 2 * along) / level
+               : 1e20F * (1 + square);
 }
 
 /* The centre of the face's circle, about, in the horizon's units. */
