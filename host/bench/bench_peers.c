@@ -1,6 +1,5 @@
 #include "bench_peers.h"
 
-#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <stdio.h>
@@ -47,12 +46,12 @@ static bool command(struct bench *b, unsigned turn,
                     const char *words[WORDS_MAX])
 {
     unsigned n = 0;
-    assert(turn < TURNS);
+    bool first = b->turns[turn].rounds == 0;
     enum host_bench_way way = turn == MAIN ? b->class->way : b->class->other;
     if (turn >= PEER) {
         words[n++] = b->builds.path[turn - PEER];
         words[n++] = set->path;
-        words[n++] = b->turns[turn].rounds == 0 ? "digest" : NULL;
+        words[n++] = first ? "digest" : NULL;
         words[n] = NULL;
         return b->builds.there[turn - PEER];
     }

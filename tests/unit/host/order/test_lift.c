@@ -301,10 +301,11 @@ static bool balls_beside(const struct incode_lifted *l,
                          l->a[k][2] * l->a[k][2]);
         thin = length[k] < length[thin] ? k : thin;
     }
-    for (double times = 1; times <= 1e4; times *= 10) {
+    static const double times[] = {1, 10, 100, 1e3, 1e4};
+    for (unsigned i = 0; i < sizeof times / sizeof times[0]; i++) {
         for (int side = -1; side <= 1; side += 2) {
-            double radius = times * l->radius;
-            double gap = l->radius * (0x1p-10 + 0x1p-5 / times);
+            double radius = times[i] * l->radius;
+            double gap = l->radius * (0x1p-10 + 0x1p-5 / times[i]);
             for (int d = 0; d < 3; d++)
                 c[d] = l->o[d] +
                        side * (radius + gap) * l->a[thin][d] / length[thin];
