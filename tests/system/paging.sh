@@ -16,7 +16,7 @@ says() {
 }
 incode gen sphere 20000 -o "$scratch/sphere.npy"
 incode gen uniform 20000 -o "$scratch/uniform.npy"
-asks='a node holds 7[0-9] % of these points at a time, and much of the time'
+asks='a node holds 8[0-9] % of these points at a time, and much of the time'
 says told "incode: --memory 1M: $asks .*; --memory 2M would hold all of them" \
     "$scratch/sphere.npy" --memory 1M --nodes 2
 says advice '' "$scratch/sphere.npy" --memory 2M --nodes 2
