@@ -14,11 +14,11 @@ says() {
     check "paging/$name" "it says: $(cat "$scratch/errors")" \
         matches "$scratch/errors" "$pattern"
 }
-incode gen sphere 20000 -o "$scratch/sphere.npy"
+incode gen sphere 10000 -o "$scratch/sphere.npy"
 incode gen uniform 20000 -o "$scratch/uniform.npy"
-asks='a node holds 8[0-9] % of these points at a time, and much of the time'
-says told "incode: --memory 1M: $asks .*; --memory 2M would hold all of them" \
-    "$scratch/sphere.npy" --memory 1M --nodes 2
-says advice '' "$scratch/sphere.npy" --memory 2M --nodes 2
-says quiet '' "$scratch/sphere.npy" --memory 1M --nodes 2 -q
+asks='a node holds 6[0-9] % of these points at a time, and much of the time'
+says told "incode: --memory 512K: $asks .*; --memory 1M would hold all of them" \
+    "$scratch/sphere.npy" --memory 512K --nodes 2
+says advice '' "$scratch/sphere.npy" --memory 1M --nodes 2
+says quiet '' "$scratch/sphere.npy" --memory 512K --nodes 2 -q
 says uniform '' "$scratch/uniform.npy" --memory 640K --nodes 2
