@@ -241,9 +241,15 @@ static bool add_rest(struct incode_horizon *h, const struct view *view,
             h->lo[d][i] = lo < h->lo[d][i] ? lo : h->lo[d][i];
             h->hi[d][i] = hi > h->hi[d][i] ? hi : h->hi[d][i];
         }
-        float far = view->far[child];
-        h->far[i] = far > h->far[i] ? far : h->far[i];
     }
+    /* Its corner may be farther off than that of any of them. */
+    float far = 0;
+    for (int d = 0; d < 3; d++) {
+        float lo = __builtin_fabsf(h->lo[d][i]);
+        float hi = __builtin_fabsf(h->hi[d][i]);
+        far += lo > hi ? lo : hi;
+    }
+    h->far[i] = far * (1 + 0x1p-20F);
     return true;
 }
 
