@@ -3,10 +3,9 @@
 
 #include "apex.h"
 #include "hits.h"
-#include "incode/predicates/simd.h"
 
-/* MakeTetra among the bricks around, where the local points do not suffice.
- * For a regular face, points are ordered along its pencil of spheres: one pass
+/* MakeTetra over the horizon, where the local points do not suffice.  For a
+ * regular face, points are ordered along its pencil of spheres: one pass
  * keeps all that lie in the ball of the first so far, and the predicates
  * compare only what is still in the last ball. */
 
@@ -48,16 +47,17 @@ enum { CROWD = 32 /* boxes: so many are many */ };
 /* Where a cap reaches many boxes, points may lie on one sphere up to rounding:
  * empty spheres met before rule out others. */
 static void bound(const struct incode_maker *m, const struct incode_query *q,
-                  struct look *look, struct incode_radical_bound *radical)
+                  struct look *look)
 {
+    struct incode_radical_bound radical;
     if (look->bricks + look->pages < CROWD || q->best == INCODE_NONE ||
         look->cap.bounded)
         return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
-    incode_radical_bound_set(radical, &m->empty, p, q->scale, q->sphere.n);
-    if (!radical->set)
+    incode_radical_bound_set(&radical, &m->empty, p, q->scale, q->sphere.n);
+    if (!radical.set)
         return;
-    incode_horizon_bound(&m->horizon, &look->cap, q->scale, radical);
+    incode_horizon_bound(&m->horizon, &look->cap, q->scale, &radical);
     reach(&m->horizon, look);
 }
 
@@ -231,7 +231,6 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
     struct incode_query *q = &s->query;
     struct look look = {.done = {0}};
     float c0[3];
-    struct incode_radical_bound radical = {.set = false};
     bool strictly = q->best == INCODE_NONE;
     uint32_t tries = 0;
     if (strictly)
@@ -247,7 +246,7 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
                                   : sphere_cap(h, q, &look.cap)))
             return false;
         reach(h, &look);
-        bound(m, q, &look, &radical);
+        bound(m, q, &look);
         if (look.bricks + look.pages == 0 && !strictly)
             return true;
         if (look.bricks + look.pages == 0) {
@@ -375,7 +374,6 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
 {
     struct incode_maker *m = n->maker;
     struct look look = {.done = {0}};
-    struct incode_radical_bound radical = {.set = false};
     float c0[3];
     bool much;
     set_middle(n, c0);
@@ -385,7 +383,7 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
     for (;;) {
         bool none = q->best == INCODE_NONE && !(q->t < __builtin_inf());
         reach(&m->horizon, &look);
-        bound(m, q, &look, &radical);
+        bound(m, q, &look);
         if (look.bricks + look.pages == 0)
             return true;
         /* Those who know of half-spaces do better. */

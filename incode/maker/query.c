@@ -474,11 +474,6 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
     if (count > INCODE_FANOUT)
         count = INCODE_FANOUT;
     uint32_t mask = passing_children(w->q, &frame->page.boxes, count);
-    if (level == 1 && w->q->boxes_only)
-        return mask == 0 ||
-                       w->visit(w->walker, w->q, frame, first, mask, w->context)
-                   ? INCODE_WALK_DONE
-                   : INCODE_WALK_STOP;
     for (uint32_t left = mask; left != 0; left &= left - 1) {
         unsigned child = (unsigned)__builtin_ctz(left);
         uint64_t end = brick_end(level - 1, (uint64_t)first + child);

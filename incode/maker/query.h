@@ -41,7 +41,6 @@ struct incode_query {
     bool round;          /* APEX: what matters lies in the ball below */
     bool lens;           /* round: it is less than the sphere (half_space.h) */
     bool large;          /* round, and the sphere itself tells of boxes, too */
-    bool boxes_only;     /* BOX: visits pages of level 1, not bricks */
     bool done;           /* not what lies within [done_lo, done_hi] */
     bool pauses;         /* the walk is suspended where the walker has no more
                             units left, with INCODE_NONE missing */
@@ -100,8 +99,8 @@ static inline void incode_walker_spend(struct incode_walker *walker,
     walker->left = walker->left > units ? walker->left - units : 0;
 }
 
-/* Called with a brick and its leaves that pass, one bit each (boxes_only: the
- * first brick of a page and its boxes that pass); false stops the walk. */
+/* Called with a brick and its leaves that pass, one bit each; false stops the
+ * walk. */
 typedef bool incode_visit(struct incode_walker *walker, struct incode_query *q,
                           const struct incode_frame *frame, uint32_t brick,
                           uint32_t leaves, void *context);
