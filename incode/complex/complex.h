@@ -1,0 +1,172 @@
+/* The Delaunay triangulation of some of the points, kept whole and grown point
+ * by point (Bowyer, Computer Journal 24, 1981; Watson, ibid.): the cells whose
+ * spheres hold the new point give way to those between it and their boundary.
+ * Ties are the predicates', so it is the one triangulation of its points.
+ *
+ * Outside the hull there are infinite cells, one beyond each of its facets,
+ * with the vertex INCODE_COMPLEX_INFINITE; so every cell has four neighbours.
+ *
+ * Memory: given by its owner, 32 bytes a point and 32 a cell, of which there
+ * are some 7 a point; 40 KB of stack.  Work: an insertion walks to the point
+ * from a cell near by, and looks at the cells that give way and at those around
+ * them; there may be as many as there are.
+ *
+ *     incode_complex_init(&x, memory, bytes);
+ *     v = incode_complex_add(&x, p, id);   // four of them, and others
+ *     if (incode_complex_begin(&x, &tally, four))
+ *         room = incode_complex_insert(&x, &tally, v, near);
+ */
+#ifndef INCODE_COMPLEX_H
+#define INCODE_COMPLEX_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "incode/pages/bricks.h"
+#include "incode/predicates/predicates.h"
+
+enum {
+    INCODE_COMPLEX_POINTS_MAX = 65534,
+    INCODE_COMPLEX_CELLS_MAX = (1 << 23) - 2,
+    INCODE_CELL_NONE = (1 << 24) - 1, /* at the end of a list by n[0] */
+    INCODE_COMPLEX_INFINITE = 0,      /* the vertex beyond the hull */
+    /* In the place of a neighbour that has been released, a finite and an
+     * infinite one. */
+    INCODE_COMPLEX_GONE = 0,
+    INCODE_COMPLEX_GONE_INFINITE = 1,
+    INCODE_COMPLEX_CELLS_FIRST = 2
+};
+
+/* A cell of positive orientation, were its infinite vertex a point beyond the
+ * facet; v[3] is finite.  n[i].cell: the neighbour opposite v[i].  In a free
+ * cell, n[0].cell is the next free one. */
+struct incode_cell {
+    uint16_t v[4];
+    struct {
+        uint32_t cell : 24, low : 8; /* of sphere[i]: its last bits */
+    } n[4];
+    int16_t sphere[3]; /* with the scale, as sphere.h has it */
+    uint8_t scale;
+    uint8_t flags; /* INCODE_CELL_... */
+};
+
+enum {
+    INCODE_CELL_MARK = 3,       /* 0 at each call, and after it */
+    INCODE_CELL_PROVED = 3 * 4, /* 0 in a new cell; else its owner's */
+    INCODE_CELL_INFINITE = 16,
+    INCODE_CELL_SCALE = 7 * 32 /* the last bits of it */
+};
+
+struct incode_complex_point {
+    double p[3];
+    uint32_t id;   /* vertex number */
+    uint32_t cell; /* one of its cells, or INCODE_NONE: it is no vertex */
+};
+
+_Static_assert(sizeof(struct incode_cell) == 32, "two in a cache line");
+_Static_assert(sizeof(struct incode_complex_point) == 32, "here, too");
+
+struct incode_complex {
+    /* Points from the start of the memory, cells from its end: cell i is
+     * cell[-i]. */
+    struct incode_complex_point *point;
+    struct incode_cell *cell;
+    size_t bytes;
+    uint32_t points;      /* with the infinite one, which is the first */
+    uint32_t points_kept; /* room for so many at least */
+    uint32_t cells;       /* used or free */
+    uint32_t free, free_count;
+    uint32_t free_point; /* by `id`, up to 0 */
+    uint64_t scans; /* insertions that looked at all cells for a first one */
+};
+
+/* memory: aligned to 8 bytes; faster where it begins and ends at multiples of
+ * 32. */
+void incode_complex_init(struct incode_complex *x, void *memory, size_t bytes);
+
+/* Keeps room for so many points, which cells do not take. */
+void incode_complex_reserve(struct incode_complex *x, uint32_t points);
+
+/* Forgets all. */
+void incode_complex_clear(struct incode_complex *x);
+
+/* Adds a point to those that may be inserted; it is no vertex yet.  Returns its
+ * index, from 1 on, or INCODE_NONE: there is no room. */
+uint32_t incode_complex_add(struct incode_complex *x, const double p[3],
+                            uint32_t id);
+
+/* Makes four of the points, which span space, the first vertices.  False: they
+ * do not, or there is no room. */
+bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
+                          const uint32_t four[4]);
+
+/* Releases the cells that are proved: none of their spheres will hold a point
+ * that is inserted later.  Vertices that have no cell left are forgotten, and
+ * their places taken by points that are added; so is what is no vertex yet.
+ * n[0] and the points' `cell` may have been used for lists before. */
+void incode_complex_release(struct incode_complex *x);
+
+/* Inserts a point that is no vertex yet, and is none of theirs, from the vertex
+ * `near` on, best one near by.  False: there is no room, or the same point is a
+ * vertex; all is as before. */
+bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
+                           uint32_t v, uint32_t near);
+
+/* Gives those of cells 0 to x->cells - 1 that are free v[0] = v[1]; it is not
+ * needed for anything else. */
+void incode_complex_tell_free(struct incode_complex *x);
+
+static inline bool incode_cell_is_free(const struct incode_cell *c)
+{
+    return c->v[0] == c->v[1];
+}
+
+/* What its owner has put down of a cell: 0 to 3. */
+static inline unsigned incode_cell_proved(const struct incode_cell *c)
+{
+    return (c->flags & (unsigned)INCODE_CELL_PROVED) / 4;
+}
+
+static inline void incode_cell_set_proved(struct incode_cell *c, unsigned to)
+{
+    c->flags = (uint8_t)((c->flags & ~(unsigned)INCODE_CELL_PROVED) | to * 4);
+}
+
+/* Whether a point is a vertex. */
+static inline bool incode_complex_is_vertex(const struct incode_complex *x,
+                                            uint32_t v)
+{
+    return x->point[v].cell != INCODE_NONE;
+}
+
+static inline struct incode_cell *
+incode_complex_cell(const struct incode_complex *x, uint32_t i)
+{
+    return x->cell - i;
+}
+
+/* Makes a cell the neighbour i of another. */
+static inline void incode_cell_join(struct incode_cell *c, unsigned i,
+                                    uint32_t to)
+{
+    c->n[i].cell = to & (uint32_t)INCODE_CELL_NONE;
+}
+
+/* Where a vertex is in a cell: 0 to 3; 4: nowhere. */
+static inline unsigned incode_cell_index(const struct incode_cell *c,
+                                         uint32_t v)
+{
+    return c->v[0] == v   ? 0
+           : c->v[1] == v ? 1
+           : c->v[2] == v ? 2
+           : c->v[3] == v ? 3
+                          : 4;
+}
+
+static inline bool incode_cell_is_infinite(const struct incode_cell *c)
+{
+    return incode_cell_index(c, INCODE_COMPLEX_INFINITE) != 4;
+}
+
+#endif

@@ -1,0 +1,250 @@
+/* Insertions where few cells give way: all lists are on the stack, and hardly a
+ * branch depends on what the points are. */
+#include <string.h>
+
+#include "cavity.h"
+#include "sphere.h"
+
+enum {
+    FACETS_MAX = 220,
+    POINTS_MAX = FACETS_MAX / 2 + 2,
+    SLOTS_MAX = FACETS_MAX + INCODE_SPHERE_BATCH,
+    LOOKED_AT_MAX = 640 /* cells */
+};
+
+struct cavity {
+    uint32_t gone, looked_at, facets;
+    uint32_t cell[LOOKED_AT_MAX];   /* those that give way */
+    uint32_t other[LOOKED_AT_MAX];  /* those looked at, with these */
+    uint32_t facet[FACETS_MAX + 4]; /* 4 times the cell, and its index in it */
+};
+
+/* Takes the marks away. */
+static void forget(struct incode_complex *x, const struct cavity *cavity)
+{
+    for (uint32_t j = 0; j < cavity->looked_at; j++)
+        incode_cell_unmark(incode_complex_cell(x, cavity->other[j]));
+}
+
+/* Neighbours of cells that give way, from `from` on, that were not looked at
+ * yet. */
+static void look_around(struct incode_complex *x, struct cavity *cavity,
+                        uint32_t from)
+{
+    struct incode_cell *cell = x->cell;
+    uint32_t count = cavity->looked_at;
+    for (uint32_t j = from; j < cavity->gone; j++) {
+        const struct incode_cell *c = cell - cavity->cell[j];
+        for (unsigned i = 0; i < 4; i++) {
+            struct incode_cell *n = cell - c->n[i].cell;
+            cavity->other[count] = c->n[i].cell;
+            count += incode_cell_mark(n) == 0;
+            n->flags |= INCODE_CELL_STAYS;
+        }
+    }
+    cavity->looked_at = count;
+}
+
+/* False: too many cells. */
+static bool find(struct incode_complex *x, struct incode_tally *tally,
+                 uint32_t v, uint32_t first, struct cavity *cavity)
+{
+    const double p[3] = {x->point[v].p[0], x->point[v].p[1], x->point[v].p[2]};
+    const struct incode_complex_point *point = x->point;
+    struct incode_cell *cell = x->cell;
+    uint32_t from = 0;
+    cavity->cell[0] = cavity->other[0] = first;
+    cavity->gone = cavity->looked_at = 1;
+    incode_complex_cell(x, first)->flags |= INCODE_CELL_GOES;
+    while (from < cavity->gone) {
+        uint32_t j = cavity->looked_at, gone = cavity->gone;
+        if (j + 4 * (gone - from) > LOOKED_AT_MAX)
+            return false;
+        look_around(x, cavity, from);
+        from = gone;
+        for (; j < cavity->looked_at; j++) {
+            double bound;
+            struct incode_cell *c = cell - cavity->other[j];
+            double t = incode_sphere_power(point, c, p, &bound);
+            uint32_t goes = t < 0;
+            if (__builtin_expect(!(__builtin_fabs(t) > bound), 0))
+                goes = incode_complex_holds(x, tally, c, p);
+            cavity->cell[gone] = cavity->other[j];
+            gone += goes;
+            c->flags |= (uint8_t)(2 * goes);
+        }
+        cavity->gone = gone;
+    }
+    return true;
+}
+
+static bool list_facets(const struct incode_complex *x, struct cavity *cavity)
+{
+    uint32_t facets = 0;
+    for (uint32_t j = 0; j < cavity->gone && facets <= FACETS_MAX; j++) {
+        uint32_t at = cavity->cell[j];
+        const struct incode_cell *c = incode_complex_cell(x, at);
+        for (unsigned i = 0; i < 4; i++) {
+            cavity->facet[facets] = at * 4 + i;
+            facets += incode_cell_mark(incode_complex_cell(x, c->n[i].cell)) ==
+                      INCODE_CELL_STAYS;
+        }
+    }
+    cavity->facets = facets;
+    return facets <= FACETS_MAX;
+}
+
+/* In `cell` of a point around the cavity, which gets another: its number. */
+#define NUMBER (UINT32_C(1) << 31)
+
+/* The new cells: on each facet of the boundary, whose points are numbered. */
+struct filling {
+    uint32_t cell[FACETS_MAX];
+    uint32_t outer[FACETS_MAX]; /* the cell beyond the facet */
+    uint8_t back[FACETS_MAX];   /* the facet's index there */
+    uint16_t v[FACETS_MAX][4];
+    uint8_t number[3][SLOTS_MAX]; /* of its vertices */
+    uint16_t point[POINTS_MAX];   /* by number */
+    uint32_t cell_of[POINTS_MAX]; /* one of its new cells */
+    double p[3][POINTS_MAX];      /* as seen from the new one */
+    double infinite[POINTS_MAX];
+    /* The facet with the edge from one point to another. */
+    uint8_t with_edge[POINTS_MAX][POINTS_MAX];
+};
+
+static void take_cells(struct incode_complex *x, const struct cavity *cavity,
+                       uint32_t *cell)
+{
+    uint32_t gone = cavity->gone, facets = cavity->facets;
+    for (uint32_t f = 0; f < facets; f++)
+        cell[f] = f < gone ? cavity->cell[f] : incode_complex_take_cell(x);
+}
+
+/* Those that give way and whose places nobody has taken are free. */
+static void free_cells(struct incode_complex *x, const struct cavity *cavity)
+{
+    for (uint32_t j = cavity->facets; j < cavity->gone; j++) {
+        incode_cell_join(incode_complex_cell(x, cavity->cell[j]), 0, x->free);
+        x->free = cavity->cell[j];
+        x->free_count++;
+    }
+}
+
+/* Takes from the cells that give way what the new ones need to know; returns
+ * how many points there are. */
+static uint32_t number(struct incode_complex *x, const struct cavity *cavity,
+                       struct filling *fill, uint32_t v)
+{
+    struct incode_complex_point *point = x->point;
+    struct incode_cell *cell = x->cell;
+    uint32_t points = 0;
+    for (uint32_t f = 0; f < cavity->facets; f++) {
+        uint32_t at = cavity->facet[f] >> 2, i = cavity->facet[f] & 3, s[3];
+        const struct incode_cell *c = cell - at;
+        struct incode_cell *n = cell - c->n[i].cell;
+        incode_cell_unmark(n);
+        fill->outer[f] = c->n[i].cell;
+        fill->back[f] =
+            (uint8_t)((n->n[1].cell == at) + 2 * (n->n[2].cell == at) +
+                      3 * (n->n[3].cell == at));
+        for (unsigned k = 0; k < 3; k++) {
+            uint16_t w = c->v[incode_cell_facet[i][k]];
+            struct incode_complex_point *p = &point[w];
+            bool known = (p->cell & NUMBER) != 0;
+            s[k] = known ? p->cell & ~NUMBER : points;
+            points += !known;
+            p->cell = s[k] | NUMBER;
+            fill->cell_of[s[k]] = fill->cell[f];
+            fill->v[f][k] = w;
+            fill->number[k][f] = (uint8_t)s[k];
+            fill->point[s[k]] = w;
+        }
+        fill->v[f][3] = (uint16_t)v;
+        fill->with_edge[s[1]][s[2]] = (uint8_t)f;
+        fill->with_edge[s[2]][s[0]] = (uint8_t)f;
+        fill->with_edge[s[0]][s[1]] = (uint8_t)f;
+    }
+    return points;
+}
+
+static void see_from(struct incode_complex *x, struct filling *fill,
+                     uint32_t points, uint32_t v)
+{
+    const double *o = x->point[v].p;
+    for (uint32_t s = 0; s < points; s++) {
+        bool infinite = fill->point[s] == INCODE_COMPLEX_INFINITE;
+        struct incode_complex_point *point = &x->point[fill->point[s]];
+        const double *p = infinite ? o : point->p;
+        point->cell = fill->cell_of[s];
+        fill->infinite[s] = infinite;
+        for (int k = 0; k < 3; k++)
+            fill->p[k][s] = p[k] - o[k];
+    }
+}
+
+static inline void write_one(struct incode_complex *x,
+                             const struct filling *fill, uint32_t f)
+{
+    struct incode_cell *d = x->cell - fill->cell[f];
+    uint32_t a = fill->number[0][f], b = fill->number[1][f],
+             c = fill->number[2][f];
+    memcpy(d->v, fill->v[f], sizeof d->v);
+    incode_cell_join(d, 0, fill->cell[fill->with_edge[c][b]]);
+    incode_cell_join(d, 1, fill->cell[fill->with_edge[a][c]]);
+    incode_cell_join(d, 2, fill->cell[fill->with_edge[b][a]]);
+    incode_cell_join(d, 3, fill->outer[f]);
+    incode_cell_join(x->cell - fill->outer[f], fill->back[f], fill->cell[f]);
+}
+
+static void write(struct incode_complex *x, struct filling *fill,
+                  uint32_t facets)
+{
+    enum { BATCH = INCODE_SPHERE_BATCH };
+    struct incode_sphere_batch b;
+    for (int i = 0; i < 3; i++)
+        memset(&fill->number[i][facets], 0, BATCH);
+    for (uint32_t first = 0; first < facets; first += BATCH) {
+        uint32_t some = facets - first < BATCH ? facets - first : BATCH;
+        for (int i = 0; i < 3; i++) {
+            const uint8_t *s = &fill->number[i][first];
+            for (int k = 0; k < 3; k++)
+                for (uint32_t j = 0; j < BATCH; j++)
+                    b.p[i][k][j] = fill->p[k][s[j]];
+            for (uint32_t j = 0; j < BATCH; j++)
+                b.infinite[i][j] = fill->infinite[s[j]];
+        }
+        incode_sphere_compute(&b);
+        for (uint32_t j = 0; j < some; j++) {
+            write_one(x, fill, first + j);
+            incode_sphere_keep(x->cell - fill->cell[first + j], &b, j);
+        }
+    }
+}
+
+enum incode_cavity_result
+incode_complex_insert_small(struct incode_complex *x,
+                            struct incode_tally *tally, uint32_t v,
+                            uint32_t first)
+{
+    struct cavity cavity;
+    struct filling fill;
+    if (!find(x, tally, v, first, &cavity) || !list_facets(x, &cavity)) {
+        forget(x, &cavity);
+        return INCODE_CAVITY_LARGE;
+    }
+    /* Cells that give way make room for others. */
+    uint32_t more =
+        cavity.facets > cavity.gone ? cavity.facets - cavity.gone : 0;
+    if (!incode_complex_has_room(x, 0, more)) {
+        forget(x, &cavity);
+        return INCODE_CAVITY_FULL;
+    }
+    take_cells(x, &cavity, fill.cell);
+    see_from(x, &fill, number(x, &cavity, &fill, v), v);
+    free_cells(x, &cavity);
+    write(x, &fill, cavity.facets);
+    /* The analyser does not see that a cavity has facets.
+     * NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
+    x->point[v].cell = fill.cell[0];
+    return INCODE_CAVITY_FILLED;
+}
