@@ -197,23 +197,6 @@ static void build_leaves(struct host_item *a, size_t n)
     }
 }
 
-/* Where to cut bricks [a, a + count): at the multiple of 32^k nearest to the
- * middle, for the largest k that leaves a fifth on either side, so that the
- * children of a box page lie together. */
-static uint32_t cut_bricks(uint32_t a, uint32_t count)
-{
-    uint64_t first = a, last = first + count, middle = first + count / 2;
-    uint64_t fifth = (count + 4) / 5;
-    for (uint64_t step = (uint64_t)1 << 25; step > 1; step >>= 5) {
-        uint64_t cut = (middle + step / 2) / step * step;
-        if (cut > first && cut < last && cut - first >= fifth &&
-            last - cut >= fifth) {
-            return (uint32_t)(cut - first);
-        }
-    }
-    return count / 2;
-}
-
 struct task {
     struct host_item *items;
     size_t n;
@@ -236,7 +219,7 @@ static void build(void *argument)
     host_kd_box(t->items, t->n, lo, hi);
     int d = host_kd_longest(lo, hi);
     size_t bricks = (t->n + INCODE_BRICK_POINTS - 1) / INCODE_BRICK_POINTS;
-    uint32_t cut = cut_bricks(t->first_brick, (uint32_t)bricks);
+    uint32_t cut = incode_bricks_cut(t->first_brick, (uint32_t)bricks);
     size_t k = (size_t)cut * INCODE_BRICK_POINTS;
     host_kd_rank(t->items, t->n, k, d, (int)(t->from_above >> d & 1));
     struct task first = *t, second = *t;

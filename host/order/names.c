@@ -11,3 +11,7 @@ const char *const host_indexes[] = {
     [INCODE_NAIVE] = "naive", [INCODE_GRID] = "grid", [INCODE_KD] = "kd", NULL};
 const char *const host_face_rules[] = {
     [INCODE_FACE_OWN] = "own", [INCODE_FACE_PAPER] = "paper", NULL};
+const char *const host_builds[] = {[INCODE_BUILD_AUTO] = "auto",
+                                   [INCODE_BUILD_FACES] = "faces",
+                                   [INCODE_BUILD_POINTS] = "points",
+                                   NULL};

@@ -12,5 +12,6 @@
 extern const char *const host_partitions[]; /* enum host_partition */
 extern const char *const host_indexes[];    /* enum incode_index */
 extern const char *const host_face_rules[]; /* enum incode_face_rule */
+extern const char *const host_builds[];     /* enum incode_build */
 
 #endif

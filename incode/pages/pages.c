@@ -35,3 +35,15 @@ uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page)
     }
     return level;
 }
+
+uint32_t incode_bricks_cut(uint32_t first, uint32_t count)
+{
+    uint64_t from = first, to = from + count, middle = from + count / 2;
+    uint64_t fifth = ((uint64_t)count + 4) / 5;
+    for (uint64_t step = (uint64_t)1 << 25; step > 1; step >>= 5) {
+        uint64_t cut = (middle + step / 2) / step * step;
+        if (cut > from && cut < to && cut - from >= fifth && to - cut >= fifth)
+            return (uint32_t)(cut - from);
+    }
+    return count / 2;
+}

@@ -75,6 +75,12 @@ struct incode_tree {
 void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
                       uint32_t cells);
 
+/* Where bricks [first, first + count), 2 or more, are cut in space: so many
+ * come before the cut.  At the multiple of 32^k nearest to the middle, for the
+ * largest k that leaves a fifth on either side, so that the children of a box
+ * page lie together. */
+uint32_t incode_bricks_cut(uint32_t first, uint32_t count);
+
 /* Level of a page, or tree->levels for the uniform grid's pages. */
 uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page);
 
