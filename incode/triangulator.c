@@ -3,88 +3,13 @@
 #include <assert.h>
 #include <string.h>
 
+#include "arena.h"
 #include "incode/pages/sound.h"
 #include "incode/predicates/check.h"
 #include "state.h"
 
 static_assert((int)INCODE_HINT_NONE == INCODE_LOCAL_NONE, "hints are indices");
 static_assert((int)INCODE_TASKS == INCODE_SEARCHES, "a search for each task");
-
-/* ---- memory ---- */
-
-static size_t round_up(size_t bytes)
-{
-    return (bytes + 63) & ~(size_t)63;
-}
-
-static uint32_t between(size_t least, size_t a, size_t most)
-{
-    return (uint32_t)(a < least ? least : a > most ? most : a);
-}
-
-/* The horizon of a maker: a box for 4 KB, a copy for 64 KB. */
-static struct incode_maker_share horizon_of(size_t bytes)
-{
-    size_t boxes = bytes >> 12, copies = bytes >> 16;
-    return (struct incode_maker_share){
-        between(INCODE_HORIZON_MIN, boxes / 64 * 64, INCODE_HORIZON_MAX),
-        between(16, copies, INCODE_HORIZON_COPIES), 0};
-}
-
-/* How an arena is divided. */
-struct shares {
-    struct incode_front_share front;
-    struct incode_maker_share maker;
-};
-
-/* The active face list takes three eighths of what the control block leaves
- * (the front of a region of 1,250,000 points, with a tenth to spare), the
- * bricks a sixteenth, page frames the rest. */
-static bool divide(struct shares *s, struct incode_map *map, size_t bytes)
-{
-    memset(map, 0, sizeof *map);
-    s->maker = horizon_of(bytes);
-    size_t horizon = incode_horizon_bytes(s->maker.boxes, s->maker.copies);
-    map->control = round_up(sizeof(struct incode_triangulator)) + horizon;
-    map->local_points = sizeof(struct incode_local_points);
-    map->tasks = (sizeof(struct incode_task) + sizeof(struct incode_search)) *
-                 INCODE_TASKS;
-    if (bytes < map->control)
-        return false;
-    size_t rest = bytes - map->control;
-    size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
-    size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
-    map->afl_faces = rest * 3 / 8 / face;
-    map->brick_entries = rest / 16 / brick;
-    if (map->afl_faces < INCODE_FACES_MIN)
-        map->afl_faces = INCODE_FACES_MIN;
-    if (map->brick_entries < INCODE_ENTRIES_MIN)
-        map->brick_entries = INCODE_ENTRIES_MIN;
-    s->front = (struct incode_front_share){(uint32_t)map->afl_faces,
-                                           (uint32_t)map->brick_entries};
-    size_t both = incode_front_bytes(&s->front);
-    map->bricks = map->brick_entries * brick;
-    map->afl = both - map->bricks;
-    size_t used = map->control + round_up(both);
-    if (bytes < used)
-        return false;
-    s->maker.frames = incode_maker_frames(&s->maker, bytes - used + horizon);
-    map->frame_count = s->maker.frames;
-    map->frames = incode_maker_bytes(&s->maker) - horizon;
-    map->total = used + map->frames;
-    return map->frame_count >= INCODE_FRAMES_MIN;
-}
-
-size_t incode_arena_min(const struct incode_setup *setup)
-{
-    (void)setup;
-    size_t bytes = sizeof(struct incode_triangulator);
-    struct incode_map map;
-    struct shares shares;
-    while (!divide(&shares, &map, bytes))
-        bytes += 1024;
-    return bytes;
-}
 
 static const char *grid_fault(const uint32_t cells[3])
 {
@@ -111,6 +36,8 @@ const char *incode_setup_fault(const struct incode_setup *setup)
     if (setup->face_rule != INCODE_FACE_OWN &&
         setup->face_rule != INCODE_FACE_PAPER)
         return "invalid setup: unknown face rule";
+    if (setup->build > INCODE_BUILD_POINTS)
+        return "invalid setup: unknown way to build";
     if (setup->reserved != 0 || setup->reserved2 != 0)
         return "invalid setup: what is reserved is not 0";
     for (int d = 0; d < 3; d++)
@@ -124,18 +51,23 @@ const char *incode_setup_fault(const struct incode_setup *setup)
     return NULL;
 }
 
+static bool may_insert(const struct incode_setup *setup)
+{
+    return setup->index == INCODE_KD && setup->face_rule == INCODE_FACE_OWN;
+}
+
 struct incode_triangulator *
 incode_triangulator_init(void *arena, size_t bytes,
                          const struct incode_setup *setup,
                          const struct incode_outside *outside, const char **why)
 {
-    struct shares shares;
+    struct incode_shares shares;
     struct incode_map map;
     INCODE_ASSERT((uintptr_t)arena % 64 == 0);
     *why = incode_setup_fault(setup);
     if (*why != NULL)
         return NULL;
-    if (!divide(&shares, &map, bytes)) {
+    if (!incode_arena_divide(&shares, &map, setup->bricks, bytes)) {
         *why = "the node's memory is too small for this index";
         return NULL;
     }
@@ -146,23 +78,93 @@ incode_triangulator_init(void *arena, size_t bytes,
     memcpy(points.lo, setup->lo, sizeof points.lo);
     memcpy(points.hi, setup->hi, sizeof points.hi);
     memcpy(points.cells, setup->cells, sizeof points.cells);
-    uint8_t *front = (uint8_t *)arena + round_up(sizeof *t);
-    uint8_t *maker = front + round_up(incode_front_bytes(&shares.front));
+    memset(t, 0, sizeof *t);
     t->map = map;
+    t->shares = shares;
+    size_t bits = incode_arena_bits(setup->bricks, bytes);
+    t->committed = bits > 0 ? (uint64_t *)(t + 1) : NULL;
+    t->arena = (uint8_t *)arena + incode_arena_aligned(sizeof *t + bits);
+    t->bytes = bytes - incode_arena_aligned(sizeof *t + bits);
     t->units = UINT32_MAX;
-    t->spent = 0;
-    incode_front_init(&t->front, front, &shares.front, setup->bricks,
-                      (enum incode_face_rule)setup->face_rule, &outside->front);
-    incode_maker_init(&t->maker, maker, &shares.maker, &points,
+    t->build = may_insert(setup) ? (enum incode_build)setup->build
+                                 : INCODE_BUILD_FACES;
+    t->phase = INCODE_PHASE_IDLE;
+    size_t maker = incode_maker_bytes(&shares.maker);
+    incode_maker_init(&t->maker, t->arena, &shares.maker, &points,
                       &outside->pages);
+    incode_front_init(&t->front, t->arena + maker, &shares.front, setup->bricks,
+                      (enum incode_face_rule)setup->face_rule, &outside->front);
+    incode_insertion_init(&t->insertion, &t->maker, &outside->front);
     return t;
+}
+
+/* ---- point by point, or face by face ---- */
+
+/* Whether the bricks of a page of boxes are mostly of a surface: their lifted
+ * boxes tell more than those along the axes.  1, 0, or -1: it is missing. */
+static int is_surface(struct incode_triangulator *t, uint32_t brick)
+{
+    const struct incode_tree *tree = &t->maker.tree;
+    const struct incode_frame *f = incode_pager_get(
+        &t->maker.pager, tree->base[1] + brick / INCODE_FANOUT);
+    uint32_t lifted = 0, first = brick / INCODE_FANOUT * INCODE_FANOUT;
+    uint32_t count = tree->bricks - first;
+    if (f == NULL)
+        return -1;
+    count = count < INCODE_FANOUT ? count : INCODE_FANOUT;
+    for (uint32_t i = 0; i < count; i++)
+        lifted += f->page.boxes.is_lifted[i];
+    return 2 * lifted > count;
+}
+
+/* Whether what is not final of a volume takes no more than half the memory: it
+ * has some 8 n^(2/3) cells, measured on uniform points. */
+static bool fits(const struct incode_triangulator *t)
+{
+    uint64_t points = (uint64_t)t->maker.tree.bricks * INCODE_BRICK_POINTS;
+    uint64_t cells =
+        t->bytes / 2 /
+        (sizeof(struct incode_cell) + sizeof(struct incode_complex_point) / 4) /
+        8;
+    cells = cells < UINT32_C(1) << 21 ? cells : (UINT32_C(1) << 21) - 1;
+    return points <= UINT32_MAX && points * points <= cells * cells * cells;
+}
+
+/* 1: point by point, 0: face by face, -1: a page is missing.  A part of the
+ * bricks would need all points for some of the tetrahedra. */
+static int choose_points(struct incode_triangulator *t)
+{
+    uint32_t own = t->job.last - t->job.first;
+    if (own == 0 || t->committed == NULL || t->build == INCODE_BUILD_FACES)
+        return 0;
+    if (t->build == INCODE_BUILD_POINTS)
+        return 1;
+    if (own != t->maker.tree.bricks)
+        return 0;
+    return fits(t) ? 1 : is_surface(t, t->job.first + own / 2);
+}
+
+/* Begins the job; false: a page is missing, or on its way. */
+static bool choose(struct incode_triangulator *t)
+{
+    int points = choose_points(t);
+    if (points < 0 || !incode_arena_turn(t, points == 1))
+        return false;
+    t->phase = points == 1 ? INCODE_PHASE_POINTS : INCODE_PHASE_FACES;
+    if (points == 0)
+        incode_front_start(&t->front, &t->job);
+    return true;
 }
 
 void incode_triangulator_start(struct incode_triangulator *t,
                                const struct incode_job *job)
 {
     incode_maker_start(&t->maker);
-    incode_front_start(&t->front, job);
+    t->job = *job;
+    t->phase = INCODE_PHASE_CHOOSE;
+    incode_front_abandon(&t->front);
+    if (t->build == INCODE_BUILD_FACES)
+        (void)choose(t);
 }
 
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
@@ -213,7 +215,8 @@ static enum incode_outcome advance(struct incode_triangulator *t, unsigned task)
         if (r != INCODE_OK || !incode_star_find(&t->front, a.f[1], a.f[2]))
             return r == INCODE_MORE ? INCODE_OK : r;
     } else {
-        (void)incode_star_take(&t->front, &face);
+        if (!incode_star_take(&t->front, &face))
+            return INCODE_OK;
         r = incode_maker_apex(&t->maker, task, face.b, face.c, face.hint, &a);
         if (r != INCODE_OK) {
             incode_star_put(&t->front, &face);
@@ -343,7 +346,7 @@ static enum incode_turn next(struct incode_triangulator *t, uint32_t *task)
     return turn;
 }
 
-static enum incode_step step(struct incode_triangulator *t)
+static enum incode_step close_stars(struct incode_triangulator *t)
 {
     uint32_t task;
     uint32_t waiting =
@@ -367,11 +370,69 @@ static enum incode_step step(struct incode_triangulator *t)
     }
 }
 
+static enum incode_step insert_points(struct incode_triangulator *t)
+{
+    switch (incode_insertion_step(&t->insertion)) {
+    case INCODE_INSERTION_FINISHED:
+        t->phase = INCODE_PHASE_IDLE;
+        return INCODE_FINISHED;
+    case INCODE_INSERTION_FULL: /* and so it will be for the next job */
+        t->build = INCODE_BUILD_FACES;
+        t->phase = INCODE_PHASE_CHOOSE;
+        if (t->insertion.emitted) {
+            incode_handover_begin(&t->handover, &t->insertion);
+            t->front.job = t->job;
+            t->phase = INCODE_PHASE_HANDOVER;
+        }
+        return INCODE_WORKED;
+    case INCODE_INSERTION_WAITING:
+        return INCODE_WAITING;
+    case INCODE_INSERTION_WORKED:
+    default:
+        return INCODE_WORKED;
+    }
+}
+
+/* What is open goes out, and comes back brick by brick. */
+static enum incode_step hand_over(struct incode_triangulator *t)
+{
+    enum incode_insertion_step r =
+        incode_handover_step(&t->handover, &t->front);
+    if (r != INCODE_INSERTION_FINISHED)
+        return r == INCODE_INSERTION_WAITING ? INCODE_WAITING : INCODE_WORKED;
+    if (!incode_arena_turn(t, false))
+        return INCODE_WAITING;
+    incode_front_take_over(&t->front, &t->job, t->committed);
+    t->phase = INCODE_PHASE_FACES;
+    return INCODE_WORKED;
+}
+
+static enum incode_step step(struct incode_triangulator *t)
+{
+    enum incode_step r = INCODE_FINISHED;
+    switch (t->phase) {
+    case INCODE_PHASE_CHOOSE:
+        return choose(t) ? INCODE_WORKED : INCODE_WAITING;
+    case INCODE_PHASE_POINTS:
+        return insert_points(t);
+    case INCODE_PHASE_HANDOVER:
+        return hand_over(t);
+    case INCODE_PHASE_FACES:
+        r = close_stars(t);
+        if (r == INCODE_FINISHED)
+            t->phase = INCODE_PHASE_IDLE;
+        return r;
+    case INCODE_PHASE_IDLE:
+    default:
+        return r;
+    }
+}
+
 enum incode_step incode_triangulator_step(struct incode_triangulator *t)
 {
     if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;
-    if (incode_front_is_finished(&t->front))
+    if (t->phase == INCODE_PHASE_IDLE)
         return INCODE_FINISHED;
     bool released = incode_pager_release(&t->maker.pager, false);
     struct incode_walker *walker = &t->maker.walker;
@@ -403,25 +464,25 @@ void incode_triangulator_statistics(const struct incode_triangulator *t,
 {
     const struct incode_front *front = &t->front;
     const struct incode_maker *maker = &t->maker;
+    const struct incode_insertion *insertion = &t->insertion;
     const struct incode_pager *pager = &maker->pager;
     *s = (struct incode_statistics){
-        .tetrahedra_built = front->counts.built,
-        .tetrahedra_kept = front->counts.kept,
-        .make_tetra_calls = maker->counts.calls,
+        .tetrahedra_built = front->counts.built + insertion->kept,
+        .tetrahedra_kept = front->counts.kept + insertion->kept,
+        .tetrahedra_by_points = insertion->kept,
+        .make_tetra_calls = maker->counts.calls + insertion->kept,
         .hull_facets = front->counts.hull_facets,
         .candidates = maker->counts.candidates,
         .tree_searches = maker->counts.tree_searches,
         .seeds = front->counts.seeds,
-        .vertices = front->counts.vertices,
+        .vertices = front->counts.vertices + insertion->vertices,
         .vertices_waited = front->counts.waited,
         .page_requests = pager->requests,
         .page_faults = front->counts.faults,
         .page_evictions = pager->evictions,
         .afl_max = front->afl.count_max,
         .afl_spilled = front->counts.spilled,
-        .memory_high_water =
-            t->map.total - (t->map.frame_count - pager->frames_used) *
-                               sizeof(struct incode_frame),
+        .memory_high_water = incode_arena_high_water(t),
         .tally = maker->counts.tally};
     memcpy(s->candidates_histogram, maker->counts.histogram,
            sizeof s->candidates_histogram);

@@ -1,13 +1,16 @@
 /* A node's triangulator: closes the star of every vertex of its bricks and
  * hands out the tetrahedra that are its own, with points that come page by
  * page and a front that may spill.  It is a maker and a front joined: what the
- * front asks, the maker answers.
+ * front asks, the maker answers.  Or it inserts all points into a triangulation
+ * of its own, where they fit.
  *
- * Memory: one arena, divided by incode_triangulator_init alone (memory map:
- * struct incode_map).  Work: a call of incode_triangulator_step closes at most
- * one star, or takes one search as far as one missing page.  With the indexes
- * `naive` and `grid` it builds at most one tetrahedron, and looks at no more
- * than 256 pages of points or about 4,096 rows of cells and points.
+ * Memory: one arena, divided by incode_triangulator_init (memory map: struct
+ * incode_map), and anew where a job goes another way than the one before. Work:
+ * a call of incode_triangulator_step closes at most one star, or takes one
+ * search as far as one missing page, or some steps of an insertion
+ * (points/insertion.h).  With the indexes `naive` and `grid` it builds at most
+ * one tetrahedron, and looks at no more than 256 pages of points or about 4,096
+ * rows of cells and points.
  *
  *     t = incode_triangulator_init(arena, bytes, &setup, &outside, &why);
  *     incode_triangulator_start(t, &job);
@@ -27,6 +30,18 @@
 
 enum { INCODE_CELLS_MAX = 1 << 30 /* of the grid, along one side */ };
 
+/* How tetrahedra are found: face by face, as InCoDe does it, or from a
+ * triangulation that is grown point by point, as long as what is not final of
+ * it fits in the node.  INCODE_BUILD_AUTO: point by point where all bricks are
+ * the node's own and a volume of so many points fits, or the points are of a
+ * surface.  With the indexes `naive` and `grid` and the face rule `paper`, face
+ * by face. */
+enum incode_build {
+    INCODE_BUILD_AUTO,
+    INCODE_BUILD_FACES,
+    INCODE_BUILD_POINTS
+};
+
 /* What every node of a run is told once.  incode_setup_fault tells what is out
  * of its limits. */
 struct incode_setup {
@@ -40,7 +55,10 @@ struct incode_setup {
     /* Which faces are pursued: enum incode_face_rule. */
     uint8_t face_rule;
 
-    uint16_t reserved; /* 0 */
+    /* How tetrahedra are found: enum incode_build. */
+    uint8_t build;
+
+    uint8_t reserved; /* 0 */
 
     /* Of the order in which pages that have arrived are taken, for tests; 0: as
      * they arrive. */
@@ -72,7 +90,8 @@ struct incode_outside {
 
 /* The memory map, in bytes but for the three counts.  control, frames, afl and
  * bricks, with the alignment of tables, are the total, which is at most the
- * arena. */
+ * arena.  Point by point, the triangulation has what the active face list, the
+ * bricks and all but a few frames have otherwise. */
 struct incode_map {
     size_t control;               /* the triangulator itself, the horizon too */
     size_t frames, frame_count;   /* of pages */
@@ -84,11 +103,14 @@ struct incode_map {
 
 struct incode_statistics {
     uint64_t tetrahedra_built, tetrahedra_kept, make_tetra_calls, hull_facets;
-    uint64_t candidates; /* points whose distance was evaluated */
+    uint64_t tetrahedra_by_points; /* kept, of the triangulation of all points;
+                                      built and as many calls, too */
+    uint64_t candidates;           /* points whose distance was evaluated */
     uint64_t tree_searches, seeds, vertices, vertices_waited;
     uint64_t page_requests, page_faults, page_evictions;
     uint64_t afl_max, afl_spilled;
-    uint64_t memory_high_water; /* bytes of the arena ever in use */
+    uint64_t memory_high_water; /* bytes of the arena ever in use: with faces,
+                                   all but frames that never were */
     struct incode_tally tally;
     uint64_t candidates_histogram[24]; /* calls by log2 of candidates, half
                                           octaves */
@@ -151,7 +173,7 @@ uint64_t incode_triangulator_spent(const struct incode_triangulator *t);
 void incode_triangulator_statistics(const struct incode_triangulator *t,
                                     struct incode_statistics *s);
 
-/* How the arena is divided; it stays so. */
+/* How the arena is divided. */
 const struct incode_map *
 incode_triangulator_map(const struct incode_triangulator *t);
 

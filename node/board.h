@@ -76,7 +76,8 @@ struct node_board {
     void (*reset)(void *context, int status);
     void *arena;        /* aligned to NODE_ALIGNMENT bytes: arena.h */
     size_t arena_bytes; /* with fixed_bytes, below 4 GiB */
-    size_t fixed_bytes; /* data memory outside the arena, stack included */
+    size_t fixed_bytes; /* data memory outside the arena, stack included, which
+                           has 48 KiB at least: an insertion takes up to 40 */
 };
 
 #endif

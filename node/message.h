@@ -19,7 +19,7 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 6,              /* both ends must agree */
+    NODE_PROTOCOL = 7,              /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
     NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got */
     NODE_FAULT_TEXT_MAX = 200,      /* bytes */

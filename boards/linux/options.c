@@ -16,7 +16,7 @@ static const char help[] =
     "  --dimension N      of the cube: 2^N nodes, 0 to 10\n"
     "  --memory BYTES     data memory in all, stack included (4194304);\n"
     "                     below 4 GiB\n"
-    "  --stack BYTES      of it (65536)\n"
+    "  --stack BYTES      of it, 48 KiB or more (65536)\n"
     "  --window N         frames a link and direction, 1 to 64 (0: by memory)\n"
     "  --serial-baud BAUD the cube has serial wires, the slowest so fast (0: "
     "none)\n"

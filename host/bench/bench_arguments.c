@@ -174,5 +174,6 @@ int host_bench(int argc, char **argv, struct host_error *error)
         return host_bench_peers(&a.peers, error);
     }
     host_run_defaults(&run);
+    run.build = INCODE_BUILD_FACES; /* as the paper's nodes do */
     return host_bench_paper(&run, a.nodes, error);
 }

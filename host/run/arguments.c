@@ -17,6 +17,7 @@ enum {
     KEY_INDEX,
     KEY_NODES,
     KEY_FACE_RULE,
+    KEY_BUILD,
     KEY_LINK,
     KEY_BOARD,
     KEY_PATIENCE,
@@ -65,6 +66,13 @@ static const struct argp_option options_of_run[] = {
     {"face-rule", KEY_FACE_RULE, "NAME", 0,
      "Faces pursued by a region: those with a vertex of its own (own, the "
      "default) or at least partly inside it (paper)",
+     1},
+    {"build", KEY_BUILD, "NAME", 0,
+     "How a node finds tetrahedra: by faces (InCoDe); by points inserted brick "
+     "after brick, as long as what is not final fits in its memory; or auto, "
+     "the default: by points where it has all bricks of a volume that fits, or "
+     "of a surface. Other indexes than kd, and the face rule paper, go by "
+     "faces",
      1},
     {"nodes", KEY_NODES, "N", 0,
      "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
@@ -174,6 +182,11 @@ static const char *index_name(unsigned i)
     return host_indexes[i];
 }
 
+static const char *build_name(unsigned i)
+{
+    return host_builds[i];
+}
+
 static const char *face_rule_name(unsigned i)
 {
     return host_face_rules[i];
@@ -237,6 +250,10 @@ static bool parse_names(int key, const char *value, struct parse *p)
     case KEY_FACE_RULE:
         o->face_rule = (enum incode_face_rule)choose(p, "face-rule", value,
                                                      face_rule_name, NULL);
+        return true;
+    case KEY_BUILD:
+        o->build =
+            (enum incode_build)choose(p, "build", value, build_name, NULL);
         return true;
     case KEY_LINK:
         o->link = host_link_row(

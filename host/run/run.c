@@ -25,6 +25,7 @@ void host_run_defaults(struct host_run_options *options)
     options->partition = HOST_ADAPTIVE;
     options->index = INCODE_KD;
     options->face_rule = INCODE_FACE_OWN;
+    options->build = INCODE_BUILD_AUTO;
     options->link = host_link_row(0);
     options->board = host_board_row(0);
     options->memory = 4u << 20;
@@ -126,6 +127,7 @@ static int run_service(const struct host_run_options *options,
     service->tets = tets;
     service->setup.setup.index = (uint8_t)options->index;
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
+    service->setup.setup.build = (uint8_t)options->build;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
     int status = host_service_run(service, error);
     host_run_sum(service, result);

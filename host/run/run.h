@@ -35,6 +35,7 @@ struct host_run_options {
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;
+    enum incode_build build;
     const struct host_link *link;
     const struct host_board *board;
     unsigned nodes; /* 0: what suits this machine */

@@ -45,6 +45,15 @@ static void put_text(json_t *object, const char *name, const char *value)
     json_object_set_new(object, name, json_string(value));
 }
 
+/* How a node found its tetrahedra, over all of its jobs. */
+static const char *built_by(const struct incode_statistics *s)
+{
+    return s->tetrahedra_built == 0                         ? "none"
+           : s->tetrahedra_by_points == 0                   ? "faces"
+           : s->tetrahedra_by_points == s->tetrahedra_built ? "points"
+                                                            : "both";
+}
+
 static json_t *node_object(const struct host_run_result *r, unsigned i)
 {
     const struct host_node_report *report = &r->node[i];
@@ -54,6 +63,7 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     json_t *o = json_object();
     put(o, "node", i);
     put_text(o, "role", role == NULL ? "none" : role->name);
+    put_text(o, "built_by", built_by(s));
     put(o, "tetrahedra_built", s->tetrahedra_built);
     put(o, "tetrahedra_kept", s->tetrahedra_kept);
     put(o, "make_tetra_calls", s->make_tetra_calls);

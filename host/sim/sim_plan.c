@@ -64,6 +64,14 @@ static const struct host_strategy *draw_strategy(const struct host_sim_plan *p,
     return row != NULL ? row : draw_row(&state, !one_node);
 }
 
+/* From a state of its own: what else a seed stands for does not change. */
+static enum incode_build draw_build(const struct host_sim_plan *p)
+{
+    uint64_t state = sim_seed(p->seed, 85);
+    return (enum incode_build)draw(&state, INCODE_BUILD_AUTO,
+                                   INCODE_BUILD_POINTS);
+}
+
 static void draw_work(struct host_sim_plan *p, uint64_t *state)
 {
     static const char *const kinds[] = {"uniform", "bubbles", "bluntfin",
@@ -76,6 +84,7 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
                : one_in(state, 6)                 ? INCODE_GRID
                                                   : INCODE_KD;
     p->face_rule = one_in(state, 3) ? INCODE_FACE_PAPER : INCODE_FACE_OWN;
+    p->build = draw_build(p);
     p->shuffle_seed = one_in(state, 2) ? sim_draw(state) : 0;
     uint64_t most = p->nodes > 64             ? 600
                     : p->index == INCODE_KD   ? 3000
@@ -181,9 +190,9 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
 
 void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)
 {
-    fprintf(file, "%llu points %s, %u node%s, %s, %s, %s, %s;",
+    fprintf(file, "%llu points %s, %u node%s, %s, %s, %s, %s, %s;",
             (unsigned long long)plan->points, plan->kind, plan->nodes,
             plan->nodes == 1 ? "" : "s", plan->strategy->name,
             host_partitions[plan->partition], host_indexes[plan->index],
-            host_face_rules[plan->face_rule]);
+            host_face_rules[plan->face_rule], host_builds[plan->build]);
 }

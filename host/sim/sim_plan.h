@@ -25,6 +25,7 @@ struct host_sim_plan {
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;
+    enum incode_build build;
     uint64_t shuffle_seed;
     /* The cube. */
     unsigned nodes, window, host_window;

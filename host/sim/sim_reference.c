@@ -125,7 +125,9 @@ int host_reference(const struct host_points *points,
                         HOST_ADAPTIVE, 1, false, error) != 0) {
         return error->code;
     }
-    struct incode_setup setup = {.bricks = r.order.bricks, .index = INCODE_KD};
+    struct incode_setup setup = {.bricks = r.order.bricks,
+                                 .index = INCODE_KD,
+                                 .build = INCODE_BUILD_FACES};
     memcpy(setup.lo, r.order.lo, sizeof setup.lo);
     memcpy(setup.hi, r.order.hi, sizeof setup.hi);
     size_t bytes = incode_arena_min(&setup) +

@@ -27,17 +27,34 @@ void incode_front_init(struct incode_front *front, void *memory,
                        enum incode_face_rule rule,
                        const struct incode_front_outside *outside)
 {
-    INCODE_ASSERT(share->faces >= INCODE_FACES_MIN &&
-                  share->entries >= INCODE_ENTRIES_MIN && bricks > 0);
+    INCODE_ASSERT(bricks > 0);
     memset(front, 0, sizeof *front);
     front->bricks = bricks;
     front->face_rule = rule;
     front->outside = *outside;
-    incode_afl_init(&front->afl, memory, share->faces, share->entries);
     front->window = WINDOW;
     front->room_faces = 2 * INCODE_STAR_FACES + 4 * INCODE_STAR_BUILT;
-    front->room_entries = share->entries / 4;
     front->finished = true;
+    incode_front_move(front, memory, share);
+}
+
+void incode_front_abandon(struct incode_front *front)
+{
+    front->finished = true;
+    front->unspill_pending = false;
+    front->afl.count = 0;
+    front->fault = front->afl.fault = NULL;
+}
+
+void incode_front_move(struct incode_front *front, void *memory,
+                       const struct incode_front_share *share)
+{
+    uint32_t most = front->afl.count_max;
+    INCODE_ASSERT(front->finished && share->faces >= INCODE_FACES_MIN &&
+                  share->entries >= INCODE_ENTRIES_MIN);
+    incode_afl_init(&front->afl, memory, share->faces, share->entries);
+    front->afl.count_max = most;
+    front->room_entries = share->entries / 4;
 }
 
 void incode_front_start(struct incode_front *front,
@@ -56,6 +73,17 @@ void incode_front_start(struct incode_front *front,
     front->draining = INCODE_NONE;
     front->busy = 0;
     front->fault = NULL;
+    front->passed = NULL;
+}
+
+void incode_front_take_over(struct incode_front *front,
+                            const struct incode_job *job,
+                            const uint64_t *passed)
+{
+    incode_front_start(front, job);
+    front->passed = passed;
+    front->spill_from = 0;
+    front->spilled_any = true;
 }
 
 /* ---- faces ---- */

@@ -98,10 +98,11 @@ struct incode_front {
     const char *fault; /* NULL, or a static string */
 
     /* Order of work (positions: bricks counted from the job's first). */
-    uint32_t current;    /* own bricks before this position are passed */
-    uint32_t window;     /* positions worked on together */
-    uint32_t spill_from; /* faces of positions from here on are spilled */
-    bool foreign;        /* own bricks are passed, others' faces remain */
+    uint32_t current;       /* own bricks before this position are passed */
+    uint32_t window;        /* positions worked on together */
+    uint32_t spill_from;    /* faces of positions from here on are spilled */
+    const uint64_t *passed; /* a bit a brick: committed before; or NULL */
+    bool foreign;           /* own bricks are passed, others' faces remain */
     bool finished;
     uint32_t busy; /* tasks that are suspended, one bit each */
     uint64_t clock;
@@ -141,9 +142,25 @@ void incode_front_init(struct incode_front *front, void *memory,
                        enum incode_face_rule rule,
                        const struct incode_front_outside *outside);
 
+/* Abandons the job at work, its fault and what it waits for, if there is one.
+ */
+void incode_front_abandon(struct incode_front *front);
+
+/* Moves to other memory, of another share: counts stay.  No job may be at work.
+ */
+void incode_front_move(struct incode_front *front, void *memory,
+                       const struct incode_front_share *share);
+
 /* Begins a job; the one before must be finished or is abandoned. */
 void incode_front_start(struct incode_front *front,
                         const struct incode_job *job);
+
+/* Begins a job some of whose bricks have been committed (`passed`, a bit a
+ * brick), and all of whose open faces and reached vertices have been spilled.
+ */
+void incode_front_take_over(struct incode_front *front,
+                            const struct incode_job *job,
+                            const uint64_t *passed);
 
 /* Spilled toggles of the brick that was asked for come back; -1: it was not, or
  * what came is no face of it. */

@@ -225,16 +225,34 @@ static enum incode_turn finish(struct incode_front *front)
     return INCODE_TURN_END;
 }
 
+/* Passes the current brick if it has been committed before: nothing of it is
+ * open, so nothing of it is spilled. */
+static bool skip_passed(struct incode_front *front)
+{
+    uint32_t brick = front->job.first + front->current;
+    if (front->passed == NULL || brick >= front->job.last ||
+        is_returning(front, brick) ||
+        (front->passed[brick / 64] >> brick % 64 & 1) == 0)
+        return false;
+    if (front->spill_from == front->current)
+        front->spill_from++;
+    front->current++;
+    return true;
+}
+
 enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
 {
     uint32_t own = front->job.last - front->job.first, v;
+    if (skip_passed(front))
+        return INCODE_TURN_WORKED;
     fetch_ahead(front);
     if (front->current >= own && !front->foreign)
         front->foreign = true;
     if (!front->foreign) {
         if (front->current >= front->spill_from)
             fetch_spilled(front);
-        if (is_returning(front, front->job.first + front->current))
+        if (front->current >= front->spill_from ||
+            is_returning(front, front->job.first + front->current))
             return INCODE_TURN_WAIT;
         if (next_own(front, &v))
             return begin_task(front, v, false, which);

@@ -41,34 +41,57 @@ static uint32_t lookahead_of(const struct incode_maker *m)
     return bricks < 1 ? 1 : bricks > LOOKAHEAD_MAX ? LOOKAHEAD_MAX : bricks;
 }
 
+/* Takes its share of an arena, with nothing in it. */
+static void take(struct incode_maker *m, void *memory,
+                 const struct incode_maker_share *share, uint32_t bricks)
+{
+    INCODE_ASSERT(share->frames >= INCODE_FRAMES_MIN);
+    incode_horizon_init(&m->horizon, memory, share->boxes, share->copies);
+    incode_pager_init(&m->pager, (uint8_t *)memory + horizon_bytes(share),
+                      share->frames, bricks);
+    m->lookahead = lookahead_of(m);
+    m->local.pages_max = share->frames / 2;
+    incode_local_reset(&m->local);
+}
+
 void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
                        const struct incode_page_source *source)
 {
-    INCODE_ASSERT(share->frames >= INCODE_FRAMES_MIN && points->bricks > 0);
+    INCODE_ASSERT(points->bricks > 0);
     memset(m, 0, sizeof *m);
     m->index = points->index;
     memcpy(m->lo, points->lo, sizeof m->lo);
     memcpy(m->hi, points->hi, sizeof m->hi);
     memcpy(m->cells, points->cells, sizeof m->cells);
-    incode_horizon_init(&m->horizon, memory, share->boxes, share->copies);
-    incode_pager_init(&m->pager, (uint8_t *)memory + horizon_bytes(share),
-                      share->frames, points->bricks);
-    m->pager.source = *source;
-    m->pager.shuffle = points->shuffle_seed;
     incode_tree_init(&m->tree, points->bricks,
                      points->index == INCODE_GRID
                          ? points->cells[0] * points->cells[1] *
                                points->cells[2]
                          : 0);
-    m->lookahead = lookahead_of(m);
+    take(m, memory, share, points->bricks);
+    m->pager.source = *source;
+    m->pager.shuffle = points->shuffle_seed;
     m->walker = (struct incode_walker){&m->pager, &m->tree, &m->counts.tally,
                                        &m->counts.candidates, UINT32_MAX};
-    m->local.pages_max = share->frames / 2;
-    incode_local_reset(&m->local);
     m->spread = 1.6;
     m->reach = 2;
+}
+
+void incode_maker_move(struct incode_maker *m, void *memory,
+                       const struct incode_maker_share *share)
+{
+    struct incode_pager old = m->pager;
+    INCODE_ASSERT(old.loading == 0);
+    for (unsigned i = 0; i < INCODE_SEARCHES; i++)
+        incode_maker_forget(m, i);
+    take(m, memory, share, m->tree.bricks);
+    m->pager.source = old.source;
+    m->pager.shuffle = old.shuffle;
+    m->pager.requests = old.requests;
+    m->pager.evictions = old.evictions;
+    m->ahead = 0;
 }
 
 void incode_maker_start(struct incode_maker *m)

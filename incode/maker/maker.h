@@ -152,6 +152,11 @@ void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_points *points,
                        const struct incode_page_source *source);
 
+/* Moves to other memory, of another share: what was there is forgotten, counts
+ * stay.  No page may be on its way. */
+void incode_maker_move(struct incode_maker *m, void *memory,
+                       const struct incode_maker_share *share);
+
 /* Begins other work on the same points: no fault, nothing looked ahead at.
  * Searches that are to be given up are forgotten one by one. */
 void incode_maker_start(struct incode_maker *m);
@@ -200,6 +205,11 @@ static inline bool incode_maker_has_advanced(const struct incode_maker *m,
  * INCODE_OK or INCODE_WAIT. */
 enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned slot,
                                         uint32_t v);
+
+/* The horizon of a brick alone: INCODE_OK or INCODE_WAIT for search[slot].page.
+ * It may be empty, where too many bricks are near. */
+enum incode_outcome incode_maker_look_from(struct incode_maker *m,
+                                           unsigned slot, uint32_t brick);
 
 /* Then the apex of (v, b, c), with near[0] and near[1] where b and c are among
  * the local points or INCODE_LOCAL_NONE; they are set.  INCODE_OK: *a is the

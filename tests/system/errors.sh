@@ -331,6 +331,7 @@ usage 'unknown partition' 'uniform|adaptive' run "$good" --partition odd \
     -o "$out"
 usage 'unknown index' 'naive.*grid.*kd' run "$good" --index tree -o "$out"
 usage 'unknown face rule' 'own.*paper' run "$good" --face-rule all -o "$out"
+usage 'unknown build' 'auto, faces, points' run "$good" --build all -o "$out"
 usage 'unknown link' 'tcp' run "$good" --link pigeon -o "$out"
 usage 'unknown board' 'linux' run "$good" --board z80 -o "$out"
 usage 'memory too small' 'memory' run "$good" --memory 1K -o "$out"

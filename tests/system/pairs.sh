@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Pairwise coverage of index, nodes, memory and the seed that shuffles which
-# page is ready when, for `sequential`; and of these, partition and face rule
-# for `spatial`.  That the rows cover every pair is checked too.
+# Pairwise coverage of index, nodes, memory, the seed that shuffles which page
+# is ready when, and how tetrahedra are found, for `sequential`; and of these,
+# partition and face rule for `spatial`.  That the rows cover every pair is
+# checked too.  (Points are inserted with `kd` and `own` alone.)
 # Sets past `naive_max` points are left out with `naive`, whose work is n^2, and
 # past `grid_max` with `grid`; those past `kd_max` are for digests.sh, and for
 # `make test-full`; so are `grid` and `naive` on many nodes of little memory.
@@ -12,33 +13,36 @@ grid_max=${GRID_MAX:-10000}
 kd_max=${KD_MAX:-10000}
 
 rows='
-sequential grid 1 1M 1
-sequential grid 2 512K 1
-sequential grid 32 4M 2
-sequential grid 8 1M 0
-sequential kd 1 4M 2
-sequential kd 2 4M 0
-sequential kd 32 1M 1
-sequential kd 32 512K 0
-sequential kd 8 512K 2
-sequential naive 1 512K 0
-sequential naive 2 1M 2
-sequential naive 32 4M 1
-sequential naive 8 4M 1
-spatial grid 1 1M 1 adaptive paper
-spatial grid 2 512K 0 uniform own
-spatial grid 32 4M 2 uniform paper
-spatial grid 8 1M 0 adaptive paper
-spatial kd 1 4M 0 adaptive own
-spatial kd 2 1M 2 adaptive paper
-spatial kd 32 1M 0 uniform paper
-spatial kd 32 512K 1 adaptive own
-spatial kd 8 512K 2 uniform own
-spatial naive 1 1M 2 uniform own
-spatial naive 1 512K 1 adaptive paper
-spatial naive 2 4M 1 adaptive own
-spatial naive 32 4M 0 adaptive paper
-spatial naive 8 4M 1 uniform paper'
+sequential grid 1 1M 1 points
+sequential grid 2 512K 1 faces
+sequential grid 32 4M 2 auto
+sequential grid 8 1M 0 faces
+sequential kd 1 4M 2 faces
+sequential kd 1 1M 1 points
+sequential kd 2 4M 0 auto
+sequential kd 32 1M 1 auto
+sequential kd 32 512K 0 points
+sequential kd 8 512K 2 auto
+sequential naive 1 512K 0 auto
+sequential naive 2 1M 2 points
+sequential naive 32 4M 1 faces
+sequential naive 8 4M 1 points
+spatial grid 1 1M 1 faces adaptive paper
+spatial grid 2 512K 0 points uniform own
+spatial grid 32 4M 2 points uniform paper
+spatial grid 8 1M 0 auto adaptive paper
+spatial kd 1 4M 0 auto adaptive own
+spatial kd 2 1M 2 auto adaptive paper
+spatial kd 2 4M 2 points adaptive own
+spatial kd 32 1M 0 points uniform paper
+spatial kd 32 512K 1 auto adaptive own
+spatial kd 8 1M 1 points uniform own
+spatial kd 8 512K 2 faces uniform own
+spatial naive 1 1M 2 auto uniform own
+spatial naive 1 512K 1 points adaptive paper
+spatial naive 2 4M 1 faces adaptive own
+spatial naive 32 4M 0 faces adaptive paper
+spatial naive 8 4M 1 points uniform paper'
 
 missing=$(echo "$rows" | awk '
     NF {
@@ -73,14 +77,14 @@ while read -r set file points _ tetrahedra digest; do
         skip "pairs/$set" "more than $kd_max points"
         continue
     fi
-    while read -r strategy index nodes memory seed partition rule; do
+    while read -r strategy index nodes memory seed build partition rule; do
         [ -n "$strategy" ] || continue
         [ "$index" = naive ] && [ "$points" -gt "$naive_max" ] && continue
         [ "$index" = grid ] && [ "$points" -gt "$grid_max" ] && continue
-        triangulates "pairs/$set $strategy $index $nodes $memory $seed \
+        triangulates "pairs/$set $strategy $index $nodes $memory $seed $build \
 ${partition:-} ${rule:-}" "$set" "$INCODE_DATA/$file" "$digest" \
             --strategy "$strategy" --index "$index" --nodes "$nodes" \
-            --memory "$memory" --shuffle-seed "$seed" \
+            --memory "$memory" --shuffle-seed "$seed" --build "$build" \
             ${partition:+--partition "$partition" --face-rule "$rule"}
     done <<< "$rows"
     rm -f "$scratch/first.$set.npy"

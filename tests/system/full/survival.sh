@@ -30,8 +30,8 @@ strike() {
 restarts=0
 for run in $(seq 100); do
     how="--strategy $(pick spatial sequential) --index $(pick kd kd grid) \
---face-rule $(pick own paper) --link $(pick tcp serial) \
---nodes $(pick 2 4 8 16) --memory $(pick 512K 1M 4M)"
+--face-rule $(pick own paper) --build $(pick auto faces points) \
+--link $(pick tcp serial) --nodes $(pick 2 4 8 16) --memory $(pick 512K 1M 4M)"
     # shellcheck disable=SC2086
     within "$INCODE" run "$points" -q --stats "$scratch/stats.json" $how \
         2> "$scratch/errors" &

@@ -34,7 +34,7 @@ enum {
 
 struct solo {
     /* What to do. */
-    uint8_t index, face_rule;
+    uint8_t index, face_rule, build;
     enum host_partition partition;
     uint32_t regions;
     size_t memory;    /* 0: the least that works */
@@ -43,11 +43,12 @@ struct solo {
     /* What the list may hold before it spills; 0: what fits. */
     uint32_t pressure, brick_pressure;
     bool false_start; /* each job is begun twice, the first one abandoned */
+    uint32_t units;   /* that a step may work; 0: as many as it likes */
 
     /* What became of it. */
     struct host_digest digest;
     struct host_tetrahedra tets; /* input rows, sorted */
-    uint64_t built, spilled, hulls, seeds, evictions;
+    uint64_t built, by_points, spilled, hulls, seeds, evictions;
     uint64_t far_calls; /* that looked at more than 2,048 points */
     uint32_t hubs;
 
@@ -187,7 +188,9 @@ static inline void solo_deliver_faces(struct solo *s)
             incode_triangulator_unspill(s->t, brick, s->face + i, 1, false), 0);
     }
     bool all = i == s->face_count;
-    memmove(s->face + kept, s->face + i, (s->face_count - i) * sizeof *s->face);
+    if (s->face_count > i)
+        memmove(s->face + kept, s->face + i,
+                (s->face_count - i) * sizeof *s->face);
     s->face_count -= i - kept;
     if (!all)
         return;
@@ -280,6 +283,7 @@ static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
     s->setup = (struct incode_setup){.bricks = s->order.bricks,
                                      .index = s->index,
                                      .face_rule = s->face_rule,
+                                     .build = s->build,
                                      .shuffle_seed = s->shuffle};
     memcpy(s->setup.lo, s->order.lo, sizeof s->setup.lo);
     memcpy(s->setup.hi, s->order.hi, sizeof s->setup.hi);
@@ -301,6 +305,8 @@ static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
                                     &why);
     if (s->t == NULL)
         fail_msg("%s", why);
+    if (s->units != 0)
+        incode_triangulator_allow(s->t, s->units);
 }
 
 /* The whole set, region after region, in one arena. */
@@ -313,6 +319,8 @@ static inline void solo_run(struct solo *s, const double *xyz, uint64_t n)
     incode_triangulator_statistics(s->t, &stats);
     assert_int_equal(stats.tetrahedra_kept >= s->tets.count, 1);
     assert_in_range(stats.memory_high_water, 1, s->memory);
+    assert_true(stats.tetrahedra_by_points <= stats.tetrahedra_kept);
+    s->by_points = stats.tetrahedra_by_points;
     s->built = stats.tetrahedra_built;
     s->spilled = stats.afl_spilled;
     s->hulls = stats.hull_facets;

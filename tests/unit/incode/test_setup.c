@@ -57,6 +57,8 @@ static void setup_limits(void **unused)
     EXPECT(true, good, index, INCODE_KD + 1);
     EXPECT(false, good, face_rule, INCODE_FACE_PAPER);
     EXPECT(true, good, face_rule, INCODE_FACE_PAPER + 1);
+    EXPECT(false, good, build, INCODE_BUILD_POINTS);
+    EXPECT(true, good, build, INCODE_BUILD_POINTS + 1);
     EXPECT(true, good, reserved, 1);
     EXPECT(true, good, reserved2, 1);
     for (int d = 0; d < 3; d++) {

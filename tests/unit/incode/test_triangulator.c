@@ -19,6 +19,7 @@
 #include "solo.h"
 
 static const char *const index_names[] = {"naive", "grid", "kd"};
+static const char *const build_names[] = {"auto", "faces", "points"};
 
 /* Runs one case and compares the digest. */
 static void expect(struct solo *s, const struct host_points *points,
@@ -27,9 +28,9 @@ static void expect(struct solo *s, const struct host_points *points,
     struct solo start = *s;
     solo_run(s, points->xyz, points->count);
     if (strcmp(s->digest.text, digest) != 0) {
-        fail_msg("%s, %s, %u regions (%s), rule %d, %zu bytes, shuffle %llu, "
-                 "chance %llu, pressure %u: %s, expected %s",
-                 name, index_names[s->index], s->regions,
+        fail_msg("%s, %s by %s, %u regions (%s), rule %d, %zu bytes, "
+                 "shuffle %llu, chance %llu, pressure %u: %s, expected %s",
+                 name, index_names[s->index], build_names[s->build], s->regions,
                  s->partition == HOST_UNIFORM ? "uniform" : "adaptive",
                  s->face_rule, s->memory, (unsigned long long)start.shuffle,
                  (unsigned long long)start.chance, s->pressure, s->digest.text,
@@ -46,6 +47,20 @@ static void reference_digest(const struct host_points *points,
     host_tetrahedra_sort(&tets);
     host_digest(&tets, digest);
     host_tetrahedra_free(&tets);
+}
+
+/* A case face by face and, where that may be, point by point. */
+static void expect_both(const struct solo *s, const struct host_points *points,
+                        const char *digest, const char *name)
+{
+    static const uint8_t builds[] = {INCODE_BUILD_FACES, INCODE_BUILD_POINTS,
+                                     INCODE_BUILD_AUTO};
+    bool both = s->index == INCODE_KD && s->face_rule == INCODE_FACE_OWN;
+    for (int i = 0; i < (both ? 3 : 1); i++) {
+        struct solo one = *s;
+        one.build = builds[i];
+        expect(&one, points, digest, name);
+    }
 }
 
 /* Every index, region count, partition and rule, the rest drawn from a seed.
@@ -68,8 +83,9 @@ static void expect_all(const struct host_points *points, const char *digest,
                     .memory = seed >> 63 ? 0 : 4 << 20,
                     .shuffle = seed >> 62 & 1 ? seed : 0,
                     .chance = seed >> 61 & 1 ? seed : 0,
-                    .false_start = seed >> 60 & 1};
-                expect(&s, points, digest, name);
+                    .false_start = seed >> 60 & 1,
+                    .units = seed >> 59 & 1};
+                expect_both(&s, points, digest, name);
             }
         }
     }
@@ -193,7 +209,8 @@ static void whole_range(void **unused)
             (void)host_points_append(&points, p, 1, &error);
             (void)host_points_append(&nearer, q, 1, &error);
         }
-        struct solo right = {.index = INCODE_KD, .regions = 1};
+        struct solo right = {
+            .index = INCODE_KD, .build = INCODE_BUILD_FACES, .regions = 1};
         solo_run(&right, nearer.xyz, nearer.count);
         digest = right.digest;
         solo_close(&right);
@@ -202,7 +219,7 @@ static void whole_range(void **unused)
                              .regions = k & 1 ? 2 : 1,
                              .memory = 4 << 20,
                              .chance = k & 2 ? k : 0};
-            expect(&s, &points, digest.text, "whole range");
+            expect_both(&s, &points, digest.text, "whole range");
         }
         host_points_free(&points);
         host_points_free(&nearer);
@@ -250,7 +267,7 @@ static void mixed_scales(void **unused)
                              .regions = k & 1 ? 2 : 1,
                              .chance = k + 1,
                              .pressure = k & 2 ? 500 : 0};
-            expect(&s, &points, digest.text, "mixed scales");
+            expect_both(&s, &points, digest.text, "mixed scales");
         }
         host_points_free(&points);
     }
@@ -310,7 +327,7 @@ static void made_sets(void **unused)
                                                      : INCODE_FACE_OWN,
                     .chance = k + 1,
                     .pressure = k & 1 ? 0 : 500};
-                expect(&s, &points, digest.text, kinds[i]);
+                expect_both(&s, &points, digest.text, kinds[i]);
             }
         }
         host_points_free(&points);
@@ -346,7 +363,10 @@ static void curves(void **unused)
 static struct solo taken_by(const char *kind, uint64_t n)
 {
     struct host_points points = {0};
-    struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 4 << 20};
+    struct solo s = {.index = INCODE_KD,
+                     .build = INCODE_BUILD_FACES,
+                     .regions = 1,
+                     .memory = 4 << 20};
     made(kind, n, &points);
     solo_run(&s, points.xyz, points.count);
     solo_close(&s);
@@ -388,12 +408,19 @@ static void rough_at_both_ends(void **unused)
     }
     assert_int_equal(host_points_append(&both, small.xyz, small.count, &error),
                      0);
-    struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 4 << 20};
-    struct host_verify_report report;
-    solo_run(&s, both.xyz, both.count);
-    if (host_verify(&both, &s.tets, &report, &error) != 0)
-        fail_msg("%s", report.text);
-    solo_close(&s);
+    for (int build = INCODE_BUILD_FACES; build <= INCODE_BUILD_POINTS;
+         build++) {
+        struct solo s = {.index = INCODE_KD,
+                         .build = (uint8_t)build,
+                         .regions = 1,
+                         .memory = 4 << 20};
+        struct host_verify_report report;
+        solo_run(&s, both.xyz, both.count);
+        if (host_verify(&both, &s.tets, &report, &error) != 0)
+            fail_msg("%s", report.text);
+        assert_int_equal(s.by_points > 0, build == INCODE_BUILD_POINTS);
+        solo_close(&s);
+    }
     host_points_free(&small);
     host_points_free(&both);
 }
@@ -410,6 +437,7 @@ static void hub(void **unused)
         points.xyz[d] = 0.02 * (d + 1);
     for (unsigned k = 0; k < 8; k++) {
         struct solo s = {.index = INCODE_KD,
+                         .build = INCODE_BUILD_FACES,
                          .regions = k & 1 ? 8 : 1,
                          .face_rule =
                              k & 2 ? INCODE_FACE_PAPER : INCODE_FACE_OWN,
@@ -478,6 +506,7 @@ static void real_sets(void **unused)
         }
         read_set(c->name, ".xyz.gz", &points);
         struct solo s = {.index = c->index,
+                         .build = INCODE_BUILD_FACES,
                          .regions = c->regions,
                          .partition = i & 1 ? HOST_UNIFORM : HOST_ADAPTIVE,
                          .face_rule =
@@ -500,8 +529,10 @@ static void smallest_memory(void **unused)
     struct host_digest digest[2];
     static const size_t memories[] = {0, 512 << 10, 4 << 20};
     for (int i = 0; i < 3; i++) {
-        struct solo s = {
-            .index = INCODE_KD, .regions = 1, .memory = memories[i]};
+        struct solo s = {.index = INCODE_KD,
+                         .build = INCODE_BUILD_FACES,
+                         .regions = 1,
+                         .memory = memories[i]};
         solo_run(&s, points.xyz, points.count);
         digest[i > 0] = s.digest;
         assert_string_equal(digest[i > 0].text, digest[0].text);

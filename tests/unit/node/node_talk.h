@@ -305,6 +305,7 @@ static inline size_t talk_compose(uint8_t type, uint8_t *data)
     case NODE_SETUP:
         setup.setup.index = (uint8_t)(number % 3);
         setup.setup.face_rule = number >> 2 & 1;
+        setup.setup.build = (uint8_t)(number / 3 % 3);
         setup.role = number >> 3 & 1 ? NODE_HOLDER : NODE_WORKER;
         setup.holders =
             number >> 4 == 0 ? talk_byte() % 4 : setup.role == NODE_HOLDER;

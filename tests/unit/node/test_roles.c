@@ -358,13 +358,13 @@ static void setups_of_other_versions(void **unused)
         uint64_t more;
     } later = {setup, 0};
     (void)unused;
-    assert_int_equal(NODE_PROTOCOL, 6);
-    setup.protocol = later.setup.protocol = 5;
-    refuses(NODE_SETUP, &setup, sizeof setup, "protocol version 5, expected 6");
-    refuses(NODE_SETUP, &later, sizeof later, "protocol version 5, expected 6");
-    refuses(NODE_SETUP, &later, 4, "protocol version 5, expected 6");
+    assert_int_equal(NODE_PROTOCOL, 7);
+    setup.protocol = later.setup.protocol = 6;
+    refuses(NODE_SETUP, &setup, sizeof setup, "protocol version 6, expected 7");
+    refuses(NODE_SETUP, &later, sizeof later, "protocol version 6, expected 7");
+    refuses(NODE_SETUP, &later, 4, "protocol version 6, expected 7");
     refuses(NODE_SETUP, &later, 3, "setup in 3 bytes, expected 96");
-    later.setup.protocol = 6;
+    later.setup.protocol = 7;
     refuses(NODE_SETUP, &later, 100, "setup in 100 bytes, expected 96");
 }
 

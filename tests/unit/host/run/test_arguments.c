@@ -14,7 +14,7 @@
 #include "host/run/arguments.h"
 #include "host/service/strategies/strategies.h"
 
-enum { WORDS_MAX = 12 };
+enum { WORDS_MAX = 13 };
 
 /* Parses "incode run" with these words, ended by NULL. */
 static int parse(const char *const *words, struct host_run_options *options,
@@ -43,6 +43,7 @@ static void test_defaults(void **unused)
     assert_int_equal(o.partition, HOST_ADAPTIVE);
     assert_int_equal(o.index, INCODE_KD);
     assert_int_equal(o.face_rule, INCODE_FACE_OWN);
+    assert_int_equal(o.build, INCODE_BUILD_AUTO);
     assert_int_equal(o.memory, 4194304);
     assert_int_equal(o.nodes, 0);
     assert_int_equal(o.outputs, 0);
@@ -59,6 +60,7 @@ static void test_options(void **unused)
                                         "--partition=uniform",
                                         "--index=grid",
                                         "--face-rule=paper",
+                                        "--build=points",
                                         "--nodes=8",
                                         "--memory=512K",
                                         "--window=1",
@@ -73,6 +75,7 @@ static void test_options(void **unused)
     assert_int_equal(o.partition, HOST_UNIFORM);
     assert_int_equal(o.index, INCODE_GRID);
     assert_int_equal(o.face_rule, INCODE_FACE_PAPER);
+    assert_int_equal(o.build, INCODE_BUILD_POINTS);
     assert_int_equal(o.nodes, 8);
     assert_int_equal(o.memory, 524288);
     assert_int_equal(o.window, 1);
@@ -95,6 +98,7 @@ static void test_refused(void **unused)
         {"--partition=odd", "adaptive, uniform"},
         {"--index=tree", "naive, grid, kd"},
         {"--face-rule=all", "own, paper"},
+        {"--build=stars", "auto, faces, points"},
         {"--link=wet-string", "no such name; allowed: tcp, "},
         {"--link=a-name-longer-than-any-other-name-that-there-is",
          "no such name; allowed: tcp"},
@@ -156,7 +160,8 @@ static void test_names(void **unused)
         int last;
     } tables[] = {{"--partition", host_partitions, HOST_UNIFORM},
                   {"--index", host_indexes, INCODE_KD},
-                  {"--face-rule", host_face_rules, INCODE_FACE_PAPER}};
+                  {"--face-rule", host_face_rules, INCODE_FACE_PAPER},
+                  {"--build", host_builds, INCODE_BUILD_POINTS}};
     (void)unused;
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
         for (int value = 0; value <= tables[i].last; value++) {
@@ -167,7 +172,7 @@ static void test_names(void **unused)
             assert_non_null(words[1]);
             assert_int_equal(parse(words, &o, &error), 0);
             const int found[] = {(int)o.partition, (int)o.index,
-                                 (int)o.face_rule};
+                                 (int)o.face_rule, (int)o.build};
             assert_int_equal(found[i], value);
         }
         assert_null(tables[i].names[tables[i].last + 1]);

@@ -49,6 +49,7 @@ static const char *const names[] = {"points",
                                     "per_node"};
 
 static const char *const node_names[] = {"node",
+                                         "built_by",
                                          "tetrahedra_built",
                                          "tetrahedra_kept",
                                          "make_tetra_calls",
@@ -82,8 +83,11 @@ static void fill(struct host_run_result *r)
     strcpy(r->digest.text, "sha256:00");
     for (unsigned i = 0; i < 4; i++) {
         r->node[i].statistics.busy_us = 1500000;
-        r->node[i].statistics.statistics.tetrahedra_built = 150 + i;
+        struct incode_statistics *s = &r->node[i].statistics.statistics;
+        s->tetrahedra_built = 150 + i;
+        s->tetrahedra_by_points = i == 1 ? 151 : i == 2 ? 7 : 0;
     }
+    r->node[3].statistics.statistics.tetrahedra_built = 0;
 }
 
 /* What is written of a result, read again. */
@@ -131,9 +135,13 @@ static void test_names(void **unused)
         for (size_t i = 0; i < sizeof node_names / sizeof node_names[0]; i++) {
             assert_non_null(json_object_get(node, node_names[i]));
         }
+        static const char *const built_by[] = {"faces", "points", "both",
+                                               "none"};
         assert_int_equal(
             json_integer_value(json_object_get(node, "tetrahedra_built")),
-            150 + k);
+            k == 3 ? 0 : 150 + k);
+        assert_string_equal(
+            json_string_value(json_object_get(node, "built_by")), built_by[k]);
     }
     json_decref(o);
 }

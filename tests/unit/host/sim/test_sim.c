@@ -68,6 +68,7 @@ static struct host_sim_plan small_run(void)
     plan.index = INCODE_KD;
     plan.partition = HOST_ADAPTIVE;
     plan.face_rule = INCODE_FACE_OWN;
+    plan.build = INCODE_BUILD_AUTO;
     plan.shuffle_seed = 0;
     plan.window = plan.host_window = 2;
     plan.memory_more = 65536;

@@ -1,0 +1,121 @@
+#include "arena.h"
+
+#include <string.h>
+
+static uint32_t between(size_t least, size_t a, size_t most)
+{
+    return (uint32_t)(a < least ? least : a > most ? most : a);
+}
+
+/* The horizon of a maker: a box for 4 KB, a copy for 64 KB. */
+static struct incode_maker_share horizon_of(size_t bytes)
+{
+    size_t boxes = bytes >> 12, copies = bytes >> 16;
+    return (struct incode_maker_share){
+        between(INCODE_HORIZON_MIN, boxes / 64 * 64, INCODE_HORIZON_MAX),
+        between(16, copies, INCODE_HORIZON_COPIES), 0};
+}
+
+size_t incode_arena_bits(uint32_t bricks, size_t bytes)
+{
+    size_t bits = ((size_t)bricks + 63) / 64 * sizeof(uint64_t);
+    return bits <= bytes / 64 ? bits : 0;
+}
+
+/* The active face list takes three eighths of what the control block leaves
+ * (the front of a region of 1,250,000 points, with a tenth to spare), the
+ * bricks a sixteenth, page frames the rest. */
+bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
+                         uint32_t bricks, size_t bytes)
+{
+    memset(map, 0, sizeof *map);
+    s->maker = horizon_of(bytes);
+    size_t horizon = incode_horizon_bytes(s->maker.boxes, s->maker.copies);
+    map->control = incode_arena_aligned(sizeof(struct incode_triangulator) +
+                                        incode_arena_bits(bricks, bytes)) +
+                   horizon;
+    map->local_points = sizeof(struct incode_local_points);
+    map->tasks = (sizeof(struct incode_task) + sizeof(struct incode_search)) *
+                 INCODE_TASKS;
+    if (bytes < map->control)
+        return false;
+    size_t rest = bytes - map->control;
+    size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
+    size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
+    map->afl_faces = rest * 3 / 8 / face;
+    map->brick_entries = rest / 16 / brick;
+    if (map->afl_faces < INCODE_FACES_MIN)
+        map->afl_faces = INCODE_FACES_MIN;
+    if (map->brick_entries < INCODE_ENTRIES_MIN)
+        map->brick_entries = INCODE_ENTRIES_MIN;
+    s->front = (struct incode_front_share){(uint32_t)map->afl_faces,
+                                           (uint32_t)map->brick_entries};
+    size_t both = incode_front_bytes(&s->front);
+    map->bricks = map->brick_entries * brick;
+    map->afl = both - map->bricks;
+    size_t used = map->control + incode_arena_aligned(both);
+    if (bytes < used)
+        return false;
+    s->maker.frames = incode_maker_frames(&s->maker, bytes - used + horizon);
+    map->frame_count = s->maker.frames;
+    map->frames = incode_maker_bytes(&s->maker) - horizon;
+    map->total = used + map->frames;
+    return map->frame_count >= INCODE_FRAMES_MIN;
+}
+
+size_t incode_arena_min(const struct incode_setup *setup)
+{
+    size_t bytes = sizeof(struct incode_triangulator);
+    struct incode_map map;
+    struct incode_shares shares;
+    while (!incode_arena_divide(&shares, &map, setup->bricks, bytes))
+        bytes += 1024;
+    return bytes;
+}
+
+/* The maker's share point by point, where few pages are wanted at a time. */
+static struct incode_maker_share few_frames(const struct incode_triangulator *t)
+{
+    struct incode_maker_share share = t->shares.maker;
+    share.frames = INCODE_FRAMES_MIN;
+    return share;
+}
+
+/* Bytes of the arena in use up to now, as it is divided. */
+static size_t in_use(const struct incode_triangulator *t)
+{
+    size_t unused = (t->maker.pager.frame_count - t->maker.pager.frames_used) *
+                    sizeof(struct incode_frame);
+    struct incode_maker_share few = few_frames(t);
+    if (!t->by_points)
+        return t->map.total - unused;
+    return incode_arena_aligned(sizeof *t) + incode_maker_bytes(&few) - unused +
+           t->insertion.used;
+}
+
+size_t incode_arena_high_water(const struct incode_triangulator *t)
+{
+    size_t now = in_use(t);
+    return now > t->high_water ? now : t->high_water;
+}
+
+bool incode_arena_turn(struct incode_triangulator *t, bool points)
+{
+    struct incode_maker_share share = points ? few_frames(t) : t->shares.maker;
+    size_t maker = incode_maker_bytes(&share);
+    if (t->by_points != points && t->maker.pager.loading > 0)
+        return false;
+    if (t->by_points != points) {
+        if (t->has_worked)
+            t->high_water = incode_arena_high_water(t);
+        incode_maker_move(&t->maker, t->arena, &share);
+    }
+    t->by_points = points;
+    t->has_worked = true;
+    if (points)
+        incode_insertion_start(&t->insertion, t->committed, t->arena + maker,
+                               t->bytes - maker, t->job.first, t->job.last);
+    else
+        incode_front_move(&t->front, t->arena + maker, &t->shares.front);
+    return true;
+}

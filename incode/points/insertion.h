@@ -1,0 +1,113 @@
+/* The tetrahedra of own bricks from a Delaunay triangulation grown point by
+ * point (incode/complex): no face has to be searched, and what is flat,
+ * stretched or nearly degenerate costs little more than what is not.
+ *
+ * Where all points fit, they are inserted at once.  Otherwise brick after
+ * brick; when memory runs short, cells whose spheres reach no brick that is
+ * still to come are final: they are emitted and released (Isenburg, Liu,
+ * Shewchuk, Snoeyink, Streaming computation of Delaunay triangulations, ACM
+ * Transactions on Graphics 25, 2006).  A brick is committed when all cells at
+ * its points are.
+ *
+ * Memory: struct incode_insertion, about 33 KB, and a block given by its owner:
+ * a bit a brick, the complex the rest.  Work: a step takes a brick in, or
+ * inserts or emits some, or looks at some cells; releasing looks at each once.
+ * It listens to the maker's walker.
+ *
+ *     incode_insertion_init(&n, &maker, &outside);
+ *     incode_insertion_start(&n, bits, memory, bytes, first, last);
+ *     while ((step = incode_insertion_step(&n)) == INCODE_INSERTION_WORKED)
+ *         continue;
+ */
+#ifndef INCODE_INSERTION_H
+#define INCODE_INSERTION_H
+
+#include "incode/complex/complex.h"
+#include "incode/front/job.h"
+#include "incode/maker/maker.h"
+#include "rest.h"
+
+enum {
+    INCODE_INSERTION_EMITTED = 128, /* tetrahedra at a time */
+    INCODE_INSERTION_BRICKS = 32    /* taken in at a time, unless all fit */
+};
+
+enum incode_insertion_step {
+    INCODE_INSERTION_WORKED,  /* call again */
+    INCODE_INSERTION_WAITING, /* for a page, or for room outside */
+    INCODE_INSERTION_FULL,    /* what is not final does not fit */
+    INCODE_INSERTION_FINISHED /* the own bricks are committed */
+};
+
+struct incode_insertion {
+    struct incode_complex complex;
+    struct incode_maker *maker;
+    struct incode_front_outside outside;
+    uint64_t kept, vertices;           /* tetrahedra emitted, points inserted */
+    uint64_t releases, judged, looked; /* cells judged, looked at closely */
+    size_t used; /* most bytes of the memory so far, of all jobs */
+
+    uint32_t own_first, own_last; /* own bricks */
+    uint64_t *committed;          /* a bit a brick, its owner's */
+    uint64_t *touched;            /* a cell is left at one of its points */
+    bool whole;                   /* all bricks are taken in at once */
+    bool emitted;                 /* something has been */
+    bool again;                   /* the bricks at work did not fit before */
+
+    enum incode_insertion_stage {
+        INCODE_INSERTION_CHOOSE,
+        INCODE_INSERTION_LOAD,
+        INCODE_INSERTION_BEGIN,
+        INCODE_INSERTION_INSERT,
+        INCODE_INSERTION_SAMPLE,
+        INCODE_INSERTION_REST,
+        INCODE_INSERTION_JUDGE,
+        INCODE_INSERTION_LOOK,
+        INCODE_INSERTION_LIST,
+        INCODE_INSERTION_EMIT,
+        INCODE_INSERTION_RELEASE,
+        INCODE_INSERTION_COMMIT,
+        INCODE_INSERTION_DONE
+    } stage;
+    /* Bricks [from, to) are being inserted; all before them are. */
+    uint32_t from, to;
+    /* The first point of every so many bricks [sample_first, sample_end) is a
+     * vertex already. */
+    uint32_t sample_first, sample_end, sample_step;
+    uint32_t most;                           /* bricks at a time */
+    uint32_t brick;                          /* to be loaded */
+    uint64_t there[INCODE_INSERTION_BRICKS]; /* of their points, which are
+                                                vertices already */
+    uint16_t staged[INCODE_INSERTION_BRICKS * INCODE_BRICK_POINTS];
+    uint32_t staged_count;
+    unsigned level;      /* of the points that are inserted now */
+    uint32_t next, near; /* the staged point at work, and a vertex near by */
+    uint32_t cell, v;    /* that is judged, whose tetrahedra are emitted */
+    uint32_t final;      /* cells so far */
+    uint32_t apexes[INCODE_INSERTION_EMITTED][3];
+    struct incode_rest rest;
+};
+
+/* Bytes that the triangulation of so many points takes, as a rule. */
+size_t incode_insertion_bytes(uint64_t points);
+
+void incode_insertion_init(struct incode_insertion *n,
+                           struct incode_maker *maker,
+                           const struct incode_front_outside *outside);
+
+/* Begins with own bricks [first, last), first < last.  committed: a bit a brick
+ * of the set, that tells which are when it is full.  memory: aligned to 8
+ * bytes; bytes: more than a bit a brick. */
+void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
+                            void *memory, size_t bytes, uint32_t first,
+                            uint32_t last);
+
+static inline bool
+incode_insertion_has_committed(const struct incode_insertion *n, uint32_t brick)
+{
+    return (n->committed[brick / 64] >> brick % 64 & 1) != 0;
+}
+
+enum incode_insertion_step incode_insertion_step(struct incode_insertion *n);
+
+#endif
