@@ -114,17 +114,6 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
     return INCODE_OK;
 }
 
-enum incode_outcome incode_maker_look_from(struct incode_maker *m,
-                                           unsigned slot, uint32_t brick)
-{
-    struct incode_search *s = &m->search[slot];
-    if (m->horizon.centre == brick)
-        return INCODE_OK;
-    const struct incode_frame *f = incode_pager_get(&m->pager, brick);
-    s->page = brick;
-    return f == NULL ? INCODE_WAIT : list_bricks(m, s, brick, f);
-}
-
 enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
                                         uint32_t v)
 {

@@ -177,7 +177,9 @@ struct incode_answer {
  * orient3d is positive is unknown), one after another, in search `slot`.
  * INCODE_OK: all are answered; INCODE_WAIT, INCODE_MORE: call again with the
  * same arguments, when page search[slot].page is there or at once.  Faces with
- * the same first vertex, one after another, share its local points. */
+ * the same first vertex, one after another, share its local points.  Faces are
+ * of the triangulation: of others, what empty spheres rule out may be the
+ * apex. */
 enum incode_outcome incode_maker_apexes(struct incode_maker *m, unsigned slot,
                                         const uint32_t (*faces)[3],
                                         uint32_t count,
@@ -205,11 +207,6 @@ static inline bool incode_maker_has_advanced(const struct incode_maker *m,
  * INCODE_OK or INCODE_WAIT. */
 enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned slot,
                                         uint32_t v);
-
-/* The horizon of a brick alone: INCODE_OK or INCODE_WAIT for search[slot].page.
- * It may be empty, where too many bricks are near. */
-enum incode_outcome incode_maker_look_from(struct incode_maker *m,
-                                           unsigned slot, uint32_t brick);
 
 /* Then the apex of (v, b, c), with near[0] and near[1] where b and c are among
  * the local points or INCODE_LOCAL_NONE; they are set.  INCODE_OK: *a is the

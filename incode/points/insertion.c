@@ -340,7 +340,6 @@ static enum incode_insertion_step judge(struct incode_insertion *n)
         incode_cell_set_proved(c, final);
         n->final += final;
     }
-    n->judged += JUDGED;
     incode_walker_spend(&n->maker->walker, JUDGED / CELLS);
     if (n->cell < x->cells)
         return INCODE_INSERTION_WORKED;
@@ -365,7 +364,6 @@ static enum incode_insertion_step look(struct incode_insertion *n)
         n->final += final;
         looked++;
     }
-    n->looked += looked;
     incode_walker_spend(&n->maker->walker, looked);
     if (n->cell < x->cells)
         return INCODE_INSERTION_WORKED;

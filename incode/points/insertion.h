@@ -43,8 +43,8 @@ struct incode_insertion {
     struct incode_complex complex;
     struct incode_maker *maker;
     struct incode_front_outside outside;
-    uint64_t kept, vertices;           /* tetrahedra emitted, points inserted */
-    uint64_t releases, judged, looked; /* cells judged, looked at closely */
+    uint64_t kept, vertices; /* tetrahedra emitted, points inserted */
+    uint64_t releases;
     size_t used; /* most bytes of the memory so far, of all jobs */
 
     uint32_t own_first, own_last; /* own bricks */
