@@ -73,12 +73,26 @@ size_t incode_arena_min(const struct incode_setup *setup)
     return bytes;
 }
 
-/* The maker's share point by point, where few pages are wanted at a time. */
+/* The maker's share point by point, where few bricks are wanted at a time, but
+ * all pages of boxes again and again: as many as go into a part of the arena.
+ */
 static struct incode_maker_share few_frames(const struct incode_triangulator *t)
 {
     struct incode_maker_share share = t->shares.maker;
-    share.frames = INCODE_FRAMES_MIN;
+    const struct incode_tree *tree = &t->maker.tree;
+    size_t boxes = tree->base[tree->levels] - tree->bricks;
+    size_t part = t->bytes / 16 / sizeof(struct incode_frame);
+    share.frames = between(INCODE_FRAMES_MIN,
+                           INCODE_FRAMES_MIN + (boxes < part ? boxes : part),
+                           t->shares.maker.frames);
     return share;
+}
+
+size_t incode_arena_room(const struct incode_triangulator *t)
+{
+    struct incode_maker_share few = few_frames(t);
+    size_t maker = incode_maker_bytes(&few);
+    return t->bytes > maker ? t->bytes - maker : 0;
 }
 
 /* Bytes of the arena in use up to now, as it is divided. */

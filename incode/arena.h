@@ -24,6 +24,9 @@ size_t incode_arena_bits(uint32_t bricks, size_t bytes);
 bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
                          uint32_t bricks, size_t bytes);
 
+/* Bytes of the arena for an insertion. */
+size_t incode_arena_room(const struct incode_triangulator *t);
+
 /* Divides the arena for a job point by point, which is begun, or face by face;
  * false: pages are on their way, whose frames stay. */
 bool incode_arena_turn(struct incode_triangulator *t, bool points);

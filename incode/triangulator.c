@@ -117,11 +117,11 @@ static int is_surface(struct incode_triangulator *t, uint32_t brick)
     return 2 * lifted > count;
 }
 
-/* Whether what is not final of a volume takes no more than half the memory: it
- * has some 8 n^(2/3) cells, measured on uniform points. */
-static bool fits(const struct incode_triangulator *t)
+/* Whether what is not final of a volume of so many bricks takes no more than
+ * half the memory: it has some 8 n^(2/3) cells, measured on uniform points. */
+static bool fits(const struct incode_triangulator *t, uint32_t bricks)
 {
-    uint64_t points = (uint64_t)t->maker.tree.bricks * INCODE_BRICK_POINTS;
+    uint64_t points = (uint64_t)bricks * INCODE_BRICK_POINTS;
     uint64_t cells =
         t->bytes / 2 /
         (sizeof(struct incode_cell) + sizeof(struct incode_complex_point) / 4) /
@@ -131,17 +131,20 @@ static bool fits(const struct incode_triangulator *t)
 }
 
 /* 1: point by point, 0: face by face, -1: a page is missing.  A part of the
- * bricks would need all points for some of the tetrahedra. */
+ * bricks needs some points of others, too, which for a volume takes as long as
+ * the faces do. */
 static int choose_points(struct incode_triangulator *t)
 {
     uint32_t own = t->job.last - t->job.first;
-    if (own == 0 || t->committed == NULL || t->build == INCODE_BUILD_FACES)
+    bool all = own == t->maker.tree.bricks;
+    size_t words = (t->maker.tree.bricks + 63) / 64;
+    size_t least = INCODE_INSERTION_LEAST + 2 * words * sizeof(uint64_t);
+    if (own == 0 || t->committed == NULL || t->build == INCODE_BUILD_FACES ||
+        incode_arena_room(t) < least)
         return 0;
-    if (t->build == INCODE_BUILD_POINTS)
+    if (t->build == INCODE_BUILD_POINTS || (all && fits(t, own)))
         return 1;
-    if (own != t->maker.tree.bricks)
-        return 0;
-    return fits(t) ? 1 : is_surface(t, t->job.first + own / 2);
+    return all || fits(t, own) ? is_surface(t, t->job.first + own / 2) : 0;
 }
 
 /* Begins the job; false: a page is missing, or on its way. */

@@ -32,10 +32,10 @@ enum { INCODE_CELLS_MAX = 1 << 30 /* of the grid, along one side */ };
 
 /* How tetrahedra are found: face by face, as InCoDe does it, or from a
  * triangulation that is grown point by point, as long as what is not final of
- * it fits in the node.  INCODE_BUILD_AUTO: point by point where all bricks are
- * the node's own and a volume of so many points fits, or the points are of a
- * surface.  With the indexes `naive` and `grid` and the face rule `paper`, face
- * by face. */
+ * it fits in the node.  INCODE_BUILD_AUTO: point by point where a volume of so
+ * many points fits, and all bricks are the node's own or they are of a surface;
+ * if they are all and of a surface, always.  With the indexes `naive` and
+ * `grid` and the face rule `paper`, face by face. */
 enum incode_build {
     INCODE_BUILD_AUTO,
     INCODE_BUILD_FACES,

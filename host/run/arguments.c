@@ -70,8 +70,9 @@ static const struct argp_option options_of_run[] = {
     {"build", KEY_BUILD, "NAME", 0,
      "How a node finds tetrahedra: by faces (InCoDe); by points inserted brick "
      "after brick, as long as what is not final fits in its memory; or auto, "
-     "the default: by points where it has all bricks of a volume that fits, or "
-     "of a surface. Other indexes than kd, and the face rule paper, go by "
+     "the default: by points where it has some of a surface, or all bricks of "
+     "a volume, that fits. Other indexes than kd, and the face rule paper, go "
+     "by "
      "faces",
      1},
     {"nodes", KEY_NODES, "N", 0,

@@ -25,7 +25,8 @@ enum incode_cavity_result {
     INCODE_CAVITY_LARGE /* for incode_complex_insert_large; as before */
 };
 
-/* The sphere of a cell, or the half-space of an infinite one, holds p. */
+/* The sphere of a cell, or the half-space of an infinite one, holds p, by exact
+ * arithmetic. */
 bool incode_complex_holds(const struct incode_complex *x,
                           struct incode_tally *tally,
                           const struct incode_cell *c, const double p[3]);
@@ -34,6 +35,16 @@ bool incode_complex_holds(const struct incode_complex *x,
 uint32_t incode_complex_locate(struct incode_complex *x,
                                struct incode_tally *tally, uint32_t from,
                                const double p[3]);
+
+/* Whether a vertex of the cell is at p. */
+bool incode_complex_has_point(const struct incode_complex *x,
+                              const struct incode_cell *c, const double p[3]);
+
+/* The cells that hold p, as `first` does; INCODE_NONE: too many. */
+uint32_t incode_complex_find_small(struct incode_complex *x,
+                                   struct incode_tally *tally,
+                                   const double p[3], uint32_t first,
+                                   uint32_t cells[INCODE_COMPLEX_CAVITY]);
 
 enum incode_cavity_result
 incode_complex_insert_small(struct incode_complex *x,
@@ -59,6 +70,7 @@ bool incode_complex_has_room(const struct incode_complex *x, uint32_t points,
                              uint32_t cells);
 
 uint32_t incode_complex_take_cell(struct incode_complex *x);
+void incode_complex_free_cell(struct incode_complex *x, uint32_t i);
 
 /* The vertices of a cell opposite each, in an order such that a vertex put
  * behind them takes its place. */

@@ -49,6 +49,15 @@ uint32_t incode_complex_take_cell(struct incode_complex *x)
     return i;
 }
 
+void incode_complex_free_cell(struct incode_complex *x, uint32_t i)
+{
+    struct incode_cell *c = incode_complex_cell(x, i);
+    c->v[0] = c->v[1];
+    incode_cell_join(c, 0, x->free);
+    x->free = i;
+    x->free_count++;
+}
+
 uint32_t incode_complex_add(struct incode_complex *x, const double p[3],
                             uint32_t id)
 {
@@ -145,12 +154,9 @@ bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
 
 /* ---- insertion ---- */
 
-/* Whether a vertex of the cell is there already: pages contradict each other.
- */
-static bool has_point(const struct incode_complex *x, uint32_t cell,
-                      const double p[3])
+bool incode_complex_has_point(const struct incode_complex *x,
+                              const struct incode_cell *c, const double p[3])
 {
-    const struct incode_cell *c = incode_complex_cell(x, cell);
     for (unsigned i = 0; i < 4; i++)
         if (c->v[i] != INFINITE &&
             incode_lexicographic(x->point[c->v[i]].p, p) == 0)
@@ -166,7 +172,9 @@ bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
                   incode_complex_is_vertex(x, near));
     uint32_t first =
         incode_complex_locate(x, tally, x->point[near].cell, x->point[v].p);
-    if (first == INCODE_NONE || has_point(x, first, x->point[v].p))
+    if (first == INCODE_NONE ||
+        incode_complex_has_point(x, incode_complex_cell(x, first),
+                                 x->point[v].p))
         return false;
     enum incode_cavity_result r =
         incode_complex_insert_small(x, tally, v, first);
@@ -175,12 +183,15 @@ bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
     return r == INCODE_CAVITY_FILLED;
 }
 
-void incode_complex_tell_free(struct incode_complex *x)
+uint32_t incode_complex_cavity(struct incode_complex *x,
+                               struct incode_tally *tally, const double p[3],
+                               uint32_t near,
+                               uint32_t cells[INCODE_COMPLEX_CAVITY])
 {
-    uint32_t at = x->free;
-    for (uint32_t left = x->free_count; left > 0; left--) {
-        struct incode_cell *c = incode_complex_cell(x, at);
-        c->v[0] = c->v[1];
-        at = c->n[0].cell;
-    }
+    INCODE_ASSERT(near < x->points && incode_complex_is_vertex(x, near));
+    uint32_t first = incode_complex_locate(x, tally, x->point[near].cell, p);
+    if (first == INCODE_NONE ||
+        incode_complex_has_point(x, incode_complex_cell(x, first), p))
+        return 0;
+    return incode_complex_find_small(x, tally, p, first, cells);
 }

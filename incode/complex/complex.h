@@ -29,6 +29,7 @@
 enum {
     INCODE_COMPLEX_POINTS_MAX = 65534,
     INCODE_COMPLEX_CELLS_MAX = (1 << 23) - 2,
+    INCODE_COMPLEX_CAVITY = 640,      /* cells, looked at for a point */
     INCODE_CELL_NONE = (1 << 24) - 1, /* at the end of a list by n[0] */
     INCODE_COMPLEX_INFINITE = 0,      /* the vertex beyond the hull */
     /* In the place of a neighbour that has been released, a finite and an
@@ -39,12 +40,13 @@ enum {
 };
 
 /* A cell of positive orientation, were its infinite vertex a point beyond the
- * facet; v[3] is finite.  n[i].cell: the neighbour opposite v[i].  In a free
- * cell, n[0].cell is the next free one. */
+ * facet; v[3] is finite.  n[i].cell: the neighbour opposite v[i].  A free
+ * cell has v[0] = v[1], and n[0].cell is the next one. */
 struct incode_cell {
     uint16_t v[4];
     struct {
-        uint32_t cell : 24, low : 8; /* of sphere[i]: its last bits */
+        uint32_t cell : 24, low : 8; /* of sphere[i]: its last bits; n[3]: of
+                                        a walk, within a call */
     } n[4];
     int16_t sphere[3]; /* with the scale, as sphere.h has it */
     uint8_t scale;
@@ -53,10 +55,14 @@ struct incode_cell {
 
 enum {
     INCODE_CELL_MARK = 3,       /* 0 at each call, and after it */
-    INCODE_CELL_PROVED = 3 * 4, /* 0 in a new cell; else its owner's */
+    INCODE_CELL_PROVED = 3 * 4, /* 0 in a new cell, INCODE_CELL_FINAL, or as
+                                   its owner likes */
     INCODE_CELL_INFINITE = 16,
     INCODE_CELL_SCALE = 7 * 32 /* the last bits of it */
 };
+
+/* In INCODE_CELL_PROVED: no point will be inserted that the sphere holds. */
+enum { INCODE_CELL_FINAL = 1 };
 
 struct incode_complex_point {
     double p[3];
@@ -78,7 +84,8 @@ struct incode_complex {
     uint32_t cells;       /* used or free */
     uint32_t free, free_count;
     uint32_t free_point; /* by `id`, up to 0 */
-    uint64_t scans; /* insertions that looked at all cells for a first one */
+    uint64_t searches; /* insertions that looked at all points for a near one */
+    uint64_t scans;    /* insertions that looked at all cells for a first one */
 };
 
 /* memory: aligned to 8 bytes; faster where it begins and ends at multiples of
@@ -113,9 +120,24 @@ void incode_complex_release(struct incode_complex *x);
 bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
                            uint32_t v, uint32_t near);
 
-/* Gives those of cells 0 to x->cells - 1 that are free v[0] = v[1]; it is not
- * needed for anything else. */
-void incode_complex_tell_free(struct incode_complex *x);
+/* The cells that would give way to a point, 0 if it is a vertex; INCODE_NONE:
+ * they and those around them are more than INCODE_COMPLEX_CAVITY.  near: as
+ * above. */
+uint32_t incode_complex_cavity(struct incode_complex *x,
+                               struct incode_tally *tally, const double p[3],
+                               uint32_t near,
+                               uint32_t cells[INCODE_COMPLEX_CAVITY]);
+
+/* Whether a cell would. */
+bool incode_complex_gives_way(const struct incode_complex *x,
+                              struct incode_tally *tally,
+                              const struct incode_cell *c, const double p[3]);
+
+/* Sets INCODE_CELL_PROVED of all of them to 0, and returns how many there are.
+ */
+uint32_t incode_complex_disprove(struct incode_complex *x,
+                                 struct incode_tally *tally, const double p[3],
+                                 uint32_t near);
 
 static inline bool incode_cell_is_free(const struct incode_cell *c)
 {

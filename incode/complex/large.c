@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "cavity.h"
+#include "incode/predicates/check.h"
 #include "sphere.h"
 
 /* In a cell that gives way, a neighbour that takes its place at a facet of the
@@ -24,11 +25,13 @@ static void set_next(struct incode_cell *c, uint32_t next)
     memcpy(c->sphere, &next, sizeof next);
 }
 
-static bool goes(const struct incode_complex *x, struct incode_tally *tally,
-                 const struct incode_cell *c, const double p[3])
+bool incode_complex_gives_way(const struct incode_complex *x,
+                              struct incode_tally *tally,
+                              const struct incode_cell *c, const double p[3])
 {
     double bound, t = incode_sphere_power(x->point, c, p, &bound);
-    return t < -bound || (!(t > bound) && incode_complex_holds(x, tally, c, p));
+    return t < -bound || (!(t > bound) && !incode_complex_has_point(x, c, p) &&
+                          incode_complex_holds(x, tally, c, p));
 }
 
 /* Lists the cells that give way; returns how many facets are around them. */
@@ -44,7 +47,8 @@ static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
         for (unsigned i = 0; i < 4; i++) {
             uint32_t next = c->n[i].cell;
             struct incode_cell *n = incode_complex_cell(x, next);
-            if (incode_cell_mark(n) == 0 && goes(x, tally, n, p)) {
+            if (incode_cell_mark(n) == 0 &&
+                incode_complex_gives_way(x, tally, n, p)) {
                 n->flags |= INCODE_CELL_GOES;
                 set_next(n, INCODE_NONE);
                 set_next(incode_complex_cell(x, last), next);
@@ -161,11 +165,65 @@ incode_complex_insert_large(struct incode_complex *x,
     /* What gave way is free. */
     uint32_t next;
     for (uint32_t at = first; at != INCODE_NONE; at = next) {
-        struct incode_cell *c = incode_complex_cell(x, at);
-        next = next_of(c);
-        incode_cell_join(c, 0, x->free);
-        x->free = at;
-        x->free_count++;
+        next = next_of(incode_complex_cell(x, at));
+        incode_complex_free_cell(x, at);
     }
     return INCODE_CAVITY_FILLED;
+}
+
+/* Where a cell's neighbour is in it. */
+static unsigned side_of(const struct incode_cell *c, uint32_t neighbour)
+{
+    return c->n[0].cell == neighbour   ? 0
+           : c->n[1].cell == neighbour ? 1
+           : c->n[2].cell == neighbour ? 2
+                                       : 3;
+}
+
+/* Goes through a cavity from one of its cells, depth first, with the way back
+ * in the cells, and marks them; the second time it takes the marks away. */
+static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
+                           const double p[3], uint32_t first, bool again)
+{
+    uint32_t at = first, count = 1;
+    unsigned i = 0;
+    incode_complex_cell(x, first)->flags ^= INCODE_CELL_GOES;
+    while (i < 4 || at != first) {
+        const struct incode_cell *c = incode_complex_cell(x, at);
+        if (i == 4) {
+            uint32_t before = c->n[c->n[3].low].cell;
+            i = side_of(incode_complex_cell(x, before), at) + 1;
+            at = before;
+            continue;
+        }
+        uint32_t next = c->n[i].cell;
+        struct incode_cell *n = incode_complex_cell(x, next);
+        if (again ? incode_cell_mark(n) != 0
+                  : incode_cell_mark(n) == 0 &&
+                        incode_complex_gives_way(x, tally, n, p)) {
+            n->flags ^= INCODE_CELL_GOES;
+            incode_cell_set_proved(n, 0);
+            n->n[3].low = (uint8_t)side_of(n, at);
+            at = next;
+            i = 0;
+            count++;
+        } else {
+            i++;
+        }
+    }
+    incode_cell_set_proved(incode_complex_cell(x, first), 0);
+    return count;
+}
+
+uint32_t incode_complex_disprove(struct incode_complex *x,
+                                 struct incode_tally *tally, const double p[3],
+                                 uint32_t near)
+{
+    INCODE_ASSERT(near < x->points && incode_complex_is_vertex(x, near));
+    uint32_t first = incode_complex_locate(x, tally, x->point[near].cell, p);
+    if (first == INCODE_NONE ||
+        incode_complex_has_point(x, incode_complex_cell(x, first), p))
+        return 0;
+    (void)go_through(x, tally, p, first, false);
+    return go_through(x, tally, p, first, true);
 }

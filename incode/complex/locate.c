@@ -85,27 +85,32 @@ static uint32_t walk(const struct incode_complex *x, struct incode_tally *tally,
         const struct incode_cell *c = incode_complex_cell(x, at);
         if (incode_cell_is_infinite(c))
             return at;
-        for (unsigned i = 0; i < 4 && next == INCODE_NONE; i++)
-            if (c->n[i].cell != before && orient_with(x, tally, c, i, p) < 0)
+        bool barred = false;
+        for (unsigned i = 0; i < 4 && next == INCODE_NONE; i++) {
+            if (c->n[i].cell == before || orient_with(x, tally, c, i, p) >= 0)
+                continue;
+            if (c->n[i].cell >= INCODE_COMPLEX_CELLS_FIRST)
                 next = c->n[i].cell;
+            else
+                barred = true;
+        }
         if (next == INCODE_NONE)
-            return at;
-        if (next < INCODE_COMPLEX_CELLS_FIRST)
-            return INCODE_NONE;
+            return barred ? INCODE_NONE : at;
         before = at;
         at = next;
     }
     return INCODE_NONE; /* a point that is there already, perhaps */
 }
 
-/* Looks at all cells. */
+/* Looks at all cells that are not final. */
 static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
                      const double p[3])
 {
     x->scans++;
-    incode_complex_tell_free(x);
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
+        if (incode_cell_proved(c) == INCODE_CELL_FINAL)
+            continue;
         double bound, t = incode_sphere_power(x->point, c, p, &bound);
         if (!(t > bound) && !incode_cell_is_free(c) &&
             (t < -bound || incode_complex_holds(x, tally, c, p)))
@@ -114,21 +119,50 @@ static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
     return INCODE_NONE;
 }
 
-uint32_t incode_complex_locate(struct incode_complex *x,
-                               struct incode_tally *tally, uint32_t from,
-                               const double p[3])
+/* The vertex nearest to p, up to rounding; INFINITE: squares overflow. */
+static uint32_t nearest(const struct incode_complex *x, const double p[3])
+{
+    uint32_t best = INFINITE;
+    double least = __builtin_inf();
+    for (uint32_t v = 1; v < x->points; v++) {
+        const struct incode_complex_point *q = &x->point[v];
+        double square = 0;
+        for (int d = 0; d < 3; d++)
+            square += (q->p[d] - p[d]) * (q->p[d] - p[d]);
+        if (square < least && q->cell != INCODE_NONE) {
+            least = square;
+            best = v;
+        }
+    }
+    return best;
+}
+
+/* From one cell on; INCODE_NONE: what has been released is on the way. */
+static uint32_t go(const struct incode_complex *x, struct incode_tally *tally,
+                   uint32_t from, const double p[3])
 {
     bool found = false;
     const struct incode_cell *c = incode_complex_cell(x, from);
     unsigned i = incode_cell_index(c, INFINITE);
     from = i < 4 ? c->n[i].cell : from;
-    if (from >= INCODE_COMPLEX_CELLS_FIRST)
-        from = descend(x, from, p, &found);
-    if (found)
-        return from;
-    from = from < INCODE_COMPLEX_CELLS_FIRST ? INCODE_NONE
-                                             : walk(x, tally, from, p);
-    if (from == INCODE_NONE)
-        from = scan(x, tally, p);
-    return from;
+    if (from < INCODE_COMPLEX_CELLS_FIRST)
+        return INCODE_NONE;
+    from = descend(x, from, p, &found);
+    return found ? from : walk(x, tally, from, p);
+}
+
+/* Where the way is barred, it may be free from the nearest vertex, which has a
+ * cell that holds p. */
+uint32_t incode_complex_locate(struct incode_complex *x,
+                               struct incode_tally *tally, uint32_t from,
+                               const double p[3])
+{
+    from = go(x, tally, from, p);
+    if (from == INCODE_NONE) {
+        uint32_t near = nearest(x, p);
+        x->searches++;
+        if (near != INFINITE)
+            from = go(x, tally, x->point[near].cell, p);
+    }
+    return from == INCODE_NONE ? scan(x, tally, p) : from;
 }

@@ -18,19 +18,8 @@ static void settle(struct incode_complex *x, uint32_t i)
     }
 }
 
-static void free_cell(struct incode_complex *x, uint32_t i)
-{
-    struct incode_cell *c = incode_complex_cell(x, i);
-    incode_cell_set_proved(c, 0);
-    c->v[0] = c->v[1];
-    incode_cell_join(c, 0, x->free);
-    x->free = i;
-    x->free_count++;
-}
-
 void incode_complex_release(struct incode_complex *x)
 {
-    incode_complex_tell_free(x);
     for (uint32_t v = 0; v < x->points; v++)
         x->point[v].cell = INCODE_NONE;
     for (uint32_t i = FIRST; i < x->cells; i++) {
@@ -38,9 +27,11 @@ void incode_complex_release(struct incode_complex *x)
         if (!incode_cell_is_free(c) && incode_cell_proved(c) == 0)
             settle(x, i);
     }
-    for (uint32_t i = FIRST; i < x->cells; i++)
-        if (incode_cell_proved(incode_complex_cell(x, i)) != 0)
-            free_cell(x, i);
+    for (uint32_t i = FIRST; i < x->cells; i++) {
+        const struct incode_cell *c = incode_complex_cell(x, i);
+        if (!incode_cell_is_free(c) && incode_cell_proved(c) != 0)
+            incode_complex_free_cell(x, i);
+    }
     x->free_point = 0;
     for (uint32_t v = x->points - 1; v > 0; v--) {
         if (x->point[v].cell != INCODE_NONE)

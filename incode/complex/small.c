@@ -9,7 +9,7 @@ enum {
     FACETS_MAX = 220,
     POINTS_MAX = FACETS_MAX / 2 + 2,
     SLOTS_MAX = FACETS_MAX + INCODE_SPHERE_BATCH,
-    LOOKED_AT_MAX = 640 /* cells */
+    LOOKED_AT_MAX = INCODE_COMPLEX_CAVITY /* cells */
 };
 
 struct cavity {
@@ -47,9 +47,9 @@ static void look_around(struct incode_complex *x, struct cavity *cavity,
 
 /* False: too many cells. */
 static bool find(struct incode_complex *x, struct incode_tally *tally,
-                 uint32_t v, uint32_t first, struct cavity *cavity)
+                 const double at[3], uint32_t first, struct cavity *cavity)
 {
-    const double p[3] = {x->point[v].p[0], x->point[v].p[1], x->point[v].p[2]};
+    const double p[3] = {at[0], at[1], at[2]};
     const struct incode_complex_point *point = x->point;
     struct incode_cell *cell = x->cell;
     uint32_t from = 0;
@@ -76,6 +76,18 @@ static bool find(struct incode_complex *x, struct incode_tally *tally,
         cavity->gone = gone;
     }
     return true;
+}
+
+uint32_t incode_complex_find_small(struct incode_complex *x,
+                                   struct incode_tally *tally,
+                                   const double p[3], uint32_t first,
+                                   uint32_t cells[INCODE_COMPLEX_CAVITY])
+{
+    struct cavity cavity;
+    bool all = find(x, tally, p, first, &cavity);
+    forget(x, &cavity);
+    memcpy(cells, cavity.cell, cavity.gone * sizeof *cells);
+    return all ? cavity.gone : INCODE_NONE;
 }
 
 static bool list_facets(const struct incode_complex *x, struct cavity *cavity)
@@ -124,9 +136,7 @@ static void take_cells(struct incode_complex *x, const struct cavity *cavity,
 static void free_cells(struct incode_complex *x, const struct cavity *cavity)
 {
     for (uint32_t j = cavity->facets; j < cavity->gone; j++) {
-        incode_cell_join(incode_complex_cell(x, cavity->cell[j]), 0, x->free);
-        x->free = cavity->cell[j];
-        x->free_count++;
+        incode_complex_free_cell(x, cavity->cell[j]);
     }
 }
 
@@ -228,7 +238,8 @@ incode_complex_insert_small(struct incode_complex *x,
 {
     struct cavity cavity;
     struct filling fill;
-    if (!find(x, tally, v, first, &cavity) || !list_facets(x, &cavity)) {
+    if (!find(x, tally, x->point[v].p, first, &cavity) ||
+        !list_facets(x, &cavity)) {
         forget(x, &cavity);
         return INCODE_CAVITY_LARGE;
     }

@@ -14,8 +14,8 @@ void incode_handover_begin(struct incode_handover *h,
     memset(h, 0, sizeof *h);
     h->n = n;
     h->cell = INCODE_COMPLEX_CELLS_FIRST;
+    h->vertex = 1;
     h->brick = n->own_first;
-    incode_complex_tell_free(x);
     for (uint32_t v = 0; v < x->points; v++)
         if (incode_complex_is_vertex(x, v))
             x->point[v].cell = NOT_REACHED;
@@ -71,6 +71,23 @@ static enum incode_insertion_step send_faces(struct incode_handover *h,
     return INCODE_INSERTION_WORKED;
 }
 
+/* The points of own bricks to come that a released tetrahedron has. */
+static enum incode_insertion_step send_ahead(struct incode_handover *h)
+{
+    const struct incode_complex *x = &h->n->complex;
+    for (unsigned i = 0; i < CELLS && h->vertex < x->points; i++, h->vertex++) {
+        const struct incode_complex_point *v = &x->point[h->vertex];
+        uint32_t brick = v->id / INCODE_BRICK_POINTS;
+        if (v->cell != REACHED || brick < h->n->from || brick >= h->n->own_last)
+            continue;
+        if (h->count == INCODE_BRICK_POINTS && !send(h))
+            return INCODE_INSERTION_WAITING;
+        h->faces[h->count++] =
+            (struct incode_face){{v->id, INCODE_NONE, INCODE_NONE}};
+    }
+    return INCODE_INSERTION_WORKED;
+}
+
 /* The points of a brick that a released tetrahedron has: those that have no
  * cell any more, or an open face. */
 static enum incode_insertion_step send_reached(struct incode_handover *h)
@@ -102,6 +119,8 @@ enum incode_insertion_step incode_handover_step(struct incode_handover *h,
     uint32_t end = n->from < n->own_last ? n->from : n->own_last;
     if (h->cell < n->complex.cells)
         return send_faces(h, front);
+    if (h->vertex < n->complex.points)
+        return send_ahead(h);
     while (h->brick < end && incode_insertion_has_committed(n, h->brick))
         h->brick++;
     if (h->brick < end)

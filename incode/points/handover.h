@@ -20,10 +20,11 @@
 
 struct incode_handover {
     struct incode_insertion *n;
-    uint32_t cell, facet; /* at work: facets of cells first, */
-    uint32_t brick;       /* then points of bricks */
+    uint32_t cell;   /* at work: facets of cells first, */
+    uint32_t vertex; /* then vertices ahead of their turn, */
+    uint32_t brick;  /* then points of bricks */
     struct incode_face faces[INCODE_BRICK_POINTS];
-    uint32_t count, sent;
+    uint32_t count;
 };
 
 void incode_handover_begin(struct incode_handover *h,

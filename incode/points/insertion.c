@@ -1,9 +1,10 @@
 #include "insertion.h"
 
+#include <assert.h>
 #include <string.h>
 
-#include "incode/front/owner.h"
 #include "incode/predicates/check.h"
+#include "stages.h"
 
 enum {
     AHEAD = 16,              /* bricks asked for together */
@@ -11,15 +12,18 @@ enum {
     SAMPLE = 500,            /* points of the first round, about */
     ROUND = 2,               /* bits: 4 times as many in each that follows */
     INSERT_UNITS = 4,        /* of work, an insertion */
-    CELLS = 16,              /* judged or listed as a unit of work */
-    EMIT_A_UNIT = 8,         /* tetrahedra */
-    JUDGED = 1024,           /* cells a step */
-    LOOKED = 64,             /* the same */
     HALF_CELLS_A_POINT = 13, /* in volumes and on surfaces */
     LEFT_A_POINT = 4,        /* cells that are not final */
+    FILL = 15,               /* of the room for cells, in 16 */
+    FILL_PART = 12,          /* the same where points of others' come in */
     SAMPLE_SHARE = 16,       /* of the room for points */
-    RESERVE = 4096           /* bytes */
+    RESERVE = 4096,          /* bytes */
+    ALIGNED = 64             /* the same */
 };
+
+static_assert(sizeof(struct incode_insertion_work) + RESERVE <=
+                  INCODE_INSERTION_LEAST,
+              "it leaves room for some cells");
 
 /* ---- memory ---- */
 
@@ -27,7 +31,7 @@ size_t incode_insertion_bytes(uint64_t points)
 {
     size_t each = sizeof(struct incode_complex_point) +
                   HALF_CELLS_A_POINT * sizeof(struct incode_cell) / 2;
-    return (size_t)points * each + RESERVE;
+    return (size_t)points * each + INCODE_INSERTION_LEAST;
 }
 
 void incode_insertion_init(struct incode_insertion *n,
@@ -57,29 +61,43 @@ static uint32_t divide(struct incode_insertion *n)
                                               : INCODE_INSERTION_BRICKS;
 }
 
+/* Nothing is inserted yet.  whole: all bricks at once. */
+static void begin_job(struct incode_insertion *n, bool whole)
+{
+    uint32_t bricks = n->maker->tree.bricks;
+    incode_complex_clear(&n->complex);
+    n->whole = whole;
+    n->from = n->to = n->own_first;
+    n->sampled = n->thorough = false;
+    n->most = whole ? bricks : divide(n);
+    n->sample_step = 1 + bricks / (1 + n->complex.points_kept / SAMPLE_SHARE);
+    n->stage = INCODE_INSERTION_CHOOSE;
+}
+
 void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
                             void *memory, size_t bytes, uint32_t first,
                             uint32_t last)
 {
     uint32_t bricks = n->maker->tree.bricks, words = (bricks + 63) / 64;
-    size_t bits = words * sizeof(uint64_t);
-    INCODE_ASSERT(first < last && last <= bricks && bits < bytes);
+    size_t bits = words * sizeof(uint64_t), before = 2 * bits;
+    uint64_t points = (uint64_t)bricks * INCODE_BRICK_POINTS;
+    INCODE_ASSERT(first < last && last <= bricks &&
+                  bytes >= before + INCODE_INSERTION_LEAST);
     n->committed = committed;
     n->touched = memory;
+    n->passed = n->touched + words;
     memset(committed, 0, bits);
-    incode_complex_init(&n->complex, (uint8_t *)memory + bits, bytes - bits);
-    uint64_t points = (uint64_t)bricks * INCODE_BRICK_POINTS;
-    n->whole = points <= INCODE_COMPLEX_POINTS_MAX &&
-               incode_insertion_bytes(points) <= n->complex.bytes;
-    n->emitted = false;
+    before += -((uintptr_t)memory + before) % ALIGNED;
+    n->work = (void *)((uint8_t *)memory + before);
+    before += sizeof *n->work;
+    incode_complex_init(&n->complex, (uint8_t *)memory + before,
+                        bytes - before);
     n->own_first = first;
     n->own_last = last;
-    n->from = n->to = 0;
-    n->most = n->whole ? bricks : divide(n);
-    n->again = false;
-    n->sample_first = n->sample_end = 0;
-    n->sample_step = 1 + bricks / (1 + n->complex.points_kept / SAMPLE_SHARE);
-    n->stage = INCODE_INSERTION_CHOOSE;
+    n->emitted = n->squeezed = n->closed = false;
+    begin_job(n, incode_insertion_owns_all(n) &&
+                     points <= INCODE_COMPLEX_POINTS_MAX &&
+                     2 * bits + incode_insertion_bytes(points) <= bytes);
 }
 
 /* Bricks that there is room for, a quarter to spare. */
@@ -94,18 +112,58 @@ static uint32_t room_for(const struct incode_insertion *n)
     return (uint32_t)((x->bytes - used) / (brick + brick / 4));
 }
 
+/* Whether what is free should be left to points that are inserted ahead of
+ * their turn. */
+static bool is_short(const struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    uint32_t points = x->points < x->points_kept ? x->points_kept : x->points;
+    size_t room = x->bytes - points * sizeof *x->point;
+    size_t used = (x->cells - (size_t)x->free_count) * sizeof *x->cell;
+    uint32_t fill = incode_insertion_owns_all(n) ? FILL : FILL_PART;
+    return !n->whole && (used > room / 16 * fill || room_for(n) < 1);
+}
+
 /* ---- the points ---- */
+
+/* The points of the bricks at work that are vertices. */
+static void mark_there(struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    memset(n->there, 0, sizeof n->there);
+    for (uint32_t v = 1; v < x->points; v++) {
+        uint32_t id = x->point[v].id, brick = id / INCODE_BRICK_POINTS;
+        if (incode_complex_is_vertex(x, v) && brick >= n->from && brick < n->to)
+            n->there[brick - n->from] |= UINT64_C(1)
+                                         << id % INCODE_BRICK_POINTS;
+    }
+}
+
+void incode_insertion_take_in(struct incode_insertion *n)
+{
+    if (!n->whole)
+        mark_there(n);
+    n->brick = n->from;
+    n->staged_count = 0;
+    n->stage = INCODE_INSERTION_LOAD;
+}
 
 /* The next bricks: the largest part, of those that cutting all bricks leads to,
  * that begins with the first of them and is not too large. */
 static enum incode_insertion_step choose(struct incode_insertion *n)
 {
-    uint32_t all = n->maker->tree.bricks, first = 0, last = all;
+    uint32_t first = 0, last = n->maker->tree.bricks;
     uint32_t room = room_for(n), most = n->most;
     if (!n->whole && room < most)
         most = room > 0 ? room : 1;
     n->from = n->to;
-    while (last - first > 1 && (first != n->from || last - first > most)) {
+    n->squeezed = false;
+    if (n->from == n->own_last) {
+        n->stage = INCODE_INSERTION_REST;
+        return INCODE_INSERTION_WORKED;
+    }
+    while (last - first > 1 &&
+           (first != n->from || last - first > most || last > n->own_last)) {
         uint32_t cut = first + incode_bricks_cut(first, last - first);
         if (n->from < cut)
             last = cut;
@@ -113,27 +171,70 @@ static enum incode_insertion_step choose(struct incode_insertion *n)
             first = cut;
     }
     n->to = last;
-    n->again = false;
-    n->brick = n->from;
-    n->staged_count = 0;
-    memset(n->there, 0, sizeof n->there);
-    n->stage = INCODE_INSERTION_LOAD;
+    incode_insertion_take_in(n);
     return INCODE_INSERTION_WORKED;
 }
 
 /* Of a set that is inserted whole, points are in the order of bricks. */
 static uint32_t staged(const struct incode_insertion *n, uint32_t i)
 {
-    return n->whole ? 1 + i : n->staged[i];
+    return n->whole ? 1 + i : n->work->staged[i];
 }
 
-static enum incode_insertion_step make_room(struct incode_insertion *n);
-
-/* Whether the first point of a brick is a vertex already. */
-static bool is_sampled(const struct incode_insertion *n, uint32_t brick)
+/* Of a set that is inserted whole, those that are. */
+static uint32_t vertices(const struct incode_insertion *n)
 {
-    return brick >= n->sample_first && brick < n->sample_end &&
-           (brick - n->sample_first) % n->sample_step == 0;
+    uint32_t count = 0;
+    for (uint32_t v = 1; v < n->complex.points; v++)
+        count += incode_complex_is_vertex(&n->complex, v);
+    return count;
+}
+
+/* Whether a set that is inserted whole will fit, going by its first rounds. */
+static bool will_fit(const struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    uint64_t cells = (uint64_t)(x->cells - x->free_count) * n->staged_count;
+    size_t room = x->bytes - x->points * sizeof *x->point;
+    return cells / vertices(n) <= room / sizeof *x->cell / 4 * 5;
+}
+
+/* In the midst of some bricks: these count among the rest, and what is not a
+ * vertex yet is taken in again. */
+static enum incode_insertion_step make_room(struct incode_insertion *n)
+{
+    if (n->whole) {
+        n->vertices -= vertices(n);
+        begin_job(n, false);
+        return INCODE_INSERTION_WORKED;
+    }
+    if (n->from == n->own_first && n->most > 1) {
+        /* More cells than is thought: fewer at a time. */
+        uint32_t fewer = n->most / 4;
+        n->vertices -= vertices(n);
+        begin_job(n, false);
+        n->most = fewer > 1 ? fewer : 1;
+        return INCODE_INSERTION_WORKED;
+    }
+    if (n->complex.cells == 0)
+        return INCODE_INSERTION_FULL;
+    n->stage = INCODE_INSERTION_REST;
+    return INCODE_INSERTION_WORKED;
+}
+
+/* The brick from one on, or of every other from there, that is not among those
+ * taken in. */
+static uint32_t past_own(const struct incode_insertion *n, uint32_t brick)
+{
+    return brick >= n->own_first && brick < n->to ? n->to : brick;
+}
+
+static bool is_of_four(const struct incode_insertion *n, uint32_t id)
+{
+    bool is = false;
+    for (unsigned i = 0; i < 4; i++)
+        is = is || n->complex.point[n->four[i]].id == id;
+    return is;
 }
 
 /* Inserts the first point of a brick to come, or of every other, so that those
@@ -143,20 +244,25 @@ static enum incode_insertion_step sample(struct incode_insertion *n)
 {
     struct incode_complex *x = &n->complex;
     struct incode_pager *pager = &n->maker->pager;
-    uint32_t bricks = n->maker->tree.bricks, step = n->sample_step;
-    if (n->sample_end >= bricks) {
+    uint32_t bricks = n->maker->tree.bricks;
+    uint32_t brick = past_own(n, n->brick), id = brick * INCODE_BRICK_POINTS;
+    if (brick >= bricks) {
         n->stage = INCODE_INSERTION_CHOOSE;
         return INCODE_INSERTION_WORKED;
     }
-    uint32_t left = (bricks - 1 - n->sample_end) / step;
-    for (uint32_t i = 0; i < AHEAD && i <= left; i++)
-        (void)incode_pager_get(pager, n->sample_end + i * step);
-    const struct incode_frame *f = incode_pager_get(pager, n->sample_end);
+    for (uint32_t i = 0, ahead = brick; i < AHEAD && ahead < bricks; i++) {
+        (void)incode_pager_get(pager, ahead);
+        ahead = past_own(n, ahead + n->sample_step);
+    }
+    const struct incode_frame *f = incode_pager_get(pager, brick);
     if (f == NULL)
         return INCODE_INSERTION_WAITING;
+    n->brick = brick + n->sample_step;
+    if (is_of_four(n, id))
+        return INCODE_INSERTION_WORKED;
     const struct incode_brick *b = &f->page.brick;
     const double p[3] = {b->x[0], b->y[0], b->z[0]};
-    uint32_t v = incode_complex_add(x, p, n->sample_end * INCODE_BRICK_POINTS);
+    uint32_t v = incode_complex_add(x, p, id);
     incode_walker_spend(&n->maker->walker, INSERT_UNITS);
     if (v == INCODE_NONE ||
         !incode_complex_insert(x, &n->maker->counts.tally, v, n->near)) {
@@ -165,7 +271,6 @@ static enum incode_insertion_step sample(struct incode_insertion *n)
     }
     n->vertices++;
     n->near = v;
-    n->sample_end = left > 0 ? n->sample_end + step : bricks;
     return INCODE_INSERTION_WORKED;
 }
 
@@ -184,13 +289,11 @@ static enum incode_insertion_step load(struct incode_insertion *n)
         uint32_t id = n->brick * INCODE_BRICK_POINTS + i;
         if (!n->whole && (n->there[n->brick - n->from] >> i & 1) != 0)
             continue;
-        if (i == 0 && is_sampled(n, n->brick))
-            continue;
         uint32_t v = incode_complex_add(&n->complex, p, id);
         if (v == INCODE_NONE)
             return make_room(n);
         if (!n->whole)
-            n->staged[n->staged_count] = (uint16_t)v;
+            n->work->staged[n->staged_count] = (uint16_t)v;
         n->staged_count++;
     }
     if (++n->brick == n->to)
@@ -215,23 +318,69 @@ static uint32_t find_off(struct incode_insertion *n, uint32_t from,
     return 0;
 }
 
-/* Four points that span space, far apart in the order of bricks.  Where the
- * first bricks have none, the set goes by faces, whose search of a first
- * tetrahedron says where there are none at all. */
-static bool find_four(struct incode_insertion *n)
+/* Begins with the four points, or looks for more of them elsewhere. */
+static enum incode_insertion_step begin_with(struct incode_insertion *n)
 {
-    uint32_t all = n->complex.points - 1;
-    uint32_t four[4] = {1, 1 + all / 2, 0, 0};
-    if (all < 4)
-        return false;
-    four[2] = find_off(n, all / 4, four, 2);
-    four[3] = four[2] == 0 ? 0 : find_off(n, all / 4 * 3, four, 3);
-    n->near = four[0];
-    if (four[3] == 0 ||
-        !incode_complex_begin(&n->complex, &n->maker->counts.tally, four))
-        return false;
+    n->near = n->four[0];
+    n->stage = INCODE_INSERTION_SPAN;
+    if (n->four_count < 4)
+        return INCODE_INSERTION_WORKED;
+    if (!incode_complex_begin(&n->complex, &n->maker->counts.tally, n->four))
+        return INCODE_INSERTION_FULL;
     n->vertices += 4;
-    return true;
+    n->stage = INCODE_INSERTION_INSERT;
+    return INCODE_INSERTION_WORKED;
+}
+
+/* Four points that span space, as far as these bricks have them, far apart in
+ * their order. */
+static enum incode_insertion_step find_four(struct incode_insertion *n)
+{
+    uint32_t all = n->complex.points - 1, *four = n->four;
+    four[0] = 1;
+    four[1] = 1 + all / 2;
+    n->four_count = 2;
+    if (all < 4)
+        return INCODE_INSERTION_FULL;
+    four[2] = find_off(n, all / 4, four, 2);
+    n->four_count += four[2] != 0;
+    four[3] = four[2] == 0 ? 0 : find_off(n, all / 4 * 3, four, 3);
+    n->four_count += four[3] != 0;
+    n->brick = 0;
+    return begin_with(n);
+}
+
+/* Bricks that are in one plane or on one line, as those of a building's wall or
+ * a lake: the first points of others may be elsewhere.  Where they are not, the
+ * set goes by faces, whose search of a first tetrahedron says whether there is
+ * one at all. */
+static enum incode_insertion_step span(struct incode_insertion *n)
+{
+    struct incode_complex *x = &n->complex;
+    struct incode_pager *pager = &n->maker->pager;
+    const struct incode_complex_point *q = x->point;
+    uint32_t bricks = n->maker->tree.bricks;
+    n->brick = past_own(n, n->brick);
+    if (n->brick >= bricks)
+        return INCODE_INSERTION_FULL;
+    for (uint32_t i = 1; i < AHEAD && n->brick + i < bricks; i++)
+        (void)incode_pager_get(pager, n->brick + i);
+    const struct incode_frame *f = incode_pager_get(pager, n->brick);
+    if (f == NULL)
+        return INCODE_INSERTION_WAITING;
+    const double p[3] = {f->page.brick.x[0], f->page.brick.y[0],
+                         f->page.brick.z[0]};
+    uint32_t id = n->brick++ * INCODE_BRICK_POINTS, *four = n->four;
+    incode_walker_spend(&n->maker->walker, 1);
+    if (n->four_count == 2
+            ? incode_collinear(q[four[0]].p, q[four[1]].p, p)
+            : incode_orient3d(&n->maker->counts.tally, q[four[0]].p,
+                              q[four[1]].p, q[four[2]].p, p) == 0)
+        return INCODE_INSERTION_WORKED;
+    four[n->four_count] = incode_complex_add(x, p, id);
+    if (four[n->four_count++] == INCODE_NONE)
+        return INCODE_INSERTION_FULL;
+    return begin_with(n);
 }
 
 static enum incode_insertion_step begin(struct incode_insertion *n)
@@ -240,10 +389,8 @@ static enum incode_insertion_step begin(struct incode_insertion *n)
     n->level = 0;
     for (uint32_t left = n->staged_count; left > SAMPLE; left >>= ROUND)
         n->level++;
-    if (n->complex.cells == 0 && !find_four(n))
-        return INCODE_INSERTION_FULL;
     n->stage = INCODE_INSERTION_INSERT;
-    return INCODE_INSERTION_WORKED;
+    return n->complex.cells == 0 ? find_four(n) : INCODE_INSERTION_WORKED;
 }
 
 /* The round in which a point is inserted: a random sample first, four times as
@@ -281,266 +428,19 @@ static enum incode_insertion_step insert(struct incode_insertion *n)
     }
     n->next = 0;
     if (n->level-- > 0)
-        return INCODE_INSERTION_WORKED;
-    bool last = n->to == n->maker->tree.bricks;
+        return n->whole && !will_fit(n) ? make_room(n)
+                                        : INCODE_INSERTION_WORKED;
     n->from = n->to;
-    n->stage = last || room_for(n) < (n->most + 3) / 4
-                   ? INCODE_INSERTION_REST
-                   : INCODE_INSERTION_CHOOSE;
-    if (!last && n->sample_first == 0) { /* after the first bricks */
-        n->sample_first = n->sample_end = n->to;
+    n->stage = is_short(n) ? INCODE_INSERTION_REST : INCODE_INSERTION_CHOOSE;
+    if (!n->sampled) { /* after the first bricks */
+        n->sampled = true;
+        n->brick = 0;
         n->stage = INCODE_INSERTION_SAMPLE;
     }
     return INCODE_INSERTION_WORKED;
 }
 
-/* ---- which cells are final ---- */
-
-static enum incode_insertion_step begin_list(struct incode_insertion *n);
-
-/* In the midst of some bricks: these count among the rest, and what is not a
- * vertex yet is taken in again, once. */
-static enum incode_insertion_step make_room(struct incode_insertion *n)
-{
-    if (n->whole || n->complex.cells == 0 || n->again)
-        return INCODE_INSERTION_FULL;
-    n->again = true;
-    n->stage = INCODE_INSERTION_REST;
-    return INCODE_INSERTION_WORKED;
-}
-
-static enum incode_insertion_step set_rest(struct incode_insertion *n)
-{
-    struct incode_complex *x = &n->complex;
-    if (!incode_rest_set(&n->rest, n->maker, n->from))
-        return INCODE_INSERTION_WAITING;
-    incode_complex_tell_free(x);
-    n->releases++;
-    n->cell = INCODE_COMPLEX_CELLS_FIRST;
-    n->final = 0;
-    n->stage = INCODE_INSERTION_JUDGE;
-    return INCODE_INSERTION_WORKED;
-}
-
-static uint32_t cells_left(const struct incode_insertion *n)
-{
-    const struct incode_complex *x = &n->complex;
-    return x->cells - INCODE_COMPLEX_CELLS_FIRST - x->free_count;
-}
-
-static enum incode_insertion_step judge(struct incode_insertion *n)
-{
-    const struct incode_complex *x = &n->complex;
-    uint32_t end = x->cells - n->cell < JUDGED ? x->cells : n->cell + JUDGED;
-    for (; n->cell < end; n->cell++) {
-        struct incode_cell *c = incode_complex_cell(x, n->cell);
-        if (incode_cell_is_free(c))
-            continue;
-        bool final = !incode_rest_reaches(&n->rest, x, c);
-        incode_cell_set_proved(c, final);
-        n->final += final;
-    }
-    incode_walker_spend(&n->maker->walker, JUDGED / CELLS);
-    if (n->cell < x->cells)
-        return INCODE_INSERTION_WORKED;
-    n->cell = INCODE_COMPLEX_CELLS_FIRST;
-    if (n->final >= cells_left(n) / 2)
-        return begin_list(n);
-    n->stage = INCODE_INSERTION_LOOK;
-    return INCODE_INSERTION_WORKED;
-}
-
-/* Looks closely at those that are not final as far as the rest's boxes tell. */
-static enum incode_insertion_step look(struct incode_insertion *n)
-{
-    const struct incode_complex *x = &n->complex;
-    uint32_t looked = 0;
-    for (; n->cell < x->cells && looked < LOOKED; n->cell++) {
-        struct incode_cell *c = incode_complex_cell(x, n->cell);
-        if (incode_cell_is_free(c) || incode_cell_proved(c) != 0)
-            continue;
-        bool final = !incode_rest_looks(&n->rest, x, c);
-        incode_cell_set_proved(c, final);
-        n->final += final;
-        looked++;
-    }
-    incode_walker_spend(&n->maker->walker, looked);
-    if (n->cell < x->cells)
-        return INCODE_INSERTION_WORKED;
-    if (n->final < cells_left(n) / 8)
-        return INCODE_INSERTION_FULL;
-    return begin_list(n);
-}
-
-/* ---- the tetrahedra ---- */
-
-/* Which of a cell's vertices is the smallest, whose brick owns it. */
-static unsigned owner_of(const struct incode_complex *x,
-                         const struct incode_cell *c)
-{
-    const double *const p[4] = {x->point[c->v[0]].p, x->point[c->v[1]].p,
-                                x->point[c->v[2]].p, x->point[c->v[3]].p};
-    return incode_owner(p);
-}
-
-static bool is_own(const struct incode_insertion *n, uint32_t id)
-{
-    uint32_t brick = id / INCODE_BRICK_POINTS;
-    return brick >= n->own_first && brick < n->own_last;
-}
-
-/* From now on points' `cell` is the first of what they own. */
-static enum incode_insertion_step begin_list(struct incode_insertion *n)
-{
-    struct incode_complex *x = &n->complex;
-    for (uint32_t v = 0; v < x->points; v++)
-        x->point[v].cell = INCODE_NONE;
-    n->cell = INCODE_COMPLEX_CELLS_FIRST;
-    n->emitted = true;
-    n->stage = INCODE_INSERTION_LIST;
-    return INCODE_INSERTION_WORKED;
-}
-
-/* Lists some final tetrahedra by the vertex that owns them; the triangulation
- * is set right when they are released. */
-static enum incode_insertion_step list(struct incode_insertion *n)
-{
-    struct incode_complex *x = &n->complex;
-    uint32_t end = x->cells - n->cell < CELLS ? x->cells : n->cell + CELLS;
-    for (; n->cell < end; n->cell++) {
-        struct incode_cell *c = incode_complex_cell(x, n->cell);
-        if (incode_cell_is_free(c) || incode_cell_proved(c) == 0 ||
-            incode_cell_is_infinite(c))
-            continue;
-        struct incode_complex_point *owner = &x->point[c->v[owner_of(x, c)]];
-        if (!is_own(n, owner->id))
-            continue;
-        incode_cell_join(c, 0, owner->cell);
-        owner->cell = n->cell;
-    }
-    if (n->cell < x->cells)
-        return INCODE_INSERTION_WORKED;
-    n->v = 1;
-    n->stage = INCODE_INSERTION_EMIT;
-    return INCODE_INSERTION_WORKED;
-}
-
-/* The vertices of a cell after v, so that all have positive orientation. */
-static void apexes_of(const struct incode_complex *x,
-                      const struct incode_cell *c, uint32_t v,
-                      uint32_t apexes[3])
-{
-    static const uint8_t EVEN[4][3] = {
-        {1, 2, 3}, {0, 3, 2}, {3, 0, 1}, {2, 1, 0}};
-    const uint8_t *others = EVEN[incode_cell_index(c, v)];
-    for (unsigned k = 0; k < 3; k++)
-        apexes[k] = x->point[c->v[others[k]]].id;
-}
-
-/* The next cell of such a list. */
-static uint32_t next_of(const struct incode_cell *c)
-{
-    uint32_t next = c->n[0].cell;
-    return next == INCODE_CELL_NONE ? INCODE_NONE : next;
-}
-
-/* Emits tetrahedra of v, as far as there is room for them. */
-static enum incode_insertion_step emit_some(struct incode_insertion *n,
-                                            struct incode_complex_point *v)
-{
-    const struct incode_complex *x = &n->complex;
-    size_t room = n->outside.emit_room(n->outside.context), count = 0;
-    if (room == 0)
-        return INCODE_INSERTION_WAITING;
-    if (room > INCODE_INSERTION_EMITTED)
-        room = INCODE_INSERTION_EMITTED;
-    for (; v->cell != INCODE_NONE && count < room; count++) {
-        const struct incode_cell *c = incode_complex_cell(x, v->cell);
-        v->cell = next_of(c);
-        apexes_of(x, c, n->v, n->apexes[count]);
-    }
-    n->outside.emit(n->outside.context, v->id, (const uint32_t(*)[3])n->apexes,
-                    count);
-    n->kept += count;
-    incode_walker_spend(&n->maker->walker, (uint32_t)count / EMIT_A_UNIT);
-    return INCODE_INSERTION_WORKED;
-}
-
-static enum incode_insertion_step emit(struct incode_insertion *n)
-{
-    struct incode_complex *x = &n->complex;
-    for (unsigned i = 0; i < STEPS && n->v < x->points; i++, n->v++)
-        if (x->point[n->v].cell != INCODE_NONE)
-            return emit_some(n, &x->point[n->v]);
-    if (n->v == x->points)
-        n->stage = INCODE_INSERTION_RELEASE;
-    return INCODE_INSERTION_WORKED;
-}
-
-static void set_bit(uint64_t *bits, uint32_t i)
-{
-    bits[i / 64] |= UINT64_C(1) << i % 64;
-}
-
-/* The points of the bricks at work that are vertices. */
-static void mark_there(struct incode_insertion *n)
-{
-    const struct incode_complex *x = &n->complex;
-    memset(n->there, 0, sizeof n->there);
-    for (uint32_t v = 1; v < x->points; v++) {
-        uint32_t id = x->point[v].id, brick = id / INCODE_BRICK_POINTS;
-        if (incode_complex_is_vertex(x, v) && brick >= n->from && brick < n->to)
-            n->there[brick - n->from] |= UINT64_C(1)
-                                         << id % INCODE_BRICK_POINTS;
-    }
-}
-
-/* Releases what has been emitted. */
-static enum incode_insertion_step release(struct incode_insertion *n)
-{
-    struct incode_complex *x = &n->complex;
-    uint32_t words = (n->maker->tree.bricks + 63) / 64, latest = 0;
-    incode_complex_release(x);
-    memset(n->touched, 0, words * sizeof *n->touched);
-    for (uint32_t v = 1; v < x->points; v++) {
-        uint32_t id = x->point[v].id;
-        if (!incode_complex_is_vertex(x, v))
-            continue;
-        set_bit(n->touched, id / INCODE_BRICK_POINTS);
-        if (id >= latest) {
-            latest = id;
-            n->near = v;
-        }
-    }
-    n->brick = n->own_first;
-    n->stage = INCODE_INSERTION_COMMIT;
-    return INCODE_INSERTION_WORKED;
-}
-
-/* Commits the bricks at whose points no cell is left. */
-static enum incode_insertion_step commit(struct incode_insertion *n)
-{
-    uint32_t end = n->from < n->own_last ? n->from : n->own_last;
-    for (; n->brick < end; n->brick++) {
-        if ((n->touched[n->brick / 64] >> n->brick % 64 & 1) != 0 ||
-            incode_insertion_has_committed(n, n->brick))
-            continue;
-        if (n->outside.emit_room(n->outside.context) == 0)
-            return INCODE_INSERTION_WAITING;
-        set_bit(n->committed, n->brick);
-        n->outside.commit(n->outside.context, n->brick);
-    }
-    n->stage = INCODE_INSERTION_CHOOSE;
-    if (n->from == n->maker->tree.bricks) {
-        n->stage = INCODE_INSERTION_DONE;
-    } else if (n->from < n->to) { /* in the midst of some bricks */
-        mark_there(n);
-        n->brick = n->from;
-        n->staged_count = 0;
-        n->stage = INCODE_INSERTION_LOAD;
-    }
-    return INCODE_INSERTION_WORKED;
-}
+/* ---- steps ---- */
 
 static enum incode_insertion_step step(struct incode_insertion *n)
 {
@@ -551,24 +451,30 @@ static enum incode_insertion_step step(struct incode_insertion *n)
         return load(n);
     case INCODE_INSERTION_BEGIN:
         return begin(n);
+    case INCODE_INSERTION_SPAN:
+        return span(n);
     case INCODE_INSERTION_INSERT:
         return insert(n);
     case INCODE_INSERTION_SAMPLE:
         return sample(n);
     case INCODE_INSERTION_REST:
-        return set_rest(n);
+        return incode_insertion_rest(n);
     case INCODE_INSERTION_JUDGE:
-        return judge(n);
+        return incode_insertion_judge(n);
     case INCODE_INSERTION_LOOK:
-        return look(n);
+        return incode_insertion_look(n);
+    case INCODE_INSERTION_VISIT:
+        return incode_insertion_visit(n);
+    case INCODE_INSERTION_SETTLE:
+        return incode_insertion_settle(n);
     case INCODE_INSERTION_LIST:
-        return list(n);
+        return incode_insertion_list(n);
     case INCODE_INSERTION_EMIT:
-        return emit(n);
+        return incode_insertion_emit(n);
     case INCODE_INSERTION_RELEASE:
-        return release(n);
+        return incode_insertion_release(n);
     case INCODE_INSERTION_COMMIT:
-        return commit(n);
+        return incode_insertion_commit(n);
     case INCODE_INSERTION_DONE:
     default:
         return INCODE_INSERTION_FINISHED;
@@ -578,7 +484,8 @@ static enum incode_insertion_step step(struct incode_insertion *n)
 static void note_used(struct incode_insertion *n)
 {
     const struct incode_complex *x = &n->complex;
-    size_t used = x->points * sizeof *x->point + x->cells * sizeof *x->cell;
+    size_t used = sizeof *n->work + x->points * sizeof *x->point +
+                  x->cells * sizeof *x->cell;
     n->used = used > n->used ? used : n->used;
 }
 

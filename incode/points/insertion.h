@@ -3,16 +3,17 @@
  * stretched or nearly degenerate costs little more than what is not.
  *
  * Where all points fit, they are inserted at once.  Otherwise brick after
- * brick; when memory runs short, cells whose spheres reach no brick that is
+ * brick; when memory runs short, cells whose spheres hold no point that is
  * still to come are final: they are emitted and released (Isenburg, Liu,
  * Shewchuk, Snoeyink, Streaming computation of Delaunay triangulations, ACM
  * Transactions on Graphics 25, 2006).  A brick is committed when all cells at
- * its points are.
+ * its points are.  Of others' bricks, the points that have to do with own ones
+ * are inserted last.
  *
- * Memory: struct incode_insertion, about 33 KB, and a block given by its owner:
- * a bit a brick, the complex the rest.  Work: a step takes a brick in, or
- * inserts or emits some, or looks at some cells; releasing looks at each once.
- * It listens to the maker's walker.
+ * Memory: struct incode_insertion, about 2 KB, and a block given by its owner:
+ * 34 KB, two bits a brick, the complex the rest.  Work: a step takes a brick
+ * in, or inserts or emits some, or looks at some cells; releasing looks at each
+ * once. It listens to the maker's walker.
  *
  *     incode_insertion_init(&n, &maker, &outside);
  *     incode_insertion_start(&n, bits, memory, bytes, first, last);
@@ -25,11 +26,14 @@
 #include "incode/complex/complex.h"
 #include "incode/front/job.h"
 #include "incode/maker/maker.h"
+#include "look.h"
 #include "rest.h"
 
 enum {
-    INCODE_INSERTION_EMITTED = 128, /* tetrahedra at a time */
-    INCODE_INSERTION_BRICKS = 32    /* taken in at a time, unless all fit */
+    INCODE_INSERTION_EMITTED = 128,   /* tetrahedra at a time */
+    INCODE_INSERTION_BRICKS = 32,     /* taken in at a time, unless all fit */
+    INCODE_INSERTION_REACHED = 1024,  /* cells listed */
+    INCODE_INSERTION_LEAST = 40 << 10 /* bytes */
 };
 
 enum incode_insertion_step {
@@ -49,46 +53,70 @@ struct incode_insertion {
 
     uint32_t own_first, own_last; /* own bricks */
     uint64_t *committed;          /* a bit a brick, its owner's */
-    uint64_t *touched;            /* a cell is left at one of its points */
-    bool whole;                   /* all bricks are taken in at once */
-    bool emitted;                 /* something has been */
-    bool again;                   /* the bricks at work did not fit before */
+    /* A bit a brick: a cell is left at one of its points; before that, it is to
+     * be visited. */
+    uint64_t *touched;
+    uint64_t *passed; /* a bit a brick: it has been visited */
+    struct incode_insertion_work *work;
+    bool whole;    /* all bricks are taken in at once */
+    bool emitted;  /* something has been */
+    bool sampled;  /* bricks to come have been */
+    bool closing;  /* points of others' bricks are inserted where they matter */
+    bool closed;   /* that is done */
+    bool squeezed; /* they did not fit */
+    bool thorough; /* boxes alone are not enough */
+    bool large;    /* the cavities of points near by */
+    bool shown;    /* points to come, to the cells */
 
     enum incode_insertion_stage {
         INCODE_INSERTION_CHOOSE,
         INCODE_INSERTION_LOAD,
         INCODE_INSERTION_BEGIN,
+        INCODE_INSERTION_SPAN,
         INCODE_INSERTION_INSERT,
         INCODE_INSERTION_SAMPLE,
         INCODE_INSERTION_REST,
         INCODE_INSERTION_JUDGE,
         INCODE_INSERTION_LOOK,
+        INCODE_INSERTION_VISIT,
+        INCODE_INSERTION_SETTLE,
         INCODE_INSERTION_LIST,
         INCODE_INSERTION_EMIT,
         INCODE_INSERTION_RELEASE,
         INCODE_INSERTION_COMMIT,
         INCODE_INSERTION_DONE
     } stage;
-    /* Bricks [from, to) are being inserted; all before them are. */
+    /* Own bricks [from, to) are being inserted; all before them are. */
     uint32_t from, to;
-    /* The first point of every so many bricks [sample_first, sample_end) is a
-     * vertex already. */
-    uint32_t sample_first, sample_end, sample_step;
-    uint32_t most;                           /* bricks at a time */
-    uint32_t brick;                          /* to be loaded */
+    uint32_t sample_step; /* one point of so many bricks to come */
+    uint32_t most;        /* bricks at a time */
+    uint32_t brick;       /* to be loaded */
+    uint32_t four[4];     /* the first vertices */
+    uint32_t four_count;
     uint64_t there[INCODE_INSERTION_BRICKS]; /* of their points, which are
                                                 vertices already */
-    uint16_t staged[INCODE_INSERTION_BRICKS * INCODE_BRICK_POINTS];
     uint32_t staged_count;
     unsigned level;      /* of the points that are inserted now */
     uint32_t next, near; /* the staged point at work, and a vertex near by */
     uint32_t cell, v;    /* that is judged, whose tetrahedra are emitted */
     uint32_t final;      /* cells so far */
+    uint32_t reached;    /* cells listed; INCODE_NONE: too many */
+    unsigned round;      /* of looks and visits: 0, 1 */
     uint32_t apexes[INCODE_INSERTION_EMITTED][3];
-    struct incode_rest rest;
 };
 
-/* Bytes that the triangulation of so many points takes, as a rule. */
+/* What of it is in the memory that is given. */
+struct incode_insertion_work {
+    struct incode_rest rest;
+    struct incode_look look;
+    union {
+        uint16_t staged[INCODE_INSERTION_BRICKS * INCODE_BRICK_POINTS];
+        uint32_t reached[INCODE_INSERTION_REACHED]; /* cells, in a visit */
+    };
+};
+
+/* Bytes that the triangulation of so many points takes, as a rule, beside two
+ * bits a brick. */
 size_t incode_insertion_bytes(uint64_t points);
 
 void incode_insertion_init(struct incode_insertion *n,
@@ -97,7 +125,7 @@ void incode_insertion_init(struct incode_insertion *n,
 
 /* Begins with own bricks [first, last), first < last.  committed: a bit a brick
  * of the set, that tells which are when it is full.  memory: aligned to 8
- * bytes; bytes: more than a bit a brick. */
+ * bytes; bytes: at least INCODE_INSERTION_LEAST and two bits a brick. */
 void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
                             void *memory, size_t bytes, uint32_t first,
                             uint32_t last);

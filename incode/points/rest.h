@@ -1,13 +1,13 @@
-/* The points that have not been inserted yet, as far as pages of boxes tell of
- * them: whether one may lie in the sphere of a cell, which is final otherwise.
+/* The points that have not been inserted yet, as far as the highest boxes tell:
+ * whether one may lie in the sphere of a cell, which is final otherwise.
  *
- * Bricks are inserted in their order, so the rest is those from one of them on:
- * all later children of the pages above it, some 30 boxes a level.
+ * They are the bricks before one and those from another on: some 30 boxes of
+ * each level for each of the two.  What these do not tell, look.h does.
  *
- * Memory: struct incode_rest, about 11 KB.  Work: incode_rest_reaches looks at
- * these boxes, incode_rest_looks also into the pages below those reached.
+ * Memory: struct incode_rest, about 21 KB.  Work: incode_rest_reaches looks at
+ * these boxes.
  *
- *     while (!incode_rest_set(&rest, &maker, brick))
+ *     while (!incode_rest_set(&rest, &maker, first, brick))
  *         deliver(page);
  *     final = !incode_rest_reaches(&rest, &x, cell);
  */
@@ -19,33 +19,25 @@
 #include "incode/complex/complex.h"
 #include "incode/maker/maker.h"
 
-enum { INCODE_REST_MAX = (INCODE_LEVELS_MAX - 1) * INCODE_FANOUT };
+enum { INCODE_REST_MAX = (INCODE_LEVELS_MAX - 1) * 2 * INCODE_FANOUT };
 
 struct incode_rest {
     /* Absolute coordinates; filled up to a multiple of 8 with boxes that
      * nothing reaches. */
     alignas(64) double lo[3][INCODE_REST_MAX];
     alignas(64) double hi[3][INCODE_REST_MAX];
-    uint32_t page[INCODE_REST_MAX];
     uint32_t count;
-    double scale; /* 2^k, of relative coordinates */
-    struct incode_maker *maker;
 };
 
-/* All bricks from this one on, or none; false: a page is missing. */
+/* All bricks before one and from another on, before < from; false: a page is
+ * missing. */
 bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
-                     uint32_t brick);
+                     uint32_t before, uint32_t from);
 
 /* Whether a point of the rest may lie in the sphere of a cell, or beyond its
  * facet or in its plane, as far as the rest's boxes tell. */
 bool incode_rest_reaches(const struct incode_rest *rest,
                          const struct incode_complex *x,
                          const struct incode_cell *c);
-
-/* The same, as far as all boxes tell, the lifted ones, too.  A page that is
- * missing is asked for, and may be reached. */
-bool incode_rest_looks(const struct incode_rest *rest,
-                       const struct incode_complex *x,
-                       const struct incode_cell *c);
 
 #endif

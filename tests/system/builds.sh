@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Every real set point by point, where all its points fit, and as `auto` has it
 # in the usual memory: the digest of the index and the same bytes.  `auto` takes
-# points where one node has all bricks and what is not final fits, and faces
-# else; what is asked for by points and does not fit is done by faces.
+# points where what is not final fits and one node has all bricks of a volume, or
+# some of a surface, and faces else; what is asked for by points and does not fit
+# is done by faces.
 . tests/system/lib.sh
 large=64M
 
@@ -34,18 +35,21 @@ two='--strategy spatial --nodes 2'
     goes_by points "$scratch/uniform.npy" $one
     goes_by faces "$scratch/uniform.npy" $two
     goes_by points "$scratch/uniform.npy" $two --build points
-    goes_by faces "$scratch/sphere.npy" $two
-    goes_by points "$scratch/sphere.npy" $two --build points
-    goes_by faces "$scratch/sphere.npy" --strategy spatial --nodes 4
+    goes_by points "$scratch/sphere.npy" $two
+    goes_by faces "$scratch/sphere.npy" $two --build faces
+    goes_by points "$scratch/sphere.npy" --strategy spatial --nodes 4
+    goes_by points "$scratch/sphere.npy" --strategy spatial --nodes 8 \
+        --memory 512K
+    goes_by faces "$scratch/many.npy" --strategy spatial --nodes 8
     goes_by faces "$scratch/uniform.npy" $one --build faces
     goes_by faces "$scratch/uniform.npy" $one --index grid --build points
     goes_by faces "$scratch/uniform.npy" $two --face-rule paper --build points
     goes_by points "$scratch/many.npy" $one
     goes_by points "$scratch/many.npy" $one --memory $large
     goes_by faces "$scratch/many.npy" $one --memory 640K
-    # They have the square of their number of tetrahedra, which auto does not
-    # expect.
-    goes_by faces "$scratch/lines.npy" $one
+    goes_by both "$scratch/many.npy" $one --memory 640K --build points
+    # They have the square of their number of tetrahedra.
+    goes_by points "$scratch/lines.npy" $one
 }
 
 sets() { # MOST

@@ -1,7 +1,8 @@
 /* A complex from which final cells are released goes on taking points: what was
  * released and what is left are the triangulation of all, each cell once,
- * whatever the order of the bricks, and none that is final is needed again. */
-#include "complex_scene.h"
+ * whatever the order of the bricks, and none that is final is needed again.
+ * Points that come later may be shown to it before. */
+#include "cavity_scene.h"
 
 #include "tests/unit/emulated.h"
 
@@ -51,7 +52,6 @@ static void check_left(struct scene *s)
 {
     struct incode_complex *x = &s->x;
     uint32_t free = 0;
-    incode_complex_tell_free(x);
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
         if (incode_cell_is_free(c)) {
@@ -95,7 +95,6 @@ static uint32_t release(struct scene *s, const double (*p)[3],
 {
     struct incode_complex *x = &s->x;
     uint32_t count = 0, part = 1 + scene_draw(&seed, 8);
-    incode_complex_tell_free(x);
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         struct incode_cell *c = incode_complex_cell(x, i);
         if (incode_cell_is_free(c))
@@ -110,6 +109,18 @@ static uint32_t release(struct scene *s, const double (*p)[3],
     incode_complex_release(x);
     check_left(s);
     return count;
+}
+
+/* Some of the points to come, each of which a cell holds that is left. */
+static void show(struct scene *s, const double (*p)[3], const uint32_t *row,
+                 uint32_t from, uint32_t n)
+{
+    bool listed;
+    scene_prove_all(s);
+    for (uint32_t i = from; i < n; i += 1 + scene_draw(&seed, 2 * BRICK))
+        assert_true(scene_check_cavity(s, p[row[i]], &listed) > 0);
+    scene_prove_none(s);
+    check_left(s);
 }
 
 /* Bricks of points in slabs along an axis, these in any order; after some of
@@ -141,6 +152,7 @@ static uint64_t stream(const double (*p)[3], const uint32_t *row, uint32_t n,
         from = to;
         if (from == n || scene_draw(&seed, 2) == 0)
             (void)release(&s, p, row, from, n, &tets);
+        show(&s, p, row, from, n);
     }
     /* Nothing is left but room. */
     assert_int_equal(s.x.cells, s.x.free_count + INCODE_COMPLEX_CELLS_FIRST);

@@ -1,0 +1,341 @@
+/* Which cells are final: no point to come lies in their spheres.
+ *
+ * The highest boxes to come tell of most cells of a volume; all boxes, with the
+ * lifted ones, of most cells of a surface.  Of the rest only the points can
+ * tell: the bricks that these cells may reach are visited, and each of their
+ * points looks up the cells that it would make give way.  First one brick for
+ * each cell, as that often settles it, then all that are still reached.
+ *
+ * When all own bricks have been taken in, a point of another's brick that lies
+ * in the sphere of a cell at an own point is inserted, and that closes the
+ * stars of all own points in one visit: a new cell at such a point p is on a
+ * facet at p between a cell that gives way and one that stays, and its sphere
+ * is within the two's (Edelsbrunner, Combinatorica 10, 1990), both at p, too.
+ * So a point that was in no sphere at an own point never will be.  Before that,
+ * and where these points do not fit, they are only shown to the cells, and
+ * those that hold none are final. */
+#include <string.h>
+
+#include "stages.h"
+
+enum {
+    AHEAD = 16,       /* bricks asked for together */
+    CELLS = 16,       /* judged as a unit of work */
+    JUDGED = 1024,    /* cells a step */
+    INSERT_UNITS = 4, /* of work, a point */
+    SHOWN = 256,      /* cells looked at as a unit of work */
+    LARGE = 32,       /* a cavity of more than such a part of the cells */
+    FEW = 128,        /* cells: looking at all is better than a search */
+    LEAST_SHARE = 8   /* of the cells must be final */
+};
+
+/* Marks of cells: INCODE_CELL_PROVED. */
+enum {
+    UNKNOWN = 0, /* or not final, as is known */
+    FINAL = INCODE_CELL_FINAL,
+    REACHED = 3 /* by a box, and by no point yet */
+};
+
+/* ---- boxes ---- */
+
+enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n)
+{
+    struct incode_insertion_work *work = n->work;
+    size_t bits = (n->maker->tree.bricks + 63) / 64 * sizeof(uint64_t);
+    if (!incode_rest_set(&work->rest, n->maker, n->own_first, n->from))
+        return INCODE_INSERTION_WAITING;
+    n->closing = n->from == n->own_last && !n->squeezed;
+    n->shown = false;
+    memset(n->touched, 0, bits);
+    memset(n->passed, 0, bits);
+    incode_look_init(&work->look, n->maker, n->passed, n->touched);
+    incode_look_begin(&work->look, false, n->own_first, n->from);
+    n->releases++;
+    n->cell = INCODE_COMPLEX_CELLS_FIRST;
+    n->final = 0;
+    n->round = 0;
+    n->stage = INCODE_INSERTION_JUDGE;
+    return INCODE_INSERTION_WORKED;
+}
+
+static uint32_t cells_left(const struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    return x->cells - INCODE_COMPLEX_CELLS_FIRST - x->free_count;
+}
+
+static void go_on(struct incode_insertion *n, enum incode_insertion_stage stage)
+{
+    n->cell = INCODE_COMPLEX_CELLS_FIRST;
+    n->brick = n->next = 0;
+    n->reached = INCODE_NONE;
+    n->large = false;
+    n->stage = stage;
+}
+
+/* Where to stop after some cells. */
+static uint32_t some_cells(const struct incode_insertion *n)
+{
+    uint32_t cells = n->complex.cells;
+    incode_walker_spend(&n->maker->walker, JUDGED / CELLS);
+    return cells - n->cell < JUDGED ? cells : n->cell + JUDGED;
+}
+
+enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
+        struct incode_cell *c = incode_complex_cell(x, n->cell);
+        if (incode_cell_is_free(c))
+            continue;
+        bool final = !incode_rest_reaches(&n->work->rest, x, c);
+        incode_cell_set_proved(c, final ? FINAL : UNKNOWN);
+        n->final += final;
+    }
+    if (n->cell < x->cells)
+        return INCODE_INSERTION_WORKED;
+    bool enough = n->final == cells_left(n) ||
+                  (!n->thorough && n->final >= cells_left(n) / 2);
+    go_on(n, enough ? INCODE_INSERTION_SETTLE : INCODE_INSERTION_LOOK);
+    return INCODE_INSERTION_WORKED;
+}
+
+/* Whether it is at an own point that has been taken in. */
+static bool is_at_own(const struct incode_insertion *n,
+                      const struct incode_cell *c)
+{
+    const struct incode_complex_point *point = n->complex.point;
+    uint32_t first = n->own_first * INCODE_BRICK_POINTS;
+    uint32_t count = n->from * INCODE_BRICK_POINTS - first;
+    bool own = false;
+    for (unsigned i = 0; i < 4; i++)
+        own = own || point[c->v[i]].id - first < count;
+    return own;
+}
+
+/* Whether a cell is to be looked at in this round. */
+static bool is_wanted(const struct incode_insertion *n,
+                      const struct incode_cell *c)
+{
+    unsigned proved = incode_cell_proved(c);
+    if (incode_cell_is_free(c) || proved == FINAL)
+        return false;
+    if (n->round == 1 && !n->closing)
+        return proved == REACHED;
+    return n->squeezed || is_at_own(n, c);
+}
+
+/* What the look has told of its cells. */
+static void note(struct incode_insertion *n)
+{
+    const struct incode_look *look = &n->work->look;
+    for (uint32_t i = 0; i < look->count && n->round == 0; i++) {
+        bool reached = incode_look_has_reached(look, i);
+        incode_cell_set_proved(incode_complex_cell(&n->complex, look->cell[i]),
+                               reached ? REACHED : FINAL);
+        n->final += !reached;
+    }
+}
+
+enum incode_insertion_step incode_insertion_look(struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    struct incode_look *look = &n->work->look;
+    uint32_t end = look->at == 0 ? some_cells(n) : n->cell;
+    for (; n->cell < end && !incode_look_is_full(look); n->cell++)
+        if (is_wanted(n, incode_complex_cell(x, n->cell)))
+            incode_look_add(look, x, n->cell);
+    if (n->cell < x->cells && !incode_look_is_full(look))
+        return INCODE_INSERTION_WORKED;
+    incode_walker_spend(&n->maker->walker, look->count);
+    enum incode_look_result r = incode_look_go(look);
+    if (r != INCODE_LOOK_DONE)
+        return r == INCODE_LOOK_MORE ? INCODE_INSERTION_WORKED
+                                     : INCODE_INSERTION_WAITING;
+    note(n);
+    incode_look_begin(look, n->round == 1, n->own_first, n->from);
+    if (n->cell < x->cells)
+        return INCODE_INSERTION_WORKED;
+    /* Without a visit, those that are reached stay. */
+    n->shown =
+        n->thorough || n->round == 1 || n->final < cells_left(n) / LEAST_SHARE;
+    go_on(n, n->shown ? INCODE_INSERTION_VISIT : INCODE_INSERTION_SETTLE);
+    return INCODE_INSERTION_WORKED;
+}
+
+/* ---- points ---- */
+
+/* The first brick from one on that is wanted; else the number of bricks. */
+static uint32_t next_wanted(const struct incode_insertion *n, uint32_t brick)
+{
+    uint32_t bricks = n->maker->tree.bricks;
+    while (brick < bricks) {
+        uint64_t left = n->touched[brick / 64] >> brick % 64;
+        if (left != 0)
+            return brick + (uint32_t)__builtin_ctzll(left);
+        brick = (brick / 64 + 1) * 64;
+    }
+    return bricks;
+}
+
+/* Shows a point to the cells that are listed. */
+static void show_listed(struct incode_insertion *n, const double p[3])
+{
+    const struct incode_complex *x = &n->complex;
+    uint32_t *list = n->work->reached, left = 0;
+    for (uint32_t i = 0; i < n->reached; i++) {
+        struct incode_cell *c = incode_complex_cell(x, list[i]);
+        if (incode_complex_gives_way(x, &n->maker->counts.tally, c, p))
+            incode_cell_set_proved(c, UNKNOWN);
+        list[left] = list[i];
+        left += incode_cell_proved(c) == REACHED;
+    }
+    n->reached = left;
+}
+
+/* Shows a point, if there is one, to all cells that are reached, and lists what
+ * is left of them if it is few. */
+static void show_all(struct incode_insertion *n, const double *p)
+{
+    const struct incode_complex *x = &n->complex;
+    uint32_t left = 0;
+    for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
+        struct incode_cell *c = incode_complex_cell(x, i);
+        if (incode_cell_is_free(c) || incode_cell_proved(c) != REACHED)
+            continue;
+        if (p != NULL &&
+            incode_complex_gives_way(x, &n->maker->counts.tally, c, p))
+            incode_cell_set_proved(c, UNKNOWN);
+        else if (left++ < INCODE_INSERTION_REACHED)
+            n->work->reached[left - 1] = i;
+    }
+    n->reached = left <= INCODE_INSERTION_REACHED ? left : INCODE_NONE;
+    incode_walker_spend(&n->maker->walker, x->cells / SHOWN);
+}
+
+/* Shows it to all that it would make give way.  They are sought from the last
+ * ones, but where those that are left are few, or its cavity is large, as those
+ * of its neighbours are. */
+static void show_point(struct incode_insertion *n, const double p[3])
+{
+    struct incode_complex *x = &n->complex;
+    struct incode_tally *tally = &n->maker->counts.tally;
+    uint32_t cells[INCODE_COMPLEX_CAVITY], count = INCODE_NONE;
+    if (n->reached > FEW)
+        count = incode_complex_cavity(x, tally, p, n->near, cells);
+    if (count == INCODE_NONE && n->reached != INCODE_NONE) {
+        show_listed(n, p);
+    } else if (count == INCODE_NONE && n->large) {
+        show_all(n, p);
+    } else if (count == INCODE_NONE) {
+        uint32_t large = incode_complex_disprove(x, tally, p, n->near);
+        incode_walker_spend(&n->maker->walker, large / CELLS);
+        n->large = large > x->cells / LARGE;
+        show_all(n, NULL);
+    } else {
+        for (uint32_t i = 0; i < count; i++) {
+            struct incode_cell *c = incode_complex_cell(x, cells[i]);
+            incode_cell_set_proved(c, UNKNOWN);
+            n->near = c->v[3];
+        }
+    }
+}
+
+/* Inserts it if it lies in the sphere of a cell at an own point; false: there
+ * is no room. */
+static bool close_stars(struct incode_insertion *n, const double p[3],
+                        uint32_t id)
+{
+    struct incode_complex *x = &n->complex;
+    struct incode_tally *tally = &n->maker->counts.tally;
+    uint32_t cells[INCODE_COMPLEX_CAVITY];
+    uint32_t count = incode_complex_cavity(x, tally, p, n->near, cells);
+    bool wanted = count == INCODE_NONE;
+    for (uint32_t i = 0; i < count && !wanted; i++) {
+        const struct incode_cell *c = incode_complex_cell(x, cells[i]);
+        wanted = is_at_own(n, c);
+        n->near = c->v[3];
+    }
+    if (!wanted)
+        return true;
+    uint32_t v = incode_complex_add(x, p, id);
+    if (v == INCODE_NONE || !incode_complex_insert(x, tally, v, n->near))
+        return false;
+    n->vertices++;
+    n->near = v;
+    return true;
+}
+
+static enum incode_insertion_step end_visit(struct incode_insertion *n)
+{
+    n->round++;
+    go_on(n, n->round == 1 ? INCODE_INSERTION_LOOK : INCODE_INSERTION_SETTLE);
+    incode_look_begin(&n->work->look, true, n->own_first, n->from);
+    return INCODE_INSERTION_WORKED;
+}
+
+enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n)
+{
+    struct incode_pager *pager = &n->maker->pager;
+    struct incode_walker *walker = &n->maker->walker;
+    uint32_t bricks = n->maker->tree.bricks;
+    uint32_t brick = next_wanted(n, n->brick), ahead = brick;
+    if (!n->closing && n->next == 0 && n->reached > FEW)
+        show_all(n, NULL);
+    if (brick == bricks || (!n->closing && n->reached == 0))
+        return end_visit(n);
+    for (unsigned i = 0; i < AHEAD && ahead < bricks; i++) {
+        (void)incode_pager_get(pager, ahead);
+        ahead = next_wanted(n, ahead + 1);
+    }
+    const struct incode_frame *f = incode_pager_get(pager, brick);
+    if (f == NULL)
+        return INCODE_INSERTION_WAITING;
+    const struct incode_brick *b = &f->page.brick;
+    for (uint32_t first = n->next; n->next < f->count; n->next++) {
+        const double p[3] = {b->x[n->next], b->y[n->next], b->z[n->next]};
+        uint32_t id = brick * INCODE_BRICK_POINTS + n->next;
+        if (walker->left == 0 && n->next > first)
+            return INCODE_INSERTION_WORKED;
+        incode_walker_spend(walker, INSERT_UNITS);
+        if (!n->closing) {
+            show_point(n, p);
+        } else if (!close_stars(n, p, id)) {
+            n->squeezed = true; /* what is final makes room */
+            n->stage = INCODE_INSERTION_REST;
+            return INCODE_INSERTION_WORKED;
+        }
+    }
+    n->touched[brick / 64] &= ~(UINT64_C(1) << brick % 64);
+    incode_insertion_set_bit(n->passed, brick);
+    n->brick = brick + 1;
+    n->next = 0;
+    n->large = false;
+    return INCODE_INSERTION_WORKED;
+}
+
+/* ---- what has come of it ---- */
+
+enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    if (n->cell == INCODE_COMPLEX_CELLS_FIRST)
+        n->final = 0;
+    for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
+        struct incode_cell *c = incode_complex_cell(x, n->cell);
+        if (incode_cell_is_free(c))
+            continue;
+        unsigned proved = incode_cell_proved(c);
+        bool final = proved == FINAL || (n->shown && proved == REACHED) ||
+                     (n->shown && n->closing && is_at_own(n, c));
+        incode_cell_set_proved(c, final ? FINAL : UNKNOWN);
+        n->final += final;
+    }
+    if (n->cell < x->cells)
+        return INCODE_INSERTION_WORKED;
+    if (!n->closing && n->final < cells_left(n) / LEAST_SHARE)
+        return INCODE_INSERTION_FULL;
+    n->closed = n->closing && (n->shown || n->final == cells_left(n));
+    incode_insertion_begin_list(n);
+    return INCODE_INSERTION_WORKED;
+}

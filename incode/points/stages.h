@@ -1,0 +1,43 @@
+/* The stages of an insertion, for the files of this room alone: insertion.c
+ * takes points in, finality.c says which cells are final, emission.c emits and
+ * releases them.
+ *
+ * Memory: the insertion's.  Work: a bounded part of the stage a call.
+ *
+ *     if (n->stage == INCODE_INSERTION_JUDGE)
+ *         step = incode_insertion_judge(n);
+ */
+#ifndef INCODE_STAGES_H
+#define INCODE_STAGES_H
+
+#include "insertion.h"
+
+/* Begins to take the bricks [from, to) in. */
+void incode_insertion_take_in(struct incode_insertion *n);
+
+enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_look(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n);
+
+/* Begins to emit the cells that are proved. */
+void incode_insertion_begin_list(struct incode_insertion *n);
+
+enum incode_insertion_step incode_insertion_list(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_release(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n);
+
+static inline void incode_insertion_set_bit(uint64_t *bits, uint32_t i)
+{
+    bits[i / 64] |= UINT64_C(1) << i % 64;
+}
+
+/* Whether the own bricks are all there are. */
+static inline bool incode_insertion_owns_all(const struct incode_insertion *n)
+{
+    return n->own_last - n->own_first == n->maker->tree.bricks;
+}
+
+#endif
