@@ -36,10 +36,6 @@ uint32_t incode_complex_locate(struct incode_complex *x,
                                struct incode_tally *tally, uint32_t from,
                                const double p[3]);
 
-/* Whether a vertex of the cell is at p. */
-bool incode_complex_has_point(const struct incode_complex *x,
-                              const struct incode_cell *c, const double p[3]);
-
 /* The cells that hold p, as `first` does; INCODE_NONE: too many. */
 uint32_t incode_complex_find_small(struct incode_complex *x,
                                    struct incode_tally *tally,

@@ -154,16 +154,6 @@ bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
 
 /* ---- insertion ---- */
 
-bool incode_complex_has_point(const struct incode_complex *x,
-                              const struct incode_cell *c, const double p[3])
-{
-    for (unsigned i = 0; i < 4; i++)
-        if (c->v[i] != INFINITE &&
-            incode_lexicographic(x->point[c->v[i]].p, p) == 0)
-            return true;
-    return false;
-}
-
 bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
                            uint32_t v, uint32_t near)
 {
@@ -172,9 +162,7 @@ bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
                   incode_complex_is_vertex(x, near));
     uint32_t first =
         incode_complex_locate(x, tally, x->point[near].cell, x->point[v].p);
-    if (first == INCODE_NONE ||
-        incode_complex_has_point(x, incode_complex_cell(x, first),
-                                 x->point[v].p))
+    if (first == INCODE_NONE)
         return false;
     enum incode_cavity_result r =
         incode_complex_insert_small(x, tally, v, first);
@@ -190,8 +178,7 @@ uint32_t incode_complex_cavity(struct incode_complex *x,
 {
     INCODE_ASSERT(near < x->points && incode_complex_is_vertex(x, near));
     uint32_t first = incode_complex_locate(x, tally, x->point[near].cell, p);
-    if (first == INCODE_NONE ||
-        incode_complex_has_point(x, incode_complex_cell(x, first), p))
-        return 0;
-    return incode_complex_find_small(x, tally, p, first, cells);
+    return first == INCODE_NONE
+               ? 0
+               : incode_complex_find_small(x, tally, p, first, cells);
 }

@@ -133,11 +133,17 @@ bool incode_complex_gives_way(const struct incode_complex *x,
                               struct incode_tally *tally,
                               const struct incode_cell *c, const double p[3]);
 
-/* Sets INCODE_CELL_PROVED of all of them to 0, and returns how many there are.
- */
+/* Sets INCODE_CELL_PROVED of all of them to 0, and returns how many there are;
+ * *were: those that had another. */
 uint32_t incode_complex_disprove(struct incode_complex *x,
                                  struct incode_tally *tally, const double p[3],
-                                 uint32_t near);
+                                 uint32_t near, uint32_t *were);
+
+/* Cells that are not free. */
+static inline uint32_t incode_complex_cells_used(const struct incode_complex *x)
+{
+    return x->cells - x->free_count;
+}
 
 static inline bool incode_cell_is_free(const struct incode_cell *c)
 {

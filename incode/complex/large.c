@@ -25,15 +25,6 @@ static void set_next(struct incode_cell *c, uint32_t next)
     memcpy(c->sphere, &next, sizeof next);
 }
 
-bool incode_complex_gives_way(const struct incode_complex *x,
-                              struct incode_tally *tally,
-                              const struct incode_cell *c, const double p[3])
-{
-    double bound, t = incode_sphere_power(x->point, c, p, &bound);
-    return t < -bound || (!(t > bound) && !incode_complex_has_point(x, c, p) &&
-                          incode_complex_holds(x, tally, c, p));
-}
-
 /* Lists the cells that give way; returns how many facets are around them. */
 static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
                      const double p[3], uint32_t first)
@@ -180,14 +171,24 @@ static unsigned side_of(const struct incode_cell *c, uint32_t neighbour)
                                        : 3;
 }
 
+/* Returns whether it was proved. */
+static uint32_t disprove(struct incode_cell *c)
+{
+    uint32_t was = incode_cell_proved(c) != 0;
+    c->flags ^= INCODE_CELL_GOES;
+    incode_cell_set_proved(c, 0);
+    return was;
+}
+
 /* Goes through a cavity from one of its cells, depth first, with the way back
  * in the cells, and marks them; the second time it takes the marks away. */
 static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
-                           const double p[3], uint32_t first, bool again)
+                           const double p[3], uint32_t first, bool again,
+                           uint32_t *were)
 {
     uint32_t at = first, count = 1;
     unsigned i = 0;
-    incode_complex_cell(x, first)->flags ^= INCODE_CELL_GOES;
+    *were += disprove(incode_complex_cell(x, first));
     while (i < 4 || at != first) {
         const struct incode_cell *c = incode_complex_cell(x, at);
         if (i == 4) {
@@ -201,8 +202,7 @@ static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
         if (again ? incode_cell_mark(n) != 0
                   : incode_cell_mark(n) == 0 &&
                         incode_complex_gives_way(x, tally, n, p)) {
-            n->flags ^= INCODE_CELL_GOES;
-            incode_cell_set_proved(n, 0);
+            *were += disprove(n);
             n->n[3].low = (uint8_t)side_of(n, at);
             at = next;
             i = 0;
@@ -211,19 +211,18 @@ static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
             i++;
         }
     }
-    incode_cell_set_proved(incode_complex_cell(x, first), 0);
     return count;
 }
 
 uint32_t incode_complex_disprove(struct incode_complex *x,
                                  struct incode_tally *tally, const double p[3],
-                                 uint32_t near)
+                                 uint32_t near, uint32_t *were)
 {
     INCODE_ASSERT(near < x->points && incode_complex_is_vertex(x, near));
     uint32_t first = incode_complex_locate(x, tally, x->point[near].cell, p);
-    if (first == INCODE_NONE ||
-        incode_complex_has_point(x, incode_complex_cell(x, first), p))
+    *were = 0;
+    if (first == INCODE_NONE)
         return 0;
-    (void)go_through(x, tally, p, first, false);
-    return go_through(x, tally, p, first, true);
+    (void)go_through(x, tally, p, first, false, were);
+    return go_through(x, tally, p, first, true, were);
 }

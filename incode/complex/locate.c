@@ -41,6 +41,26 @@ bool incode_complex_holds(const struct incode_complex *x,
                             x->point[c->v[2]].p, x->point[c->v[3]].p, p) > 0;
 }
 
+/* Whether a vertex of the cell is at p. */
+static bool has_point(const struct incode_complex *x,
+                      const struct incode_cell *c, const double p[3])
+{
+    for (unsigned i = 0; i < 4; i++)
+        if (c->v[i] != INFINITE &&
+            incode_lexicographic(x->point[c->v[i]].p, p) == 0)
+            return true;
+    return false;
+}
+
+bool incode_complex_gives_way(const struct incode_complex *x,
+                              struct incode_tally *tally,
+                              const struct incode_cell *c, const double p[3])
+{
+    double bound, t = incode_sphere_power(x->point, c, p, &bound);
+    return t < -bound || (!(t > bound) && !has_point(x, c, p) &&
+                          incode_complex_holds(x, tally, c, p));
+}
+
 /* From a finite cell downhill: to the neighbour of which p has the least power,
  * as computed, as long as that decreases.  The facet between two spheres is in
  * the plane where their powers are equal, so downhill is towards p. */
@@ -109,11 +129,9 @@ static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
     x->scans++;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
-        if (incode_cell_proved(c) == INCODE_CELL_FINAL)
-            continue;
-        double bound, t = incode_sphere_power(x->point, c, p, &bound);
-        if (!(t > bound) && !incode_cell_is_free(c) &&
-            (t < -bound || incode_complex_holds(x, tally, c, p)))
+        if (!incode_cell_is_free(c) &&
+            incode_cell_proved(c) != INCODE_CELL_FINAL &&
+            incode_complex_gives_way(x, tally, c, p))
             return i;
     }
     return INCODE_NONE;
@@ -164,5 +182,9 @@ uint32_t incode_complex_locate(struct incode_complex *x,
         if (near != INFINITE)
             from = go(x, tally, x->point[near].cell, p);
     }
-    return from == INCODE_NONE ? scan(x, tally, p) : from;
+    if (from == INCODE_NONE)
+        from = scan(x, tally, p);
+    return from != INCODE_NONE && has_point(x, incode_complex_cell(x, from), p)
+               ? INCODE_NONE
+               : from;
 }

@@ -6,8 +6,6 @@
 #include "stages.h"
 
 enum {
-    STEPS = 64,     /* a call, at most */
-    CELLS = 16,     /* listed as a unit of work */
     EMIT_A_UNIT = 8 /* tetrahedra */
 };
 
@@ -69,7 +67,9 @@ void incode_insertion_begin_list(struct incode_insertion *n)
 enum incode_insertion_step incode_insertion_list(struct incode_insertion *n)
 {
     struct incode_complex *x = &n->complex;
-    uint32_t end = x->cells - n->cell < CELLS ? x->cells : n->cell + CELLS;
+    uint32_t end = x->cells - n->cell < INCODE_INSERTION_CELLS
+                       ? x->cells
+                       : n->cell + INCODE_INSERTION_CELLS;
     for (; n->cell < end; n->cell++) {
         struct incode_cell *c = incode_complex_cell(x, n->cell);
         if (incode_cell_is_free(c) || incode_cell_proved(c) == 0 ||
@@ -132,7 +132,8 @@ static enum incode_insertion_step emit_some(struct incode_insertion *n,
 enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n)
 {
     struct incode_complex *x = &n->complex;
-    for (unsigned i = 0; i < STEPS && n->v < x->points; i++, n->v++)
+    for (unsigned i = 0; i < INCODE_INSERTION_STEPS && n->v < x->points;
+         i++, n->v++)
         if (x->point[n->v].cell != INCODE_NONE)
             return emit_some(n, &x->point[n->v]);
     if (n->v == x->points)
@@ -168,14 +169,13 @@ enum incode_insertion_step incode_insertion_release(struct incode_insertion *n)
 static bool is_half_full(const struct incode_insertion *n)
 {
     const struct incode_complex *x = &n->complex;
-    return (x->cells - (size_t)x->free_count) * sizeof *x->cell > x->bytes / 2;
+    return incode_complex_cells_used(x) * sizeof *x->cell > x->bytes / 2;
 }
 
 /* Commits the bricks at whose points no cell is left. */
 enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n)
 {
-    uint32_t end = n->from < n->own_last ? n->from : n->own_last;
-    for (; n->brick < end; n->brick++) {
+    for (; n->brick < n->from; n->brick++) {
         if ((n->touched[n->brick / 64] >> n->brick % 64 & 1) != 0 ||
             incode_insertion_has_committed(n, n->brick))
             continue;

@@ -19,14 +19,11 @@
 #include "stages.h"
 
 enum {
-    AHEAD = 16,       /* bricks asked for together */
-    CELLS = 16,       /* judged as a unit of work */
-    JUDGED = 1024,    /* cells a step */
-    INSERT_UNITS = 4, /* of work, a point */
-    SHOWN = 256,      /* cells looked at as a unit of work */
-    LARGE = 32,       /* a cavity of more than such a part of the cells */
-    FEW = 128,        /* cells: looking at all is better than a search */
-    LEAST_SHARE = 8   /* of the cells must be final */
+    JUDGED = 1024,  /* cells a step */
+    SHOWN = 256,    /* cells looked at as a unit of work */
+    LARGE = 32,     /* a cavity of more than such a part of the cells */
+    FEW = 128,      /* cells: looking at all is better than a search */
+    LEAST_SHARE = 8 /* of the cells must be final */
 };
 
 /* Marks of cells: INCODE_CELL_PROVED. */
@@ -37,6 +34,20 @@ enum {
 };
 
 /* ---- boxes ---- */
+
+static uint32_t cells_left(const struct incode_insertion *n)
+{
+    return incode_complex_cells_used(&n->complex) - INCODE_COMPLEX_CELLS_FIRST;
+}
+
+static void go_on(struct incode_insertion *n, enum incode_insertion_stage stage)
+{
+    n->cell = INCODE_COMPLEX_CELLS_FIRST;
+    n->brick = n->next = 0;
+    n->listed = INCODE_NONE;
+    n->large = false;
+    n->stage = stage;
+}
 
 enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n)
 {
@@ -51,33 +62,20 @@ enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n)
     incode_look_init(&work->look, n->maker, n->passed, n->touched);
     incode_look_begin(&work->look, false, n->own_first, n->from);
     n->releases++;
-    n->cell = INCODE_COMPLEX_CELLS_FIRST;
-    n->final = 0;
+    n->final = n->reached = 0;
     n->round = 0;
-    n->stage = INCODE_INSERTION_JUDGE;
+    /* What the highest boxes tell has been released, unless insertions have
+     * come in between. */
+    go_on(n, n->thorough && !n->squeezed ? INCODE_INSERTION_LOOK
+                                         : INCODE_INSERTION_JUDGE);
     return INCODE_INSERTION_WORKED;
-}
-
-static uint32_t cells_left(const struct incode_insertion *n)
-{
-    const struct incode_complex *x = &n->complex;
-    return x->cells - INCODE_COMPLEX_CELLS_FIRST - x->free_count;
-}
-
-static void go_on(struct incode_insertion *n, enum incode_insertion_stage stage)
-{
-    n->cell = INCODE_COMPLEX_CELLS_FIRST;
-    n->brick = n->next = 0;
-    n->reached = INCODE_NONE;
-    n->large = false;
-    n->stage = stage;
 }
 
 /* Where to stop after some cells. */
 static uint32_t some_cells(const struct incode_insertion *n)
 {
     uint32_t cells = n->complex.cells;
-    incode_walker_spend(&n->maker->walker, JUDGED / CELLS);
+    incode_walker_spend(&n->maker->walker, JUDGED / INCODE_INSERTION_CELLS);
     return cells - n->cell < JUDGED ? cells : n->cell + JUDGED;
 }
 
@@ -134,6 +132,7 @@ static void note(struct incode_insertion *n)
         incode_cell_set_proved(incode_complex_cell(&n->complex, look->cell[i]),
                                reached ? REACHED : FINAL);
         n->final += !reached;
+        n->reached += reached;
     }
 }
 
@@ -178,39 +177,44 @@ static uint32_t next_wanted(const struct incode_insertion *n, uint32_t brick)
     return bricks;
 }
 
-/* Shows a point to the cells that are listed. */
-static void show_listed(struct incode_insertion *n, const double p[3])
+/* Shows a point to a cell that is reached; whether it still is. */
+static bool show(struct incode_insertion *n, struct incode_cell *c,
+                 const double p[3])
 {
-    const struct incode_complex *x = &n->complex;
-    uint32_t *list = n->work->reached, left = 0;
-    for (uint32_t i = 0; i < n->reached; i++) {
-        struct incode_cell *c = incode_complex_cell(x, list[i]);
-        if (incode_complex_gives_way(x, &n->maker->counts.tally, c, p))
-            incode_cell_set_proved(c, UNKNOWN);
-        list[left] = list[i];
-        left += incode_cell_proved(c) == REACHED;
-    }
-    n->reached = left;
+    if (!incode_complex_gives_way(&n->complex, &n->maker->counts.tally, c, p))
+        return true;
+    incode_cell_set_proved(c, UNKNOWN);
+    n->reached--;
+    return false;
 }
 
-/* Shows a point, if there is one, to all cells that are reached, and lists what
- * is left of them if it is few. */
-static void show_all(struct incode_insertion *n, const double *p)
+/* Shows it to all of them, and lists what is left if it is few. */
+static void show_all(struct incode_insertion *n, const double p[3])
 {
     const struct incode_complex *x = &n->complex;
     uint32_t left = 0;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         struct incode_cell *c = incode_complex_cell(x, i);
-        if (incode_cell_is_free(c) || incode_cell_proved(c) != REACHED)
+        if (incode_cell_is_free(c) || incode_cell_proved(c) != REACHED ||
+            !show(n, c, p))
             continue;
-        if (p != NULL &&
-            incode_complex_gives_way(x, &n->maker->counts.tally, c, p))
-            incode_cell_set_proved(c, UNKNOWN);
-        else if (left++ < INCODE_INSERTION_REACHED)
-            n->work->reached[left - 1] = i;
+        if (left < INCODE_INSERTION_LISTED)
+            n->work->listed[left] = i;
+        left++;
     }
-    n->reached = left <= INCODE_INSERTION_REACHED ? left : INCODE_NONE;
+    n->listed = left <= INCODE_INSERTION_LISTED ? left : INCODE_NONE;
     incode_walker_spend(&n->maker->walker, x->cells / SHOWN);
+}
+
+static void show_listed(struct incode_insertion *n, const double p[3])
+{
+    uint32_t *list = n->work->listed, left = 0;
+    for (uint32_t i = 0; i < n->listed; i++) {
+        struct incode_cell *c = incode_complex_cell(&n->complex, list[i]);
+        list[left] = list[i];
+        left += incode_cell_proved(c) == REACHED && show(n, c, p);
+    }
+    n->listed = left;
 }
 
 /* Shows it to all that it would make give way.  They are sought from the last
@@ -223,18 +227,21 @@ static void show_point(struct incode_insertion *n, const double p[3])
     uint32_t cells[INCODE_COMPLEX_CAVITY], count = INCODE_NONE;
     if (n->reached > FEW)
         count = incode_complex_cavity(x, tally, p, n->near, cells);
-    if (count == INCODE_NONE && n->reached != INCODE_NONE) {
+    if (count == INCODE_NONE && n->listed != INCODE_NONE) {
         show_listed(n, p);
-    } else if (count == INCODE_NONE && n->large) {
+    } else if (count == INCODE_NONE &&
+               (n->large || n->reached <= INCODE_INSERTION_LISTED)) {
         show_all(n, p);
     } else if (count == INCODE_NONE) {
-        uint32_t large = incode_complex_disprove(x, tally, p, n->near);
-        incode_walker_spend(&n->maker->walker, large / CELLS);
-        n->large = large > x->cells / LARGE;
-        show_all(n, NULL);
+        uint32_t were;
+        count = incode_complex_disprove(x, tally, p, n->near, &were);
+        incode_walker_spend(&n->maker->walker, count / INCODE_INSERTION_CELLS);
+        n->reached -= were;
+        n->large = count > x->cells / LARGE;
     } else {
         for (uint32_t i = 0; i < count; i++) {
             struct incode_cell *c = incode_complex_cell(x, cells[i]);
+            n->reached -= incode_cell_proved(c) == REACHED;
             incode_cell_set_proved(c, UNKNOWN);
             n->near = c->v[3];
         }
@@ -280,11 +287,9 @@ enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n)
     struct incode_walker *walker = &n->maker->walker;
     uint32_t bricks = n->maker->tree.bricks;
     uint32_t brick = next_wanted(n, n->brick), ahead = brick;
-    if (!n->closing && n->next == 0 && n->reached > FEW)
-        show_all(n, NULL);
     if (brick == bricks || (!n->closing && n->reached == 0))
         return end_visit(n);
-    for (unsigned i = 0; i < AHEAD && ahead < bricks; i++) {
+    for (unsigned i = 0; i < INCODE_INSERTION_AHEAD && ahead < bricks; i++) {
         (void)incode_pager_get(pager, ahead);
         ahead = next_wanted(n, ahead + 1);
     }
@@ -297,7 +302,7 @@ enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n)
         uint32_t id = brick * INCODE_BRICK_POINTS + n->next;
         if (walker->left == 0 && n->next > first)
             return INCODE_INSERTION_WORKED;
-        incode_walker_spend(walker, INSERT_UNITS);
+        incode_walker_spend(walker, INCODE_INSERTION_UNITS);
         if (!n->closing) {
             show_point(n, p);
         } else if (!close_stars(n, p, id)) {

@@ -116,14 +116,13 @@ enum incode_insertion_step incode_handover_step(struct incode_handover *h,
                                                 struct incode_front *front)
 {
     const struct incode_insertion *n = h->n;
-    uint32_t end = n->from < n->own_last ? n->from : n->own_last;
     if (h->cell < n->complex.cells)
         return send_faces(h, front);
     if (h->vertex < n->complex.points)
         return send_ahead(h);
-    while (h->brick < end && incode_insertion_has_committed(n, h->brick))
+    while (h->brick < n->from && incode_insertion_has_committed(n, h->brick))
         h->brick++;
-    if (h->brick < end)
+    if (h->brick < n->from)
         return send_reached(h);
     return send(h) ? INCODE_INSERTION_FINISHED : INCODE_INSERTION_WAITING;
 }

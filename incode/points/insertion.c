@@ -7,11 +7,8 @@
 #include "stages.h"
 
 enum {
-    AHEAD = 16,              /* bricks asked for together */
-    STEPS = 64,              /* a call, at most */
     SAMPLE = 500,            /* points of the first round, about */
     ROUND = 2,               /* bits: 4 times as many in each that follows */
-    INSERT_UNITS = 4,        /* of work, an insertion */
     HALF_CELLS_A_POINT = 13, /* in volumes and on surfaces */
     LEFT_A_POINT = 4,        /* cells that are not final */
     FILL = 15,               /* of the room for cells, in 16 */
@@ -100,26 +97,29 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
                      2 * bits + incode_insertion_bytes(points) <= bytes);
 }
 
-/* Bricks that there is room for, a quarter to spare. */
-static uint32_t room_for(const struct incode_insertion *n)
+/* Bytes of cells that are there, and that there is room for. */
+static size_t used_of(const struct incode_insertion *n, size_t *room)
 {
     const struct incode_complex *x = &n->complex;
     uint32_t points = x->points < x->points_kept ? x->points_kept : x->points;
-    size_t used = points * sizeof *x->point +
-                  (x->cells - (size_t)x->free_count) * sizeof *x->cell;
+    *room = x->bytes - points * sizeof *x->point;
+    return incode_complex_cells_used(x) * sizeof *x->cell;
+}
+
+/* Bricks that there is room for, a quarter to spare. */
+static uint32_t room_for(const struct incode_insertion *n)
+{
+    size_t room, used = used_of(n, &room);
     size_t brick = INCODE_BRICK_POINTS * HALF_CELLS_A_POINT *
                    sizeof(struct incode_cell) / 2;
-    return (uint32_t)((x->bytes - used) / (brick + brick / 4));
+    return (uint32_t)((room - used) / (brick + brick / 4));
 }
 
 /* Whether what is free should be left to points that are inserted ahead of
  * their turn. */
 static bool is_short(const struct incode_insertion *n)
 {
-    const struct incode_complex *x = &n->complex;
-    uint32_t points = x->points < x->points_kept ? x->points_kept : x->points;
-    size_t room = x->bytes - points * sizeof *x->point;
-    size_t used = (x->cells - (size_t)x->free_count) * sizeof *x->cell;
+    size_t room, used = used_of(n, &room);
     uint32_t fill = incode_insertion_owns_all(n) ? FILL : FILL_PART;
     return !n->whole && (used > room / 16 * fill || room_for(n) < 1);
 }
@@ -194,7 +194,7 @@ static uint32_t vertices(const struct incode_insertion *n)
 static bool will_fit(const struct incode_insertion *n)
 {
     const struct incode_complex *x = &n->complex;
-    uint64_t cells = (uint64_t)(x->cells - x->free_count) * n->staged_count;
+    uint64_t cells = (uint64_t)incode_complex_cells_used(x) * n->staged_count;
     size_t room = x->bytes - x->points * sizeof *x->point;
     return cells / vertices(n) <= room / sizeof *x->cell / 4 * 5;
 }
@@ -203,17 +203,12 @@ static bool will_fit(const struct incode_insertion *n)
  * vertex yet is taken in again. */
 static enum incode_insertion_step make_room(struct incode_insertion *n)
 {
-    if (n->whole) {
+    if (n->whole || (n->from == n->own_first && n->most > 1)) {
+        /* More cells than is thought: brick after brick, or fewer at a time. */
+        uint32_t most = n->whole ? n->most : (n->most + 3) / 4;
         n->vertices -= vertices(n);
         begin_job(n, false);
-        return INCODE_INSERTION_WORKED;
-    }
-    if (n->from == n->own_first && n->most > 1) {
-        /* More cells than is thought: fewer at a time. */
-        uint32_t fewer = n->most / 4;
-        n->vertices -= vertices(n);
-        begin_job(n, false);
-        n->most = fewer > 1 ? fewer : 1;
+        n->most = most < n->most ? most : n->most;
         return INCODE_INSERTION_WORKED;
     }
     if (n->complex.cells == 0)
@@ -250,7 +245,8 @@ static enum incode_insertion_step sample(struct incode_insertion *n)
         n->stage = INCODE_INSERTION_CHOOSE;
         return INCODE_INSERTION_WORKED;
     }
-    for (uint32_t i = 0, ahead = brick; i < AHEAD && ahead < bricks; i++) {
+    for (uint32_t i = 0, ahead = brick;
+         i < INCODE_INSERTION_AHEAD && ahead < bricks; i++) {
         (void)incode_pager_get(pager, ahead);
         ahead = past_own(n, ahead + n->sample_step);
     }
@@ -263,7 +259,7 @@ static enum incode_insertion_step sample(struct incode_insertion *n)
     const struct incode_brick *b = &f->page.brick;
     const double p[3] = {b->x[0], b->y[0], b->z[0]};
     uint32_t v = incode_complex_add(x, p, id);
-    incode_walker_spend(&n->maker->walker, INSERT_UNITS);
+    incode_walker_spend(&n->maker->walker, INCODE_INSERTION_UNITS);
     if (v == INCODE_NONE ||
         !incode_complex_insert(x, &n->maker->counts.tally, v, n->near)) {
         n->stage = INCODE_INSERTION_REST; /* it has taken the room */
@@ -278,7 +274,8 @@ static enum incode_insertion_step load(struct incode_insertion *n)
 {
     struct incode_pager *pager = &n->maker->pager;
     (void)incode_pager_get(pager, n->brick); /* with the first credit */
-    for (uint32_t i = 1; i < AHEAD && n->brick + i < n->to; i++)
+    for (uint32_t i = 1; i < INCODE_INSERTION_AHEAD && n->brick + i < n->to;
+         i++)
         (void)incode_pager_get(pager, n->brick + i);
     const struct incode_frame *f = incode_pager_get(pager, n->brick);
     if (f == NULL)
@@ -363,7 +360,8 @@ static enum incode_insertion_step span(struct incode_insertion *n)
     n->brick = past_own(n, n->brick);
     if (n->brick >= bricks)
         return INCODE_INSERTION_FULL;
-    for (uint32_t i = 1; i < AHEAD && n->brick + i < bricks; i++)
+    for (uint32_t i = 1; i < INCODE_INSERTION_AHEAD && n->brick + i < bricks;
+         i++)
         (void)incode_pager_get(pager, n->brick + i);
     const struct incode_frame *f = incode_pager_get(pager, n->brick);
     if (f == NULL)
@@ -416,9 +414,10 @@ static enum incode_insertion_step insert(struct incode_insertion *n)
         if (!incode_complex_is_vertex(x, v)) {
             if (round_of(x->point[v].id) < n->level)
                 continue;
-            if (done > 0 && (done == STEPS || walker->left == 0))
+            if (done > 0 &&
+                (done == INCODE_INSERTION_STEPS || walker->left == 0))
                 return INCODE_INSERTION_WORKED;
-            incode_walker_spend(walker, INSERT_UNITS);
+            incode_walker_spend(walker, INCODE_INSERTION_UNITS);
             if (!incode_complex_insert(x, &n->maker->counts.tally, v, n->near))
                 return make_room(n);
             n->vertices++;
@@ -492,7 +491,8 @@ static void note_used(struct incode_insertion *n)
 enum incode_insertion_step incode_insertion_step(struct incode_insertion *n)
 {
     enum incode_insertion_step r = INCODE_INSERTION_WORKED;
-    for (unsigned i = 0; i < STEPS && r == INCODE_INSERTION_WORKED; i++) {
+    for (unsigned i = 0;
+         i < INCODE_INSERTION_STEPS && r == INCODE_INSERTION_WORKED; i++) {
         r = step(n);
         note_used(n);
         incode_walker_spend(&n->maker->walker, 1);

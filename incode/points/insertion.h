@@ -13,7 +13,7 @@
  * Memory: struct incode_insertion, about 2 KB, and a block given by its owner:
  * 34 KB, two bits a brick, the complex the rest.  Work: a step takes a brick
  * in, or inserts or emits some, or looks at some cells; releasing looks at each
- * once. It listens to the maker's walker.
+ * once.  It listens to the maker's walker.
  *
  *     incode_insertion_init(&n, &maker, &outside);
  *     incode_insertion_start(&n, bits, memory, bytes, first, last);
@@ -32,7 +32,7 @@
 enum {
     INCODE_INSERTION_EMITTED = 128,   /* tetrahedra at a time */
     INCODE_INSERTION_BRICKS = 32,     /* taken in at a time, unless all fit */
-    INCODE_INSERTION_REACHED = 1024,  /* cells listed */
+    INCODE_INSERTION_LISTED = 1024,   /* cells */
     INCODE_INSERTION_LEAST = 40 << 10 /* bytes */
 };
 
@@ -100,7 +100,8 @@ struct incode_insertion {
     uint32_t next, near; /* the staged point at work, and a vertex near by */
     uint32_t cell, v;    /* that is judged, whose tetrahedra are emitted */
     uint32_t final;      /* cells so far */
-    uint32_t reached;    /* cells listed; INCODE_NONE: too many */
+    uint32_t reached;    /* cells, by boxes and by no point yet */
+    uint32_t listed;     /* of these; INCODE_NONE: none is */
     unsigned round;      /* of looks and visits: 0, 1 */
     uint32_t apexes[INCODE_INSERTION_EMITTED][3];
 };
@@ -111,7 +112,7 @@ struct incode_insertion_work {
     struct incode_look look;
     union {
         uint16_t staged[INCODE_INSERTION_BRICKS * INCODE_BRICK_POINTS];
-        uint32_t reached[INCODE_INSERTION_REACHED]; /* cells, in a visit */
+        uint32_t listed[INCODE_INSERTION_LISTED]; /* cells, in a visit */
     };
 };
 

@@ -12,6 +12,13 @@
 
 #include "insertion.h"
 
+enum {
+    INCODE_INSERTION_AHEAD = 16, /* bricks asked for together */
+    INCODE_INSERTION_STEPS = 64, /* a call, at most */
+    INCODE_INSERTION_UNITS = 4,  /* of work, a point */
+    INCODE_INSERTION_CELLS = 16  /* looked at as a unit of work */
+};
+
 /* Begins to take the bricks [from, to) in. */
 void incode_insertion_take_in(struct incode_insertion *n);
 

@@ -118,10 +118,14 @@ static inline void scene_check_disproved(struct scene *s, const double p[3],
                                          const uint8_t *hold)
 {
     struct incode_cell *before = scene_cells(s);
-    incode_complex_disprove(&s->x, &s->tally, p, scene_near(s));
+    uint32_t were, hold_it = 0, proved = 0;
+    uint32_t count =
+        incode_complex_disprove(&s->x, &s->tally, p, scene_near(s), &were);
     for (uint32_t i = 0; i < s->x.cells; i++) {
         struct incode_cell old = before[s->x.cells - 1 - i];
         struct incode_cell new = *incode_complex_cell(&s->x, i);
+        hold_it += hold[i] != 0;
+        proved += hold[i] != 0 && incode_cell_proved(&old) != 0;
         if (hold[i] != 0)
             incode_cell_set_proved(&old, 0);
         else
@@ -130,6 +134,8 @@ static inline void scene_check_disproved(struct scene *s, const double p[3],
         assert_int_equal(new.flags, old.flags);
         assert_memory_equal(&new, &old, sizeof new);
     }
+    assert_int_equal(count, hold_it);
+    assert_int_equal(were, proved);
     free(before);
 }
 
