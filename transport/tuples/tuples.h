@@ -1,0 +1,172 @@
+/* A tuple space (Gelernter, 1985) shared out over numbered places, one a node:
+ * out, in, rd, inp, rdp and eval.  TUPLES.md says what they mean and what goes
+ * between places.
+ *
+ * Nothing here waits.  A call begins an operation, whose number is polled until
+ * it is no longer TUPLES_PENDING; messages are written in tuples_step alone,
+ * and tuples_take always takes one.  It knows no time, and draws nothing.
+ *
+ * Memory: one arena of tuples_arena_bytes(): `store_bytes` of tuples, a buffer
+ * for each operation and process of this place, and a request for each of every
+ * place.  Work: a call or message compares each tuple of this place's store
+ * with each request that waits here once at most; a step writes
+ * TUPLES_STEP_MESSAGES.
+ *
+ * No deadlock, no loss: each message between two places belongs to one
+ * operation, and has its place at the other end before it is sent: a request
+ * in the table that has a row for each operation of each place; an answer in
+ * the operation that asked, which counts those that are owed to it.  So what
+ * comes is taken at once, no link is ever held back, and an answer that a full
+ * link puts off waits in its request's row.  A tuple for which a store has no
+ * room stays in the buffer of the operation that writes it; the store promises
+ * room to those in the order in which they asked, before their tuples come
+ * again.  What no place can do is make room that nobody makes: programs say how
+ * much they put into the space, and give it a store for that.
+ *
+ *     int job = tuples_in(space, &pattern);
+ *     while (tuples_poll(space, job, &tuple) == TUPLES_PENDING)
+ *         tuples_step(space); // and tuples_take what comes
+ */
+#ifndef TRANSPORT_TUPLES_TUPLES_H
+#define TRANSPORT_TUPLES_TUPLES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "tuple.h"
+
+enum {
+    TUPLES_PLACES_MAX = 1024,
+    TUPLES_OPERATIONS_MAX = 32, /* operations and processes of a place */
+    TUPLES_HEADER_BYTES = 20,
+    TUPLES_TUPLE_MAX = 1580,  /* bytes of a tuple, as tuple_write writes it */
+    TUPLES_PATTERN_MAX = 64,  /* and of a template */
+    TUPLES_RECORD_BYTES = 12, /* that a tuple takes more in a store, which then
+                                 is rounded up to a multiple of 4 */
+    TUPLES_STEP_MESSAGES = 32,
+    TUPLES_BUSY = -1, /* as many operations are open as there may be */
+    TUPLES_UNFIT = -2 /* tuple_write cannot write it in the bytes allowed, a
+                         tuple has a formal field, or no such function */
+};
+
+enum tuples_status {
+    TUPLES_PENDING,
+    TUPLES_DONE, /* and the tuple is there, if one was asked for */
+    TUPLES_NO,   /* of inp and rdp: there was none */
+    TUPLES_ENDED /* its generation has */
+};
+
+/* A process that eval began: called once a step, with its tuple, until it
+ * returns true; then the tuple, in which it may have changed anything, goes
+ * into the space, and must be fit for that.  Its fields of bytes, if it has
+ * new ones, need to last until it has returned. */
+typedef bool tuples_function(void *context, struct tuple *tuple);
+
+/* There are no defaults.  All places are given the same, but for `self` and
+ * what context means. */
+struct tuples_config {
+    /* This place, and how many there are: 1 .. TUPLES_PLACES_MAX. */
+    uint16_t self, places;
+
+    /* That this place may have open at a time, 1 or more, and processes that it
+     * may run; TUPLES_OPERATIONS_MAX together. */
+    uint8_t operations, processes;
+
+    /* Bytes of a tuple at most: TUPLES_PATTERN_MAX .. TUPLES_TUPLE_MAX. */
+    uint16_t tuple_bytes;
+
+    /* Bytes of tuples in this place, 4 a tuple's header included: a multiple of
+     * 4, and room for one of tuple_bytes at least.  May differ. */
+    uint32_t store_bytes;
+
+    /* What eval starts, by number: functions[0 .. function_count). */
+    tuples_function *const *functions;
+    uint32_t function_count;
+
+    /* Sends a message to another place: 0, or anything else: not now.  Whole,
+     * in order and once, as cube_write does within a generation. */
+    int (*write)(void *context, uint16_t place, const void *data, size_t size);
+
+    /* Of `write` and the functions. */
+    void *context;
+};
+
+struct tuples_statistics {
+    uint64_t messages;         /* to other places */
+    uint64_t stored;           /* tuples that came to this place */
+    uint64_t taken, read;      /* and left it, or were copied */
+    uint64_t held_up;          /* tuples and processes that had to wait */
+    uint64_t outdated;         /* messages of another generation */
+    uint32_t store_high_water; /* bytes */
+    uint32_t longest_wait;     /* requests that waited at a time, at most */
+};
+
+struct tuples; /* opaque: lives at the start of its arena */
+
+/* 0, and NULL, where a limit is not kept. */
+size_t tuples_arena_bytes(const struct tuples_config *config);
+
+/* Begins with an empty space, in an arena aligned to 8 bytes.  All places do so
+ * before any operates.  generation: the same everywhere. */
+struct tuples *tuples_init(void *arena, size_t bytes,
+                           const struct tuples_config *config,
+                           uint32_t generation);
+
+/* Another generation: the space is empty again, processes are gone, and
+ * operations that were pending end with TUPLES_ENDED; those that are not polled
+ * yet keep what they have. */
+void tuples_renew(struct tuples *space, uint32_t generation);
+
+/* Each begins an operation and returns its number, 0 or more; or TUPLES_BUSY or
+ * TUPLES_UNFIT.  The tuple is copied.  eval's process starts at the place that
+ * TUPLES.md names, and is done when it has started. */
+int tuples_out(struct tuples *space, const struct tuple *tuple);
+int tuples_in(struct tuples *space, const struct tuple *pattern);
+int tuples_rd(struct tuples *space, const struct tuple *pattern);
+int tuples_inp(struct tuples *space, const struct tuple *pattern);
+int tuples_rdp(struct tuples *space, const struct tuple *pattern);
+int tuples_eval(struct tuples *space, uint32_t function,
+                const struct tuple *tuple);
+
+/* The place where a tuple lives that is fit for `out`. */
+unsigned tuples_home(const struct tuples *space, const struct tuple *tuple);
+
+/* Tuples that a place has put into the store of this one, and taken out of it;
+ * they count modulo 2^32, and from 0 in each generation. */
+struct tuples_account {
+    uint32_t put, taken;
+};
+struct tuples_account tuples_account(const struct tuples *space,
+                                     uint16_t place);
+
+/* Operations that may be begun now. */
+unsigned tuples_room(const struct tuples *space);
+
+/* Whether it is open: neither closed nor never begun. */
+bool tuples_is_open(const struct tuples *space, int operation);
+
+/* The state of an open operation.  With TUPLES_DONE, what it took or read is in
+ * *tuple, whose fields of bytes stay until tuples_close. */
+enum tuples_status tuples_poll(const struct tuples *space, int operation,
+                               struct tuple *tuple);
+
+/* Closes an operation.  One that is pending goes on unseen, if it is an out or
+ * eval, and is given up otherwise: what it would have taken stays. */
+void tuples_close(struct tuples *space, int operation);
+
+/* Takes a message from another place.  False: no place sends such. */
+bool tuples_take(struct tuples *space, uint16_t source, const uint8_t *data,
+                 size_t size);
+
+/* Runs each process once, and writes what is owed; the number of messages, and
+ * of processes that have ended. */
+unsigned tuples_step(struct tuples *space);
+
+/* Operations that are open or still owe something, requests, tuples and
+ * processes here: 0 where all pools are empty. */
+uint32_t tuples_held(const struct tuples *space);
+
+const struct tuples_statistics *tuples_statistics(const struct tuples *space);
+
+#endif
