@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "incode/front/exchange.h"
+
 static uint32_t between(size_t least, size_t a, size_t most)
 {
     return (uint32_t)(a < least ? least : a > most ? most : a);
@@ -16,9 +18,18 @@ static struct incode_maker_share horizon_of(size_t bytes)
         between(16, copies, INCODE_HORIZON_COPIES), 0};
 }
 
-size_t incode_arena_bits(uint32_t bricks, size_t bytes)
+struct incode_maker_share incode_arena_maker(size_t bytes)
 {
-    size_t bits = ((size_t)bricks + 63) / 64 * sizeof(uint64_t);
+    struct incode_maker_share share = horizon_of(bytes);
+    share.frames = incode_maker_frames(&share, bytes);
+    return share;
+}
+
+size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes)
+{
+    size_t bits = ((size_t)setup->bricks + 63) / 64 * sizeof(uint64_t);
+    if (setup->owner_rule == INCODE_OWNER_LOWEST)
+        return incode_exchange_bytes(setup->bricks);
     return bits <= bytes / 64 ? bits : 0;
 }
 
@@ -26,13 +37,13 @@ size_t incode_arena_bits(uint32_t bricks, size_t bytes)
  * (the front of a region of 1,250,000 points, with a tenth to spare), the
  * bricks a sixteenth, page frames the rest. */
 bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
-                         uint32_t bricks, size_t bytes)
+                         const struct incode_setup *setup, size_t bytes)
 {
     memset(map, 0, sizeof *map);
     s->maker = horizon_of(bytes);
     size_t horizon = incode_horizon_bytes(s->maker.boxes, s->maker.copies);
     map->control = incode_arena_aligned(sizeof(struct incode_triangulator) +
-                                        incode_arena_bits(bricks, bytes)) +
+                                        incode_arena_bits(setup, bytes)) +
                    horizon;
     map->local_points = sizeof(struct incode_local_points);
     map->tasks = (sizeof(struct incode_task) + sizeof(struct incode_search)) *
@@ -68,7 +79,7 @@ size_t incode_arena_min(const struct incode_setup *setup)
     size_t bytes = sizeof(struct incode_triangulator);
     struct incode_map map;
     struct incode_shares shares;
-    while (!incode_arena_divide(&shares, &map, setup->bricks, bytes))
+    while (!incode_arena_divide(&shares, &map, setup, bytes))
         bytes += 1024;
     return bytes;
 }

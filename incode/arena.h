@@ -3,7 +3,7 @@
  *
  * Memory: the arena.  Work: constant, but for tables that are cleared.
  *
- *     if (!incode_arena_divide(&shares, &map, bricks, bytes))
+ *     if (!incode_arena_divide(&shares, &map, &setup, bytes))
  *         why = "the arena is too small";
  */
 #ifndef INCODE_ARENA_H
@@ -17,12 +17,16 @@ static inline size_t incode_arena_aligned(size_t bytes)
 }
 
 /* Bytes of the bits that say which bricks are committed point by point; 0: they
- * would take more than a part in 64. */
-size_t incode_arena_bits(uint32_t bricks, size_t bytes);
+ * would take more than a part in 64.  Where the owner is the lowest vertex, of
+ * the maps of an exchange. */
+size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes);
 
 /* The shares face by face; false: it is too small. */
 bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
-                         uint32_t bricks, size_t bytes);
+                         const struct incode_setup *setup, size_t bytes);
+
+/* The share of a maker alone: what its horizon leaves, frames take. */
+struct incode_maker_share incode_arena_maker(size_t bytes);
 
 /* Bytes of the arena for an insertion. */
 size_t incode_arena_room(const struct incode_triangulator *t);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "arena.h"
+#include "incode/front/exchange.h"
 #include "incode/pages/sound.h"
 #include "incode/predicates/check.h"
 #include "state.h"
@@ -38,7 +39,9 @@ const char *incode_setup_fault(const struct incode_setup *setup)
         return "invalid setup: unknown face rule";
     if (setup->build > INCODE_BUILD_POINTS)
         return "invalid setup: unknown way to build";
-    if (setup->reserved != 0 || setup->reserved2 != 0)
+    if (setup->owner_rule > INCODE_OWNER_LOWEST)
+        return "invalid setup: unknown owner rule";
+    if (setup->reserved2 != 0)
         return "invalid setup: what is reserved is not 0";
     for (int d = 0; d < 3; d++)
         if (!__builtin_isfinite(setup->lo[d]) ||
@@ -53,7 +56,8 @@ const char *incode_setup_fault(const struct incode_setup *setup)
 
 static bool may_insert(const struct incode_setup *setup)
 {
-    return setup->index == INCODE_KD && setup->face_rule == INCODE_FACE_OWN;
+    return setup->index == INCODE_KD && setup->face_rule == INCODE_FACE_OWN &&
+           setup->owner_rule == INCODE_OWNER_SMALLEST;
 }
 
 struct incode_triangulator *
@@ -67,7 +71,7 @@ incode_triangulator_init(void *arena, size_t bytes,
     *why = incode_setup_fault(setup);
     if (*why != NULL)
         return NULL;
-    if (!incode_arena_divide(&shares, &map, setup->bricks, bytes)) {
+    if (!incode_arena_divide(&shares, &map, setup, bytes)) {
         *why = "the node's memory is too small for this index";
         return NULL;
     }
@@ -81,7 +85,7 @@ incode_triangulator_init(void *arena, size_t bytes,
     memset(t, 0, sizeof *t);
     t->map = map;
     t->shares = shares;
-    size_t bits = incode_arena_bits(setup->bricks, bytes);
+    size_t bits = incode_arena_bits(setup, bytes);
     t->committed = bits > 0 ? (uint64_t *)(t + 1) : NULL;
     t->arena = (uint8_t *)arena + incode_arena_aligned(sizeof *t + bits);
     t->bytes = bytes - incode_arena_aligned(sizeof *t + bits);
@@ -94,6 +98,10 @@ incode_triangulator_init(void *arena, size_t bytes,
                       &outside->pages);
     incode_front_init(&t->front, t->arena + maker, &shares.front, setup->bricks,
                       (enum incode_face_rule)setup->face_rule, &outside->front);
+    t->front.owner_rule = (enum incode_owner_rule)setup->owner_rule;
+    if (outside->peers.share != NULL)
+        incode_front_exchange(&t->front, &outside->peers, setup->lo,
+                              t->committed);
     incode_insertion_init(&t->insertion, &t->maker, &outside->front);
     return t;
 }
@@ -173,14 +181,7 @@ void incode_triangulator_start(struct incode_triangulator *t,
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes)
 {
-    const struct incode_maker *m = &t->maker;
-    if (!incode_pager_loading(&m->pager, page))
-        return INCODE_PAGE_UNASKED;
-    if (!incode_page_is_sound(&m->tree, m->lo, m->hi, page, data, bytes))
-        return INCODE_PAGE_UNSOUND;
-    return incode_pager_deliver(&t->maker.pager, page, data, bytes) == 0
-               ? 0
-               : INCODE_PAGE_UNASKED;
+    return incode_maker_page(&t->maker, page, data, bytes);
 }
 
 uint32_t incode_triangulator_awaited(const struct incode_triangulator *t)
@@ -193,6 +194,30 @@ int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 bool last)
 {
     return incode_front_unspill(&t->front, brick, faces, count, last);
+}
+
+/* ---- with others ---- */
+
+int incode_triangulator_take(struct incode_triangulator *t, const uint32_t v[4])
+{
+    return t->phase == INCODE_PHASE_FACES ? incode_front_take(&t->front, v)
+                                          : -1;
+}
+
+void incode_triangulator_seed(struct incode_triangulator *t)
+{
+    if (t->phase == INCODE_PHASE_FACES)
+        incode_front_seed_all(&t->front);
+}
+
+bool incode_triangulator_is_quiet(const struct incode_triangulator *t)
+{
+    return t->phase == INCODE_PHASE_IDLE || incode_front_is_quiet(&t->front);
+}
+
+uint32_t incode_triangulator_left(const struct incode_triangulator *t)
+{
+    return incode_front_left(&t->front);
 }
 
 /* ---- what the front asks, the maker answers ---- */
@@ -289,7 +314,7 @@ static enum incode_outcome pursue_face(struct incode_triangulator *t,
         return INCODE_OK;
     enum incode_outcome r = incode_maker_face(&t->maker, task, f, &a);
     if (r == INCODE_OK)
-        incode_front_use(&t->front, a.f, corners_of(&a).p);
+        (void)incode_front_use(&t->front, a.f, corners_of(&a).p);
     return r;
 }
 
@@ -335,9 +360,14 @@ static enum incode_step run(struct incode_triangulator *t, unsigned task)
 
 static enum incode_turn next(struct incode_triangulator *t, uint32_t *task)
 {
+    const struct incode_job *job = &t->job;
     uint32_t first, last;
     incode_front_own_left(&t->front, &first, &last);
-    incode_maker_look_ahead(&t->maker, first, last);
+    if (t->front.exchange.on)
+        incode_maker_look_down(&t->maker, job->last, first - job->first,
+                               job->last - job->first);
+    else
+        incode_maker_look_ahead(&t->maker, first, last);
     enum incode_turn turn = incode_front_next(&t->front, task);
     if (turn == INCODE_TURN_COUNT) {
         uint32_t count = incode_maker_count(&t->maker, *task);

@@ -24,6 +24,7 @@
 #include <stdint.h>
 
 #include "incode/front/job.h"
+#include "incode/front/owner.h"
 #include "incode/pages/pager.h"
 #include "incode/pages/pages.h"
 #include "incode/predicates/predicates.h"
@@ -58,7 +59,9 @@ struct incode_setup {
     /* How tetrahedra are found: enum incode_build. */
     uint8_t build;
 
-    uint8_t reserved; /* 0 */
+    /* Whose a tetrahedron is: enum incode_owner_rule.  The lowest: face by
+     * face. */
+    uint8_t owner_rule;
 
     /* Of the order in which pages that have arrived are taken, for tests; 0: as
      * they arrive. */
@@ -86,6 +89,10 @@ enum incode_step {
 struct incode_outside {
     struct incode_page_source pages;   /* what its maker asks for */
     struct incode_front_outside front; /* what its front gives and takes back */
+    /* Others that share one active face list with it (front/exchange.h), whose
+     * owner rule is the lowest and face rule `own`; share = NULL: there are
+     * none. */
+    struct incode_front_peers peers;
 };
 
 /* The memory map, in bytes but for the three counts.  control, frames, afl and
@@ -140,9 +147,8 @@ void incode_triangulator_start(struct incode_triangulator *t,
 
 /* A page has arrived: `bytes` of it, those of its kind (pages/pages.h) or, for
  * a brick, 24 times its number of points: x[count], y[count], z[count].
- * Returns 0, or one of these where it was not asked for, or cannot be the page
- * of that number (pages/sound.h); it is dropped then. */
-enum { INCODE_PAGE_UNASKED = -1, INCODE_PAGE_UNSOUND = -2 };
+ * Returns 0, or INCODE_PAGE_UNASKED or _UNSOUND (pages/pages.h) where it was
+ * not asked for, or cannot be the page of that number; it is dropped then. */
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes);
 
@@ -156,6 +162,19 @@ uint32_t incode_triangulator_awaited(const struct incode_triangulator *t);
 int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 const struct incode_face *faces, size_t count,
                                 bool last);
+
+/* With peers: a tetrahedron or facet of the hull that another has built, as
+ * incode_front_take.  Returns 0, or -1 where it is none that can come. */
+int incode_triangulator_take(struct incode_triangulator *t,
+                             const uint32_t v[4]);
+
+/* With peers, all of which are quiet: tries first tetrahedra. */
+void incode_triangulator_seed(struct incode_triangulator *t);
+
+/* With peers: whether nothing is to be done until a tetrahedron comes, and the
+ * bricks of the job that are not committed. */
+bool incode_triangulator_is_quiet(const struct incode_triangulator *t);
+uint32_t incode_triangulator_left(const struct incode_triangulator *t);
 
 /* Works on: see enum incode_step.  Bounds are stated at the top. */
 enum incode_step incode_triangulator_step(struct incode_triangulator *t);

@@ -17,11 +17,18 @@ static uint32_t power_below(uint32_t n)
     return power;
 }
 
+static size_t held_words(uint32_t capacity)
+{
+    return ((size_t)capacity + 63) / 64;
+}
+
 size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks)
 {
     size_t heads = (size_t)power_below(capacity) + power_below(bricks);
     return capacity * sizeof(struct incode_afl_node) +
-           bricks * sizeof(struct incode_touched) + heads * sizeof(uint32_t);
+           bricks * sizeof(struct incode_touched) +
+           2 * held_words(capacity) * sizeof(uint64_t) +
+           heads * sizeof(uint32_t);
 }
 
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
@@ -30,7 +37,10 @@ void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
     INCODE_ASSERT(capacity > 0 && bricks > 0);
     memset(afl, 0, sizeof *afl);
     afl->touched = memory;
-    afl->nodes = (struct incode_afl_node *)(void *)(afl->touched + bricks);
+    afl->held = (uint64_t *)(void *)(afl->touched + bricks);
+    afl->foreign = afl->held + held_words(capacity);
+    afl->nodes =
+        (struct incode_afl_node *)(void *)(afl->foreign + held_words(capacity));
     afl->heads = (uint32_t *)(void *)(afl->nodes + capacity);
     afl->capacity = capacity;
     afl->mask = power_below(capacity) - 1;
@@ -53,7 +63,7 @@ void incode_afl_clear(struct incode_afl *afl)
     }
     afl->free = INCODE_AFL_NIL;
     afl->unused = afl->touched_free = 0;
-    afl->count = afl->touched_count = 0;
+    afl->count = afl->held_count = afl->touched_count = 0;
     afl->crowded = INCODE_NONE;
     afl->fault = NULL;
 }
@@ -121,20 +131,51 @@ static uint32_t *head_of(const struct incode_afl *afl, uint32_t key)
     return &afl->heads[(key * UINT32_C(2654435761) >> 7) & afl->mask];
 }
 
+static uint64_t bit_of(uint32_t v)
+{
+    return UINT64_C(1) << v % INCODE_BRICK_POINTS;
+}
+
+static bool is_held(const struct incode_afl *afl, uint32_t i)
+{
+    return (afl->held[i / 64] >> i % 64 & 1) != 0;
+}
+
+static bool is_foreign(const struct incode_afl *afl, uint32_t i)
+{
+    return (afl->foreign[i / 64] >> i % 64 & 1) != 0;
+}
+
+static void hold(struct incode_afl *afl, uint32_t i)
+{
+    afl->held_count += !is_held(afl, i);
+    afl->held[i / 64] |= UINT64_C(1) << i % 64;
+}
+
+static void let_go(struct incode_afl *afl, uint32_t i)
+{
+    afl->held_count -= is_held(afl, i);
+    afl->held[i / 64] &= ~(UINT64_C(1) << i % 64);
+}
+
 static uint32_t take_node(struct incode_afl *afl)
 {
     uint32_t i = afl->free;
     if (i == INCODE_AFL_NIL) {
         INCODE_ASSERT(afl->unused < afl->capacity);
-        return afl->unused++;
+        i = afl->unused++;
+        afl->held[i / 64] &= ~(UINT64_C(1) << i % 64);
+    } else {
+        afl->free = afl->nodes[i].next;
     }
-    afl->free = afl->nodes[i].next;
+    afl->foreign[i / 64] &= ~(UINT64_C(1) << i % 64);
     return i;
 }
 
 static void unlink_node(struct incode_afl *afl, uint32_t *link)
 {
     uint32_t i = *link;
+    let_go(afl, i);
     *link = afl->nodes[i].next;
     afl->nodes[i].next = afl->free;
     afl->free = i;
@@ -145,14 +186,18 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                            uint32_t c)
 {
     uint32_t *link = head_of(afl, key), passed = 0;
+    afl->searches++;
     while (*link != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[*link];
+        afl->looks++;
         if (node->key == key && node->b == c && node->c == b) {
             struct incode_touched *entry =
                 incode_afl_find(afl, key / INCODE_BRICK_POINTS);
-            unlink_node(afl, link);
-            if (entry != NULL)
+            if (entry != NULL) {
                 entry->faces--;
+                entry->pending |= is_held(afl, *link) ? bit_of(key) : 0;
+            }
+            unlink_node(afl, link);
             return true;
         }
         if (node->key == key && node->b == b && node->c == c) {
@@ -167,11 +212,9 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
     return false;
 }
 
-void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
-                       uint32_t c)
+void incode_afl_open(struct incode_afl *afl, uint32_t key, uint32_t b,
+                     uint32_t c, enum incode_face_state state)
 {
-    if (incode_afl_close_twin(afl, key, b, c))
-        return;
     uint32_t i = take_node(afl);
     struct incode_afl_node *node = &afl->nodes[i];
     uint32_t *head = head_of(afl, key);
@@ -180,10 +223,22 @@ void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
     struct incode_touched *entry =
         incode_afl_touch(afl, key / INCODE_BRICK_POINTS);
     entry->faces++;
-    entry->pending |= UINT64_C(1) << (key % INCODE_BRICK_POINTS);
+    if (state == INCODE_FACE_OPEN)
+        entry->pending |= bit_of(key);
+    else
+        hold(afl, i);
+    if (state == INCODE_FACE_FOREIGN)
+        afl->foreign[i / 64] |= UINT64_C(1) << i % 64;
     afl->count++;
     if (afl->count > afl->count_max)
         afl->count_max = afl->count;
+}
+
+void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
+                       uint32_t c)
+{
+    if (!incode_afl_close_twin(afl, key, b, c))
+        incode_afl_open(afl, key, b, c, INCODE_FACE_OPEN);
 }
 
 uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
@@ -191,16 +246,16 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
 {
     uint32_t taken = 0;
     uint32_t *link = head_of(afl, v);
+    bool pending = false;
     *more = false;
-    while (*link != INCODE_AFL_NIL) {
+    while (*link != INCODE_AFL_NIL && !pending) {
         struct incode_afl_node *node = &afl->nodes[*link];
-        if (node->key != v) {
+        bool held = is_held(afl, *link);
+        if (node->key != v || held || taken == limit) {
+            *more = *more || node->key == v;
+            pending = node->key == v && !held;
             link = &node->next;
             continue;
-        }
-        if (taken == limit) {
-            *more = true;
-            break;
         }
         pairs[taken][0] = node->b;
         pairs[taken][1] = node->c;
@@ -211,8 +266,81 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
         incode_afl_find(afl, v / INCODE_BRICK_POINTS);
     if (entry != NULL) {
         entry->faces -= taken;
-        if (!*more)
-            entry->pending &= ~(UINT64_C(1) << (v % INCODE_BRICK_POINTS));
+        if (!pending)
+            entry->pending &= ~bit_of(v);
     }
     return taken;
+}
+
+/* Whether a held face of v has b or c too. */
+static bool meets_held(const struct incode_afl *afl, uint32_t v, uint32_t b,
+                       uint32_t c)
+{
+    uint32_t i = *head_of(afl, v);
+    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
+        const struct incode_afl_node *node = &afl->nodes[i];
+        if (node->key == v && is_held(afl, i) &&
+            (node->b == b || node->b == c || node->c == b || node->c == c))
+            return true;
+    }
+    return false;
+}
+
+uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
+                         uint32_t (*pairs)[2], uint32_t limit)
+{
+    uint32_t count = 0, i = *head_of(afl, v);
+    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
+        const struct incode_afl_node *node = &afl->nodes[i];
+        if (node->key != v || is_held(afl, i) ||
+            meets_held(afl, v, node->b, node->c))
+            continue;
+        if (count == limit)
+            return count;
+        pairs[count][0] = node->b;
+        pairs[count][1] = node->c;
+        hold(afl, i);
+        count++;
+    }
+    struct incode_touched *entry =
+        incode_afl_find(afl, v / INCODE_BRICK_POINTS);
+    if (entry != NULL)
+        entry->pending &= ~bit_of(v);
+    return count;
+}
+
+bool incode_afl_hold_face(struct incode_afl *afl, uint32_t key, uint32_t b,
+                          uint32_t c)
+{
+    uint32_t i = *head_of(afl, key);
+    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
+        const struct incode_afl_node *node = &afl->nodes[i];
+        if (node->key == key && node->b == b && node->c == c) {
+            hold(afl, i);
+            return true;
+        }
+    }
+    return false;
+}
+
+uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v)
+{
+    uint32_t count = 0, i = *head_of(afl, v);
+    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next)
+        if (afl->nodes[i].key == v && is_held(afl, i) && !is_foreign(afl, i)) {
+            let_go(afl, i);
+            count++;
+        }
+    if (count > 0)
+        incode_afl_touch(afl, v / INCODE_BRICK_POINTS)->pending |= bit_of(v);
+    return count;
+}
+
+void incode_afl_free(struct incode_afl *afl, uint32_t v)
+{
+    uint32_t i = *head_of(afl, v);
+    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next)
+        if (afl->nodes[i].key == v)
+            afl->foreign[i / 64] &= ~(UINT64_C(1) << i % 64);
+    (void)incode_afl_let_go(afl, v);
 }

@@ -6,6 +6,11 @@
  * faces of one key vertex and of those that share its hash, constant as long as
  * stars stay bounded (front.h: hubs).
  *
+ * A face may be held, as it has been asked about elsewhere: it stays open, and
+ * its twin closes it as any other, but it is taken no more until it is let go.
+ * Or it is foreign: what lies beyond is another's to build, so that it is not
+ * let go either.
+ *
  *     incode_afl_toggle(&afl, v, b, c);   // opens the face, or closes its twin
  *     n = incode_afl_take(&afl, v, pairs, 256, &more);   // empties its list
  */
@@ -16,14 +21,21 @@
 #include <stddef.h>
 #include <stdint.h>
 
+enum incode_face_state {
+    INCODE_FACE_OPEN,
+    INCODE_FACE_HELD,
+    INCODE_FACE_FOREIGN
+};
+
 /* What is known of a brick from its first touch until it is finished. */
 struct incode_touched {
     uint64_t reached; /* a tetrahedron has this vertex */
-    uint64_t pending; /* its list may hold faces */
+    uint64_t pending; /* its list may have faces that can be taken or held */
     uint64_t waiting; /* a task waits for a page on its behalf */
     uint32_t brick;
     uint32_t faces; /* in the lists of its vertices */
     uint32_t next;
+    uint32_t mark; /* the last sweep that met an open face of it: exchange.h */
 };
 
 struct incode_afl_node {
@@ -33,15 +45,18 @@ struct incode_afl_node {
 struct incode_afl {
     struct incode_afl_node *nodes;
     uint32_t *heads;
+    uint64_t *held, *foreign; /* a bit a node; what is foreign is held, too */
     struct incode_touched *touched;
     uint32_t *touched_heads;
     uint32_t capacity, mask, count, count_max; /* of faces */
+    uint32_t held_count;                       /* of them are held */
     uint32_t free, unused; /* nodes: a list, and all from this one on */
     uint32_t touched_capacity, touched_mask, touched_free, touched_count;
     uint32_t touched_max; /* at a time; entries from here on were never used */
     uint32_t crowded;     /* a vertex with a long list, or INCODE_NONE */
-    const char *fault;    /* NULL, or a static string: what the faces that it
-                             was given cannot be */
+    uint64_t searches, looks; /* for twins; faces looked at */
+    const char *fault; /* NULL, or a static string: what the faces that it
+                          was given cannot be */
     struct incode_touched spare; /* the entry of a brick too many */
 };
 
@@ -76,12 +91,34 @@ void incode_afl_drop(struct incode_afl *afl, uint32_t brick);
 void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
                        uint32_t c);
 
+/* Opens the face, whose twin is not open, in that state. */
+void incode_afl_open(struct incode_afl *afl, uint32_t key, uint32_t b,
+                     uint32_t c, enum incode_face_state state);
+
 /* Closes the twin (key, c, b) where it is open; false: it is not. */
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                            uint32_t c);
 
-/* Takes up to `limit` faces out of the list of v; *more: some remain. */
+/* Takes up to `limit` faces that are not held out of the list of v; *more: some
+ * remain, held or not. */
 uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit, bool *more);
+
+/* Tells up to `limit` faces of v that are not held, and holds them: of those
+ * that share an edge at v one at a time, as they may have the same tetrahedron.
+ */
+uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
+                         uint32_t (*pairs)[2], uint32_t limit);
+
+/* Holds the open face (key, b, c); false: it is not open. */
+bool incode_afl_hold_face(struct incode_afl *afl, uint32_t key, uint32_t b,
+                          uint32_t c);
+
+/* Lets all faces of v go, but for those that are foreign; how many were held.
+ */
+uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v);
+
+/* The same, of all faces, as they are to move. */
+void incode_afl_free(struct incode_afl *afl, uint32_t v);
 
 #endif

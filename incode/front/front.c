@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "exchange.h"
 #include "incode/predicates/check.h"
 
 /* Which faces are pursued, in whose list they wait, and where the list goes
@@ -74,6 +75,8 @@ void incode_front_start(struct incode_front *front,
     front->busy = 0;
     front->fault = NULL;
     front->passed = NULL;
+    if (front->exchange.on)
+        incode_exchange_start(front);
 }
 
 void incode_front_take_over(struct incode_front *front,
@@ -127,7 +130,8 @@ static unsigned key_of(const struct incode_front *front, const uint32_t f[3])
     for (unsigned i = 0; i < 3; i++) {
         bool own = incode_own(front, f[i]), hub = is_hub(front, f[i]);
         int class = (own && !hub) ? 0 : !hub ? 1 : 2;
-        if (class < best_class || (class == best_class && f[i] < f[best])) {
+        if (class < best_class ||
+            (class == best_class && incode_precedes(front, f[i], f[best]))) {
             best = i;
             best_class = class;
         }
@@ -173,12 +177,27 @@ static bool is_spilled(const struct incode_front *front, uint32_t brick)
     return incode_position(front, brick) >= front->spill_from;
 }
 
-void incode_front_toggle(struct incode_front *front, const uint32_t f[3])
+/* In the list, which is at hand. */
+static void toggle_at_hand(struct incode_front *front, const uint32_t f[3],
+                           bool held)
+{
+    if (!front->exchange.on)
+        incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
+    else
+        incode_exchange_toggle(front, f,
+                               incode_exchange_is_foreign(front, f, 3)
+                                   ? INCODE_FACE_FOREIGN
+                               : held ? INCODE_FACE_HELD
+                                      : INCODE_FACE_OPEN);
+}
+
+void incode_front_toggle(struct incode_front *front, const uint32_t f[3],
+                         bool held)
 {
     if (is_spilled(front, f[0] / INCODE_BRICK_POINTS))
         spill_one(front, f);
     else
-        incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
+        toggle_at_hand(front, f, held);
 }
 
 void incode_front_reached(struct incode_front *front, uint32_t v)
@@ -212,7 +231,7 @@ static void list_again(struct incode_front *front, uint32_t v, uint32_t b,
     const uint32_t f[3] = {v, b, c};
     unsigned turn = key_of(front, f);
     const uint32_t g[3] = {f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]};
-    incode_front_toggle(front, g);
+    incode_front_toggle(front, g, false);
 }
 
 /* Makes the vertex with a crowded list a hub; false: there is none. */
@@ -229,6 +248,7 @@ static bool find_hub(struct incode_front *front)
         front->hub_count == INCODE_HUBS)
         return false;
     front->hubs[front->hub_count++] = front->draining = v;
+    incode_afl_free(&front->afl, v); /* they move, held or not */
     return true;
 }
 
@@ -288,6 +308,7 @@ static bool evict_brick(struct incode_front *front,
     for (uint32_t slot = 0; slot < INCODE_BRICK_POINTS; slot++) {
         uint32_t v = brick * INCODE_BRICK_POINTS + slot, pairs[8][2];
         bool more = true;
+        incode_afl_free(&front->afl, v);
         while (more) {
             if (front->spill_count > 0 && !incode_front_flush(front))
                 return false;
@@ -327,7 +348,7 @@ static void evict_next(struct incode_front *front)
     front->spill_cursor = INCODE_NONE;
 }
 
-static bool has_room(const struct incode_front *front)
+bool incode_front_has_room(const struct incode_front *front)
 {
     return front->afl.capacity - front->afl.count >= front->room_faces &&
            front->afl.touched_capacity - front->afl.touched_count >=
@@ -343,7 +364,7 @@ bool incode_front_room(struct incode_front *front)
         evict_next(front);
         return false;
     }
-    if (has_room(front))
+    if (incode_front_has_room(front))
         return true;
     if (front->unspill_pending) /* what returns must be whole before it moves */
         return false;
@@ -385,7 +406,7 @@ int incode_front_unspill(struct incode_front *front, uint32_t brick,
             return 0;
         }
         if (f[1] != INCODE_NONE) {
-            incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
+            toggle_at_hand(front, f, false);
             continue;
         }
         entry = incode_afl_touch(&front->afl, brick);
@@ -395,6 +416,8 @@ int incode_front_unspill(struct incode_front *front, uint32_t brick,
         front->unspill_pending = false;
         if (front->spill_from == front->bricks)
             front->spilled_any = false;
+        if (front->exchange.on)
+            incode_exchange_returned(front, brick);
     }
     return 0;
 }

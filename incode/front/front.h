@@ -42,6 +42,7 @@
 #include "afl.h"
 #include "incode/pages/bricks.h"
 #include "job.h"
+#include "owner.h"
 
 enum {
     INCODE_STAR_FACES = 256, /* open faces at one vertex held at hand */
@@ -86,12 +87,44 @@ struct incode_front_counts {
     uint64_t vertices; /* tasks begun */
     uint64_t waited;   /* of these were suspended */
     uint64_t faults;   /* suspensions for what was not there */
+    uint64_t foreign;  /* tetrahedra found, and left to their owner */
+    uint64_t taken;    /* that came of others */
+};
+
+/* What a front needs where several share one list: exchange.h.  Maps have a bit
+ * a position of an own brick. */
+struct incode_exchange {
+    bool on;
+    struct incode_front_peers peers;
+    uint64_t *ready;     /* it may have faces to be pursued */
+    uint64_t *deferred;  /* it may have faces that were put off */
+    uint64_t *committed; /* its stars are closed */
+    double lo[3];        /* of all points */
+    double floor[3];     /* of the region: below are lower ones; or -inf */
+    uint32_t words;      /* of a map */
+    uint32_t ready_from, deferred_from; /* no bit in words before */
+    bool elsewhere;      /* others' lists may have faces: those of hubs */
+    bool quiet;          /* nothing to do until something comes */
+    uint32_t fetched;    /* bricks, since something came or was built */
+    uint32_t left;       /* own bricks that are not committed */
+    uint32_t last_count; /* points of the last own brick; 0: not known yet */
+    /* First tetrahedra: tries at the start, then brick by brick. */
+    uint32_t tries;
+    bool seeding;
+    uint32_t seed_position, seed_slot;
+    /* The sweep under way. */
+    uint32_t sweep; /* its number */
+    bool sweeping;
+    uint32_t sweep_head, sweep_entry;
+    uint32_t changes; /* tetrahedra since the last one began */
 };
 
 struct incode_front {
     uint32_t bricks; /* of all regions */
     enum incode_face_rule face_rule;
+    enum incode_owner_rule owner_rule; /* after init: the smallest vertex */
     struct incode_front_outside outside;
+    struct incode_exchange exchange;
     struct incode_job job;
     struct incode_afl afl;
     struct incode_front_counts counts;
@@ -196,6 +229,12 @@ enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which);
 enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
                                     uint32_t *which);
 
+/* Lends up to `most` faces, those of the vertices that are next: they are held,
+ * and stay open until incode_front_use has their answers, or others close them.
+ * Those that are moved or spilled meanwhile are lent again.  How many. */
+uint32_t incode_front_lend(struct incode_front *front, uint32_t (*faces)[3],
+                           uint32_t most);
+
 /* A task runs: sets how many tetrahedra it may build, `most` at most, 1 at
  * least. */
 void incode_front_run(struct incode_front *front, uint32_t most);
@@ -257,12 +296,33 @@ static inline bool incode_own(const struct incode_front *front, uint32_t v)
     return incode_own_brick(front, v / INCODE_BRICK_POINTS);
 }
 
-/* Bricks counted from the job's first, the others after its last. */
+/* Bricks counted from the job's first, the others after its last; or, in an
+ * exchange, from the last one down. */
 static inline uint32_t incode_position(const struct incode_front *front,
                                        uint32_t brick)
 {
+    if (front->exchange.on)
+        return brick < front->job.last
+                   ? front->job.last - 1 - brick
+                   : front->job.last - 1 + front->bricks - brick;
     return brick >= front->job.first ? brick - front->job.first
                                      : brick + front->bricks - front->job.first;
+}
+
+/* The brick there. */
+static inline uint32_t incode_brick_at(const struct incode_front *front,
+                                       uint32_t position)
+{
+    if (front->exchange.on)
+        return (front->job.last - 1 + front->bricks - position) % front->bricks;
+    return (front->job.first + position) % front->bricks;
+}
+
+/* Of two vertices, whether the first comes before in the order of work. */
+static inline bool incode_precedes(const struct incode_front *front, uint32_t v,
+                                   uint32_t w)
+{
+    return front->exchange.on ? v > w : v < w;
 }
 
 /* Which of v's vertices has the face in its list: *turn is its index; false:
@@ -278,13 +338,15 @@ static inline bool incode_front_key(const struct incode_front *front,
     if (front->hub_count != 0 || !incode_own(front, v[0]) ||
         !incode_own(front, v[1]) || !incode_own(front, v[2]))
         return incode_front_key_slow(front, v, p, turn);
-    unsigned least = v[1] < v[0];
-    *turn = v[2] < v[least] ? 2 : least;
+    unsigned least = incode_precedes(front, v[1], v[0]);
+    *turn = incode_precedes(front, v[2], v[least]) ? 2 : least;
     return true;
 }
 
-/* Toggles a face whose key is not the vertex at work. */
-void incode_front_toggle(struct incode_front *front, const uint32_t v[3]);
+/* Toggles a face whose key is not the vertex at work; held: if it opens, it is
+ * put off. */
+void incode_front_toggle(struct incode_front *front, const uint32_t v[3],
+                         bool held);
 /* Notes that a tetrahedron has this vertex. */
 void incode_front_reached(struct incode_front *front, uint32_t v);
 /* Whether one has. */
@@ -362,8 +424,10 @@ bool incode_front_face(struct incode_front *front, uint32_t v,
                        uint32_t face[3]);
 
 /* Builds the tetrahedron v beside the face (v[0], v[1], v[2]), v[3] =
- * INCODE_NONE at the hull, if that is still open. */
-void incode_front_use(struct incode_front *front, const uint32_t v[4],
+ * INCODE_NONE at the hull, if that is still open.  p: coordinates; only the
+ * face rule `paper` and the lexicographic owner look at them.  False: it is
+ * not, and nothing was done. */
+bool incode_front_use(struct incode_front *front, const uint32_t v[4],
                       const double *const p[4]);
 
 /* Builds a first tetrahedron at v[0]. */

@@ -44,4 +44,14 @@ struct incode_front_outside {
     bool (*unspill)(void *context, uint32_t brick);
 };
 
+/* Other fronts, where they share one active face list (exchange.h). */
+struct incode_front_peers {
+    void *context;
+    /* Calls of `share` that are possible now. */
+    size_t (*room)(void *context);
+    /* A tetrahedron (or a facet of the hull, v[3] = INCODE_NONE), for all other
+     * owners of its vertices. */
+    void (*share)(void *context, const uint32_t v[4]);
+};
+
 #endif

@@ -1,5 +1,6 @@
 #include "front.h"
 
+#include "exchange.h"
 #include "incode/predicates/check.h"
 
 /* The order of work: own bricks in their order, in each the vertices with open
@@ -9,6 +10,7 @@
 enum {
     FETCH_AHEAD = 32,  /* bricks */
     EMIT_ROOM_MIN = 8, /* tetrahedra */
+    LEND_FACES = 32,   /* of a vertex, at a time */
     ALL_TASKS = (1 << INCODE_TASKS) - 1
 };
 
@@ -19,8 +21,8 @@ static uint64_t bit_of(uint32_t v)
     return UINT64_C(1) << (v % INCODE_BRICK_POINTS);
 }
 
-static enum incode_turn begin_task(struct incode_front *front, uint32_t v,
-                                   bool seed, uint32_t *which)
+enum incode_turn incode_front_begin(struct incode_front *front, uint32_t v,
+                                    bool seed, uint32_t *which)
 {
     uint32_t idle = ~front->busy & ALL_TASKS;
     if (idle == 0)
@@ -35,6 +37,11 @@ void incode_front_run(struct incode_front *front, uint32_t most)
     front->built_max = front->spill_from < front->bricks ? INCODE_SPILL_BUILT
                                                          : INCODE_STAR_BUILT;
     size_t room = front->outside.emit_room(front->outside.context);
+    if (front->exchange.on) {
+        const struct incode_front_peers *peers = &front->exchange.peers;
+        size_t shares = peers->room(peers->context);
+        room = room < shares ? room : shares;
+    }
     if (front->built_max > room)
         front->built_max = (uint32_t)room;
     most = most > 0 ? most : 1;
@@ -70,6 +77,8 @@ void incode_front_done(struct incode_front *front, unsigned task)
     struct incode_touched *entry = count_run(front, t);
     entry->waiting &= ~bit_of(t->v);
     front->busy &= ~(UINT32_C(1) << task);
+    if (front->exchange.on && entry->pending != 0)
+        incode_exchange_ready(front, t->v);
     if (!incode_own(front, t->v) && entry->faces == 0 && entry->waiting == 0)
         incode_afl_drop(&front->afl, entry->brick);
 }
@@ -119,7 +128,9 @@ enum incode_turn incode_front_turn(struct incode_front *front, uint32_t waiting,
         return front->spill_cursor != INCODE_NONE ? INCODE_TURN_WORKED
                                                   : INCODE_TURN_WAIT;
     }
-    if (front->outside.emit_room(front->outside.context) < EMIT_ROOM_MIN)
+    const struct incode_front_peers *peers = &front->exchange.peers;
+    if (front->outside.emit_room(front->outside.context) < EMIT_ROOM_MIN ||
+        (front->exchange.on && peers->room(peers->context) < EMIT_ROOM_MIN))
         return INCODE_TURN_WAIT;
     if (incode_front_drain(front))
         return INCODE_TURN_WORKED;
@@ -134,12 +145,21 @@ static void fetch_spilled(struct incode_front *front)
 {
     if (front->unspill_pending || !incode_front_flush(front))
         return;
-    uint32_t brick = (front->job.first + front->spill_from) % front->bricks;
+    uint32_t brick = incode_brick_at(front, front->spill_from);
     if (!front->outside.unspill(front->outside.context, brick))
         return;
     front->unspill_brick = brick;
     front->unspill_pending = true;
     front->spill_from++;
+}
+
+bool incode_front_fetch(struct incode_front *front)
+{
+    if (front->spill_from == front->bricks ||
+        front->spill_cursor != INCODE_NONE || !incode_front_has_room(front))
+        return false;
+    fetch_spilled(front);
+    return true;
 }
 
 /* Brings spilled bricks back before they are needed while there is room. */
@@ -158,38 +178,32 @@ static bool is_returning(const struct incode_front *front, uint32_t brick)
     return front->unspill_pending && front->unspill_brick == brick;
 }
 
-/* The next vertex with open faces in the window of own bricks. */
-static bool next_own(struct incode_front *front, uint32_t *v)
+/* The next own brick of the window with open faces; NULL: there is none. */
+static struct incode_touched *next_own(struct incode_front *front)
 {
     uint32_t own = front->job.last - front->job.first;
     for (uint32_t i = 0; i < front->window; i++) {
         uint32_t position = front->current + i;
         if (position >= own || position >= front->spill_from ||
             is_returning(front, front->job.first + position))
-            return false;
+            return NULL;
         struct incode_touched *entry =
             incode_afl_find(&front->afl, front->job.first + position);
-        if (entry == NULL)
-            continue;
-        uint64_t ready = entry->pending & ~entry->waiting;
-        if (ready == 0)
-            continue;
-        *v = entry->brick * INCODE_BRICK_POINTS +
-             (uint32_t)__builtin_ctzll(ready);
-        return true;
+        if (entry != NULL && (entry->pending & ~entry->waiting) != 0)
+            return entry;
     }
-    return false;
+    return NULL;
 }
 
-/* The next vertex with open faces anywhere, the lowest position first, so that
+/* The next brick with open faces anywhere, the lowest position first, so that
  * what is left lies ahead and can be spilled.  Bricks without faces are
  * forgotten on the way. */
-static bool next_foreign(struct incode_front *front, uint32_t *v)
+static struct incode_touched *next_foreign(struct incode_front *front)
 {
-    const struct incode_touched *best = NULL;
+    struct incode_touched *best = NULL;
     uint32_t least = 0;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
-        const struct incode_touched *entry = &front->afl.touched[i];
+        struct incode_touched *entry = &front->afl.touched[i];
         if (!incode_touched_used(entry) || is_returning(front, entry->brick))
             continue;
         if (entry->faces == 0 && entry->waiting == 0)
@@ -201,12 +215,16 @@ static bool next_foreign(struct incode_front *front, uint32_t *v)
             least = incode_position(front, entry->brick);
         }
     }
-    if (best == NULL)
-        return false;
-    front->current = least;
-    *v = best->brick * INCODE_BRICK_POINTS +
-         (uint32_t)__builtin_ctzll(best->pending & ~best->waiting);
-    return true;
+    if (best != NULL)
+        front->current = least;
+    return best;
+}
+
+/* The first vertex of a brick that may have open faces. */
+static uint32_t first_pending(const struct incode_touched *entry)
+{
+    return entry->brick * INCODE_BRICK_POINTS +
+           (uint32_t)__builtin_ctzll(entry->pending & ~entry->waiting);
 }
 
 /* Everything is closed: the hubs' bricks are complete, too. */
@@ -242,7 +260,10 @@ static bool skip_passed(struct incode_front *front)
 
 enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
 {
-    uint32_t own = front->job.last - front->job.first, v;
+    uint32_t own = front->job.last - front->job.first;
+    const struct incode_touched *entry;
+    if (front->exchange.on)
+        return incode_exchange_next(front, which);
     if (skip_passed(front))
         return INCODE_TURN_WORKED;
     fetch_ahead(front);
@@ -254,14 +275,17 @@ enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
         if (front->current >= front->spill_from ||
             is_returning(front, front->job.first + front->current))
             return INCODE_TURN_WAIT;
-        if (next_own(front, &v))
-            return begin_task(front, v, false, which);
+        entry = next_own(front);
+        if (entry != NULL)
+            return incode_front_begin(front, first_pending(entry), false,
+                                      which);
         *which = front->job.first + front->current;
         return INCODE_TURN_COUNT;
     }
-    if (front->afl.count > 0 && next_foreign(front, &v))
-        return begin_task(front, v, false, which);
-    if (front->busy != 0 || front->unspill_pending)
+    entry = front->afl.count > 0 ? next_foreign(front) : NULL;
+    if (entry != NULL)
+        return incode_front_begin(front, first_pending(entry), false, which);
+    if (front->busy != 0 || front->unspill_pending || front->afl.held_count > 0)
         return INCODE_TURN_WAIT;
     if (front->afl.count > 0) {
         front->fault = "faces are left whose vertices are none";
@@ -271,6 +295,32 @@ enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
         return finish(front);
     fetch_spilled(front);
     return INCODE_TURN_WAIT;
+}
+
+uint32_t incode_front_lend(struct incode_front *front, uint32_t (*faces)[3],
+                           uint32_t most)
+{
+    uint32_t count = 0;
+    bool moving =
+        front->spill_cursor != INCODE_NONE || front->draining != INCODE_NONE;
+    while (!front->finished && !moving && count < most) {
+        const struct incode_touched *entry =
+            front->foreign ? next_foreign(front) : next_own(front);
+        if (entry == NULL)
+            break;
+        while ((entry->pending & ~entry->waiting) != 0 && count < most) {
+            uint32_t v = first_pending(entry), pairs[LEND_FACES][2];
+            uint32_t limit =
+                most - count < LEND_FACES ? most - count : (uint32_t)LEND_FACES;
+            uint32_t n = incode_afl_hold(&front->afl, v, pairs, limit);
+            for (uint32_t i = 0; i < n; i++, count++) {
+                faces[count][0] = v;
+                faces[count][1] = pairs[i][0];
+                faces[count][2] = pairs[i][1];
+            }
+        }
+    }
+    return count;
 }
 
 /* Passes the current brick: all its lists are empty and all its vertices
@@ -290,6 +340,8 @@ enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
                                     uint32_t *which)
 {
     INCODE_ASSERT(count >= 1 && count <= INCODE_BRICK_POINTS);
+    if (front->exchange.on)
+        return incode_exchange_count(front, count);
     uint32_t brick = front->job.first + front->current;
     const struct incode_touched *entry = incode_afl_find(&front->afl, brick);
     uint64_t all = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - count);
@@ -299,5 +351,6 @@ enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
     if ((all & ~reached) == 0)
         return pass_brick(front);
     uint32_t slot = (uint32_t)__builtin_ctzll(all & ~reached);
-    return begin_task(front, brick * INCODE_BRICK_POINTS + slot, true, which);
+    return incode_front_begin(front, brick * INCODE_BRICK_POINTS + slot, true,
+                              which);
 }

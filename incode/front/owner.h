@@ -1,25 +1,52 @@
-/* Whose a tetrahedron is: that of the brick of its lexicographically smallest
- * vertex.  A function of the tetrahedron alone, so that of all who build it one
- * keeps it, and host and nodes agree on which.
+/* Whose a tetrahedron is: that of the brick of one of its vertices, the
+ * lexicographically smallest one, or the one of the lowest number.  A function
+ * of the tetrahedron alone, so that of all who build it one keeps it, and host
+ * and nodes agree on which.
  *
  * Memory: none.  Work: three comparisons.
  *
  *     const double *const p[4] = {pa, pb, pc, pd};
- *     uint32_t brick = vertex[incode_owner(p)] / INCODE_BRICK_POINTS;
+ *     unsigned i = incode_owner(INCODE_OWNER_SMALLEST, vertex, p);
+ *     uint32_t brick = vertex[i] / INCODE_BRICK_POINTS;
  */
 #ifndef INCODE_OWNER_H
 #define INCODE_OWNER_H
 
+#include <stdint.h>
+
 #include "incode/predicates/predicates.h"
 
-/* Which of a tetrahedron's vertices, at p[0] to p[3], has it: 0 to 3. */
-static inline unsigned incode_owner(const double *const p[4])
+enum incode_owner_rule {
+    INCODE_OWNER_SMALLEST, /* the paper's: the upper left frontmost */
+    INCODE_OWNER_LOWEST    /* of number: coordinates do not count */
+};
+
+/* Which of four points is the smallest. */
+static inline unsigned incode_smallest(const double *const p[4])
 {
     unsigned least = 0;
     for (unsigned i = 1; i < 4; i++)
         if (incode_lexicographic(p[i], p[least]) < 0)
             least = i;
     return least;
+}
+
+/* Which of some vertex numbers is the lowest. */
+static inline unsigned incode_lowest(const uint32_t *v, unsigned count)
+{
+    unsigned least = 0;
+    for (unsigned i = 1; i < count; i++)
+        least = v[i] < v[least] ? i : least;
+    return least;
+}
+
+/* Which of a tetrahedron's vertices v, at p[0] to p[3], has it: 0 to 3. */
+static inline unsigned incode_owner(enum incode_owner_rule rule,
+                                    const uint32_t v[4],
+                                    const double *const p[4])
+{
+    return rule == INCODE_OWNER_LOWEST ? incode_lowest(v, 4)
+                                       : incode_smallest(p);
 }
 
 #endif

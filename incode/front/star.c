@@ -1,9 +1,9 @@
 #include <string.h>
 
+#include "exchange.h"
 #include "front.h"
 #include "incode/predicates/check.h"
 #include "incode/predicates/simd.h"
-#include "owner.h"
 
 /* Closing the star of a vertex: its open faces are taken out of the active face
  * list, each gets its tetrahedron, and the new faces toggle, those at the
@@ -17,8 +17,13 @@ static const uint16_t NO_HINTS[4] = {INCODE_HINT_NONE, INCODE_HINT_NONE,
 static void put_back(struct incode_front *front)
 {
     struct incode_star *star = &front->star;
-    for (uint32_t i = 0; i < star->faces; i++)
-        incode_afl_toggle(&front->afl, star->v, star->b[i], star->c[i]);
+    for (uint32_t i = 0; i < star->faces; i++) {
+        const uint32_t f[3] = {star->v, star->b[i], star->c[i]};
+        if (front->exchange.on)
+            incode_exchange_toggle(front, f, INCODE_FACE_OPEN);
+        else
+            incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
+    }
     star->faces = 0;
 }
 
@@ -66,14 +71,23 @@ static void toggle_here(struct incode_front *front, uint32_t b, uint32_t c,
 }
 
 static void toggle_face(struct incode_front *front, const uint32_t v[3],
-                        const double *const p[3], const uint16_t hint[3])
+                        const double *const p[3], const uint16_t hint[3],
+                        bool near)
 {
     unsigned turn;
     if (!incode_front_key(front, v, p, &turn))
         return;
     const uint32_t f[3] = {v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]};
-    if (f[0] != front->star.v) {
-        incode_front_toggle(front, f);
+    bool held = near && incode_exchange_is_outward(front, p);
+    if (f[0] != front->star.v || incode_exchange_is_foreign(front, f, 3)) {
+        incode_front_toggle(front, f, held);
+        return;
+    }
+    if (held) {
+        if (!remove_face(&front->star, f[2], f[1])) {
+            incode_front_toggle(front, f, true);
+            front->star.more = true;
+        }
         return;
     }
     toggle_here(front, f[1], f[2], hint[(turn + 1) % 3], hint[(turn + 2) % 3]);
@@ -88,7 +102,7 @@ static bool is_kept(const struct incode_front *front, const uint32_t v[4],
         own[i] = incode_own(front, v[i]);
         all = all && own[i];
     }
-    return all || own[incode_owner(p)];
+    return all || own[incode_owner(front->owner_rule, v, p)];
 }
 
 /* Emits the tetrahedron v of positive orientation if it is the region's own,
@@ -107,6 +121,11 @@ static void build(struct incode_front *front, const uint32_t v[4],
         INCODE_ASSERT(star->kept <= INCODE_STAR_BUILT);
     }
     incode_front_reached(front, v[3]);
+    bool near = false;
+    if (front->exchange.on) {
+        near = incode_exchange_is_near(front, p);
+        incode_exchange_share(front, v);
+    }
     /* Faces with their unknown side outward: of (v, b, c, a) these are
      * (v, c, b) behind, (v, a, c), (v, b, a) and (b, c, a). */
     static const uint8_t face[4][3] = {
@@ -116,8 +135,40 @@ static void build(struct incode_front *front, const uint32_t v[4],
         const uint32_t f[3] = {v[j[0]], v[j[1]], v[j[2]]};
         const double *const q[3] = {p[j[0]], p[j[1]], p[j[2]]};
         const uint16_t i[3] = {hint[j[0]], hint[j[1]], hint[j[2]]};
-        toggle_face(front, f, q, i);
+        toggle_face(front, f, q, i, near);
     }
+}
+
+/* A fault that the simulation has to find: a face that is its owner's to pursue
+ * is pursued here as well. */
+static bool is_planted(const struct incode_front *front)
+{
+#ifdef INCODE_PLANT_KEPT
+    return front->counts.built % 16 == 0;
+#else
+    (void)front;
+    return false;
+#endif
+}
+
+/* The face (v[0], v[1], v[2]) is of the hull. */
+static void find_hull(struct incode_front *front, const uint32_t v[4])
+{
+    front->counts.hull_facets++;
+    if (front->exchange.on) {
+        front->star.built++; /* it takes as much room */
+        incode_exchange_share(front, v);
+    }
+}
+
+/* The tetrahedron beside the face that was taken out, whose first vertex has it
+ * in its list, is another's: the face stays open until it comes. */
+static void leave(struct incode_front *front, const uint32_t v[4])
+{
+    front->star.built++;
+    front->counts.built++;
+    front->counts.foreign++;
+    incode_exchange_toggle(front, v, INCODE_FACE_FOREIGN);
 }
 
 static void emit(struct incode_front *front)
@@ -163,7 +214,9 @@ void incode_star_build(struct incode_front *front, const uint32_t v[4],
                        const double *const p[4], const uint16_t hint[4])
 {
     if (v[3] == INCODE_NONE)
-        front->counts.hull_facets++;
+        find_hull(front, v);
+    else if (incode_exchange_is_foreign(front, v, 4) && !is_planted(front))
+        leave(front, v);
     else
         build(front, v, p, hint, true);
 }
@@ -197,32 +250,46 @@ bool incode_front_face(struct incode_front *front, uint32_t v, uint32_t face[3])
     face[1] = pair[0][0];
     face[2] = pair[0][1];
     incode_afl_toggle(&front->afl, v, face[1], face[2]);
+    if (front->exchange.on)
+        incode_exchange_ready(front, v);
     return true;
 }
 
-void incode_front_use(struct incode_front *front, const uint32_t v[4],
+bool incode_front_use(struct incode_front *front, const uint32_t v[4],
                       const double *const p[4])
 {
     unsigned turn;
     if (!incode_front_key(front, v, p, &turn)) {
         front->fault = "a vertex has moved while its face was under search";
-        return;
+        return false;
     }
     uint32_t key = v[turn], b = v[(turn + 1) % 3], c = v[(turn + 2) % 3];
-    if (incode_position(front, key / INCODE_BRICK_POINTS) >=
-            front->spill_from ||
+    uint32_t brick = key / INCODE_BRICK_POINTS;
+    /* Of a brick that is not wholly here it is not known what is open. */
+    if (incode_position(front, brick) >= front->spill_from ||
+        (front->unspill_pending && front->unspill_brick == brick) ||
         !incode_afl_close_twin(&front->afl, key, c, b))
-        return;
+        return false;
+    const uint32_t f[4] = {key, b, c, v[3]};
     if (v[3] == INCODE_NONE)
-        front->counts.hull_facets++;
+        find_hull(front, v);
+    else if (incode_exchange_is_foreign(front, v, 4))
+        leave(front, f);
     else
         build_alone(front, v, p, true);
+    return true;
 }
 
 void incode_front_seed(struct incode_front *front, const uint32_t v[4],
                        const double *const p[4])
 {
+    if (incode_exchange_is_foreign(front, v, 4)) {
+        front->counts.built++; /* in vain */
+        front->counts.foreign++;
+        return;
+    }
     front->counts.seeds++;
+    front->exchange.tries = UINT32_MAX; /* enough */
     for (int i = 0; i < 3; i++)
         incode_front_reached(front, v[i]);
     build_alone(front, v, p, false);

@@ -125,7 +125,10 @@ static enum incode_outcome answer_near(struct incode_maker *m, unsigned slot,
 {
     enum incode_outcome r = is_at_hand(m, f[0]) ? INCODE_MORE : INCODE_AGAIN;
     uint16_t near[2] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
-    while (r == INCODE_AGAIN || r == INCODE_MORE) {
+    for (bool begun = false; r == INCODE_AGAIN || r == INCODE_MORE;
+         begun = true) {
+        if (begun && r == INCODE_MORE && m->walker.left == 0)
+            return INCODE_MORE;
         if (r == INCODE_AGAIN) {
             near[0] = near[1] = INCODE_LOCAL_NONE;
             r = incode_maker_centre(m, slot, f[0]);

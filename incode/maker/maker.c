@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <string.h>
 
+#include "incode/pages/sound.h"
 #include "incode/predicates/check.h"
 
 enum { LOOKAHEAD_MAX = 48 /* bricks */ };
@@ -119,6 +120,18 @@ uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots)
     return waiting;
 }
 
+int incode_maker_page(struct incode_maker *m, uint32_t page, const void *data,
+                      size_t bytes)
+{
+    if (!incode_pager_loading(&m->pager, page))
+        return INCODE_PAGE_UNASKED;
+    if (!incode_page_is_sound(&m->tree, m->lo, m->hi, page, data, bytes))
+        return INCODE_PAGE_UNSOUND;
+    return incode_pager_deliver(&m->pager, page, data, bytes) == 0
+               ? 0
+               : INCODE_PAGE_UNASKED;
+}
+
 uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick)
 {
     const struct incode_frame *f = incode_pager_get(&m->pager, brick);
@@ -134,15 +147,18 @@ static bool count_brick(struct incode_walker *walker, struct incode_query *q,
     return --*left > 0;
 }
 
-bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
-                           uint32_t more)
+/* more: bricks after it or, where `down`, before it. */
+static bool prefetch(struct incode_maker *m, uint32_t brick, uint32_t more,
+                     bool down)
 {
     const struct incode_frame *f = incode_pager_get(&m->pager, brick);
     if (f == NULL) {
-        for (uint32_t i = 1; i <= more; i++)
-            if (incode_pager_get(&m->pager, brick + i) == NULL &&
-                !incode_pager_loading(&m->pager, brick + i))
+        for (uint32_t i = 1; i <= more; i++) {
+            uint32_t next = down ? brick - i : brick + i;
+            if (incode_pager_get(&m->pager, next) == NULL &&
+                !incode_pager_loading(&m->pager, next))
                 break; /* no more can be asked for at present */
+        }
         return false;
     }
     struct incode_query q;
@@ -159,15 +175,39 @@ bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
     return incode_walk(&m->walker, &q, count_brick, &left) != INCODE_WALK_WAIT;
 }
 
-void incode_maker_look_ahead(struct incode_maker *m, uint32_t first,
-                             uint32_t last)
+bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
+                           uint32_t more)
+{
+    return prefetch(m, brick, more, false);
+}
+
+/* Whether there is something to look ahead at, from `first` on before `last`;
+ * *more: how many more than the one at m->ahead. */
+static bool may_look_ahead(struct incode_maker *m, uint32_t first,
+                           uint32_t last, uint32_t *more)
 {
     if (m->ahead < first)
         m->ahead = first;
     if (m->ahead >= last || m->ahead >= first + m->lookahead)
-        return;
-    uint32_t more = last - m->ahead - 1;
-    if (more >= m->lookahead)
-        more = m->lookahead - 1;
-    m->ahead += incode_maker_prefetch(m, m->ahead, more);
+        return false;
+    *more = last - m->ahead - 1;
+    if (*more >= m->lookahead)
+        *more = m->lookahead - 1;
+    return true;
+}
+
+void incode_maker_look_ahead(struct incode_maker *m, uint32_t first,
+                             uint32_t last)
+{
+    uint32_t more;
+    if (may_look_ahead(m, first, last, &more))
+        m->ahead += prefetch(m, m->ahead, more, false);
+}
+
+void incode_maker_look_down(struct incode_maker *m, uint32_t last,
+                            uint32_t passed, uint32_t count)
+{
+    uint32_t more;
+    if (may_look_ahead(m, passed, count, &more))
+        m->ahead += prefetch(m, last - 1 - m->ahead, more, true);
 }

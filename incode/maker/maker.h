@@ -109,7 +109,7 @@ struct incode_maker_counts {
 struct incode_maker {
     enum incode_index index;
     uint32_t sweep;     /* index `naive`: the brick last looked at */
-    uint32_t ahead;     /* bricks below have been asked for */
+    uint32_t ahead;     /* bricks below have been asked for, or so many */
     uint32_t lookahead; /* so many before the one at work, at most */
     double lo[3], hi[3];
     uint32_t cells[3];
@@ -238,6 +238,10 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
 /* Which of some searches, one bit each, wait for a page that is on its way. */
 uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots);
 
+/* A page has arrived: as incode_triangulator_page of incode/triangulator.h. */
+int incode_maker_page(struct incode_maker *m, uint32_t page, const void *data,
+                      size_t bytes);
+
 /* Asks for the pages of a brick, of up to `more` after it, and of what lies
  * around the first; true: all that can be has been done for it. */
 bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
@@ -247,6 +251,11 @@ bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
  * them, as far ahead as the frames allow, once each. */
 void incode_maker_look_ahead(struct incode_maker *m, uint32_t first,
                              uint32_t last);
+
+/* The same where `count` bricks, from brick last - 1 down, are worked on, and
+ * `passed` of them are passed. */
+void incode_maker_look_down(struct incode_maker *m, uint32_t last,
+                            uint32_t passed, uint32_t count);
 
 /* Points of a brick, or 0: its page is missing and has been asked for. */
 uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick);

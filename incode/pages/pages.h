@@ -35,6 +35,10 @@ enum {
  * lists have pages of their own, or by the tree. */
 enum incode_index { INCODE_NAIVE, INCODE_GRID, INCODE_KD };
 
+/* Why a page that has come is not taken: nobody has asked for it, or it cannot
+ * be the one of that number (sound.h). */
+enum { INCODE_PAGE_UNASKED = -1, INCODE_PAGE_UNSOUND = -2 };
+
 /* A brick: coordinates of slots [0, count); the rest repeats the last point. */
 struct incode_brick {
     double x[INCODE_BRICK_POINTS];

@@ -15,7 +15,7 @@ static unsigned owner_of(const struct incode_complex *x,
 {
     const double *const p[4] = {x->point[c->v[0]].p, x->point[c->v[1]].p,
                                 x->point[c->v[2]].p, x->point[c->v[3]].p};
-    return incode_owner(p);
+    return incode_smallest(p);
 }
 
 static bool is_own(const struct incode_insertion *n, uint32_t id)

@@ -35,6 +35,7 @@ enum {
 struct solo {
     /* What to do. */
     uint8_t index, face_rule, build;
+    enum incode_owner_rule owner_rule;
     enum host_partition partition;
     uint32_t regions;
     size_t memory;    /* 0: the least that works */
@@ -110,17 +111,12 @@ static inline void solo_emit(void *context, uint32_t vertex,
     for (size_t i = 0; i < count; i++) {
         v[i][0] = vertex;
         memcpy(v[i] + 1, apexes[i], sizeof apexes[i]);
-        uint32_t least = vertex;
-        double p[3], q[3];
-        host_vertex(&s->order, least, p);
-        for (int k = 1; k < 4; k++) {
-            host_vertex(&s->order, v[i][k], q);
-            if (incode_lexicographic(q, p) < 0) {
-                least = v[i][k];
-                memcpy(p, q, sizeof p);
-            }
-        }
-        uint32_t brick = least / INCODE_BRICK_POINTS;
+        double p[4][3];
+        for (int k = 0; k < 4; k++)
+            host_vertex(&s->order, v[i][k], p[k]);
+        const double *const at[4] = {p[0], p[1], p[2], p[3]};
+        unsigned owner = incode_owner(s->owner_rule, v[i], at);
+        uint32_t brick = v[i][owner] / INCODE_BRICK_POINTS;
         assert_in_range(brick, s->job.first, s->job.last - 1);
         assert_int_equal(s->committed[brick], 0);
     }
@@ -274,16 +270,23 @@ static inline void solo_region(struct solo *s, uint32_t region)
     assert_int_equal(s->t->front.afl.count, 0);
 }
 
-static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
+static inline void solo_order(struct solo *s, const double *xyz, uint64_t n)
 {
     struct host_error error = {0};
     if (host_order_make(&s->order, "set", xyz, n, s->partition, s->regions,
                         s->index == INCODE_GRID, &error) != 0)
         fail_msg("%s", error.text);
+}
+
+/* The triangulator, with the order that is there. */
+static inline void solo_make(struct solo *s,
+                             const struct incode_front_peers *peers)
+{
     s->setup = (struct incode_setup){.bricks = s->order.bricks,
                                      .index = s->index,
                                      .face_rule = s->face_rule,
                                      .build = s->build,
+                                     .owner_rule = (uint8_t)s->owner_rule,
                                      .shuffle_seed = s->shuffle};
     memcpy(s->setup.lo, s->order.lo, sizeof s->setup.lo);
     memcpy(s->setup.hi, s->order.hi, sizeof s->setup.hi);
@@ -299,7 +302,8 @@ static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
     const struct incode_outside outside = {.pages = {s, solo_request},
                                            .front = {s, solo_emit_room,
                                                      solo_emit, solo_commit,
-                                                     solo_spill, solo_unspill}};
+                                                     solo_spill, solo_unspill},
+                                           .peers = *peers};
     const char *why = "";
     s->t = incode_triangulator_init(s->arena, s->memory, &s->setup, &outside,
                                     &why);
@@ -307,6 +311,13 @@ static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
         fail_msg("%s", why);
     if (s->units != 0)
         incode_triangulator_allow(s->t, s->units);
+}
+
+static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
+{
+    const struct incode_front_peers none = {0};
+    solo_order(s, xyz, n);
+    solo_make(s, &none);
 }
 
 /* The whole set, region after region, in one arena. */

@@ -59,7 +59,8 @@ static void setup_limits(void **unused)
     EXPECT(true, good, face_rule, INCODE_FACE_PAPER + 1);
     EXPECT(false, good, build, INCODE_BUILD_POINTS);
     EXPECT(true, good, build, INCODE_BUILD_POINTS + 1);
-    EXPECT(true, good, reserved, 1);
+    EXPECT(false, good, owner_rule, INCODE_OWNER_LOWEST);
+    EXPECT(true, good, owner_rule, INCODE_OWNER_LOWEST + 1);
     EXPECT(true, good, reserved2, 1);
     for (int d = 0; d < 3; d++) {
         EXPECT(false, good, lo[d], 1);

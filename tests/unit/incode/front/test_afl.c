@@ -22,7 +22,7 @@ static uint32_t draw(uint32_t below)
 }
 
 struct plain {
-    uint32_t face[FACES][3];
+    uint32_t face[FACES][4]; /* and whether it is held */
     uint32_t count, most;
 };
 
@@ -53,6 +53,37 @@ static uint32_t faces_at(const struct plain *p, uint32_t first, uint32_t end)
     return n;
 }
 
+/* Whether a face that is held shares an edge at the key. */
+static bool meets_held(const struct plain *p, uint32_t i)
+{
+    const uint32_t *f = p->face[i];
+    for (uint32_t k = 0; k < p->count; k++) {
+        const uint32_t *g = p->face[k];
+        if (k != i && g[0] == f[0] && g[3] != 0 &&
+            (g[1] == f[1] || g[1] == f[2] || g[2] == f[1] || g[2] == f[2]))
+            return true;
+    }
+    return false;
+}
+
+/* Faces at a vertex that can be taken, or that can be held as well. */
+static uint32_t free_at(const struct plain *p, uint32_t v, bool apart)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < p->count; i++)
+        n += p->face[i][0] == v && p->face[i][3] == 0 &&
+             !(apart && meets_held(p, i));
+    return n;
+}
+
+static uint32_t held_of(const struct plain *p)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < p->count; i++)
+        n += p->face[i][3] != 0;
+    return n;
+}
+
 static uint8_t *open_list(struct incode_afl *afl, uint32_t faces,
                           uint32_t bricks)
 {
@@ -77,6 +108,7 @@ static void compare(const struct incode_afl *afl, const struct plain *p)
 {
     assert_int_equal(afl->count, p->count);
     assert_int_equal(afl->count_max, p->most);
+    assert_int_equal(afl->held_count, held_of(p));
     for (uint32_t brick = 0; brick < BRICKS; brick++) {
         const struct incode_touched *entry = incode_afl_find(afl, brick);
         uint32_t first = brick * INCODE_BRICK_POINTS;
@@ -85,7 +117,7 @@ static void compare(const struct incode_afl *afl, const struct plain *p)
         for (uint32_t v = 0; v < INCODE_BRICK_POINTS && entry != NULL; v++) {
             bool pending = (entry->pending >> v & 1) != 0;
             /* The mark may outlast the faces, but never fails them. */
-            if (faces_at(p, first + v, first + v + 1) > 0)
+            if (free_at(p, first + v, true) > 0)
                 assert_true(pending);
         }
     }
@@ -122,24 +154,62 @@ static void toggle_one(struct incode_afl *afl, struct plain *p)
     incode_afl_toggle(afl, f[0], f[1], f[2]);
     if (closes)
         return;
-    memcpy(p->face[p->count++], f, sizeof f);
+    memcpy(p->face[p->count], f, sizeof f);
+    p->face[p->count++][3] = 0;
     p->most = p->count > p->most ? p->count : p->most;
 }
 
 static void take_some(struct incode_afl *afl, struct plain *p)
 {
     uint32_t v = draw_vertex(), pairs[8][2], limit = draw(8) + 1;
-    uint32_t n = faces_at(p, v, v + 1);
+    uint32_t n = free_at(p, v, false);
     bool more = true;
     uint32_t taken = incode_afl_take(afl, v, pairs, limit, &more);
     assert_int_equal(taken, n < limit ? n : limit);
-    assert_int_equal(more, n > taken);
+    assert_int_equal(more, faces_at(p, v, v + 1) > taken);
     for (uint32_t i = 0; i < taken; i++)
         assert_true(take_out(p, v, pairs[i][0], pairs[i][1]));
     const struct incode_touched *entry =
         incode_afl_find(afl, v / INCODE_BRICK_POINTS);
     if (entry != NULL && !more)
         assert_int_equal(entry->pending >> (v % INCODE_BRICK_POINTS) & 1, 0);
+}
+
+static void hold_some(struct incode_afl *afl, struct plain *p)
+{
+    uint32_t v = draw_vertex(), pairs[8][2], limit = draw(8) + 1;
+    uint32_t n = incode_afl_hold(afl, v, pairs, limit);
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t k = find(p, v, pairs[i][0], pairs[i][1]);
+        assert_in_range(k, 0, p->count - 1);
+        assert_int_equal(p->face[k][3], 0);
+        assert_false(meets_held(p, k)); /* nor one of those before it */
+        p->face[k][3] = 1;
+    }
+    if (n < limit)
+        assert_int_equal(free_at(p, v, true), 0);
+}
+
+static void hold_one(struct incode_afl *afl, struct plain *p)
+{
+    uint32_t none[3] = {draw_vertex(), 9, 9};
+    assert_false(incode_afl_hold_face(afl, none[0], none[1], none[2]));
+    if (p->count == 0)
+        return;
+    uint32_t *f = p->face[draw(p->count)];
+    assert_true(incode_afl_hold_face(afl, f[0], f[1], f[2]));
+    f[3] = 1;
+}
+
+static void let_go(struct incode_afl *afl, struct plain *p)
+{
+    uint32_t v = draw_vertex(), held = 0;
+    for (uint32_t i = 0; i < p->count; i++) {
+        held += p->face[i][0] == v && p->face[i][3] != 0;
+        if (p->face[i][0] == v)
+            p->face[i][3] = 0;
+    }
+    assert_int_equal(incode_afl_let_go(afl, v), held);
 }
 
 static void drop_one(struct incode_afl *afl, const struct plain *p)
@@ -160,11 +230,17 @@ static void against_plain(void **unused)
         struct plain p = {.count = 0};
         state = round;
         for (int step = 0; step < 20000; step++) {
-            uint32_t what = draw(16);
+            uint32_t what = draw(20);
             if (what == 0)
                 take_some(&afl, &p);
             else if (what == 1)
                 drop_one(&afl, &p);
+            else if (what == 2)
+                hold_some(&afl, &p);
+            else if (what == 3)
+                hold_one(&afl, &p);
+            else if (what == 4)
+                let_go(&afl, &p);
             else
                 toggle_one(&afl, &p);
             if (step % 256 == 0)

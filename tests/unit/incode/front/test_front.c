@@ -77,7 +77,8 @@ static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
         memcpy(v[i] + 1, apexes[i], sizeof apexes[i]);
         const double *const p[4] = {at(w, v[i][0]), at(w, v[i][1]),
                                     at(w, v[i][2]), at(w, v[i][3])};
-        uint32_t brick = v[i][incode_owner(p)] / INCODE_BRICK_POINTS;
+        uint32_t brick = v[i][incode_owner(INCODE_OWNER_SMALLEST, v[i], p)] /
+                         INCODE_BRICK_POINTS;
         assert_in_range(brick, w->front.job.first, w->front.job.last - 1);
         assert_false(w->committed[brick]);
     }
@@ -489,7 +490,13 @@ static void one_owner(void **unused)
     for (int k = 0; k < 4; k++) {
         const double *const p[4] = {corner[turns[k][0]], corner[turns[k][1]],
                                     corner[turns[k][2]], corner[turns[k][3]]};
-        assert_int_equal(turns[k][incode_owner(p)], 1);
+        uint32_t v[4];
+        for (int i = 0; i < 4; i++)
+            v[i] = turns[k][i] ^ 2; /* the lowest of them is corner 2 */
+        unsigned i = incode_owner(INCODE_OWNER_SMALLEST, v, p);
+        assert_int_equal(turns[k][i], 1);
+        i = incode_owner(INCODE_OWNER_LOWEST, v, p);
+        assert_int_equal(turns[k][i], 2);
     }
 }
 

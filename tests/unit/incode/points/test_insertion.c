@@ -1,7 +1,6 @@
-/* The tetrahedra of own bricks from the triangulation of all points, in memory
- * that holds it whole or only what is not final yet: every size of memory,
- * every range of bricks, rooms outside that are small, sets that span no space,
- * steps that are short. */
+/* The tetrahedra of own bricks from the triangulation of all points: every size
+ * of memory, whether it holds all or only what is not final yet, every range of
+ * bricks, small rooms outside, sets that span no space, short steps. */
 #include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -522,9 +521,10 @@ static void expect_no_space(const double (*p)[3], uint32_t n)
     struct bare bare = {p, n, {0}, 0};
     const struct incode_setup setup = {
         .bricks = (n + 63) / 64, .index = INCODE_KD, .hi = {1000, 1000, 1000}};
-    const struct incode_outside outside = {
-        {&bare, bare_request},
-        {&world.solo, emit_room, emit, commit, solo_spill, solo_unspill}};
+    const struct incode_outside outside = {.pages = {&bare, bare_request},
+                                           .front = {&world.solo, emit_room,
+                                                     emit, commit, solo_spill,
+                                                     solo_unspill}};
     const char *why = "";
     memset(&world, 0, sizeof world);
     world.solo.arena = aligned_alloc(64, 1 << 20);

@@ -1,0 +1,143 @@
+/* Fronts that share one active face list: each has the faces of its own
+ * vertices, and they tell each other the tetrahedra that they build.
+ *
+ * Regions are runs of bricks.  A tetrahedron belongs to the front that owns its
+ * lowest vertex (its number; owner.h); only that front builds it, toggles its
+ * own faces and shares it with the owners of its other vertices, who toggle
+ * theirs (incode_front_take).  A facet of the hull is the business of its
+ * lowest vertex, and is shared likewise.  So each tetrahedron toggles once
+ * everywhere, and no double has to be recognised.
+ *
+ * A face is pursued by the owner of its lowest vertex alone; the others keep it
+ * open until they hear of its tetrahedra.  Where the apex found is lower still
+ * and foreign, the tetrahedron is the apex's owner's to build: the face stays
+ * open until it comes.  Nobody ever has to build across such a face:
+ *
+ *   All tetrahedra are built if each vertex without a lower neighbour has a
+ *   first one.  By induction on the number of a vertex v: all tetrahedra of v
+ *   with a lower vertex are built, as their lowest vertex is below v.  The link
+ *   of v is a sphere or a disk, so its triangles hang together by edges.  If v
+ *   has a lower neighbour, there are triangles with a lower vertex, and a way
+ *   leads from them to each triangle that has none; where it enters such
+ *   triangles it crosses an edge (b, c), b and c above v: the face (v, b, c)
+ *   has v lowest and is open, its owner pursues it and builds the next
+ *   tetrahedron, which is v's, and so on.  If v has no lower neighbour, the
+ *   same way leads on from its first tetrahedron.
+ *
+ * When all fronts are quiet, the lowest vertex at which something is missing
+ * has thus no tetrahedron at all, so it is enough to try a first one at each
+ * vertex that has none (incode_front_seed_all), once: where it is foreign, the
+ * vertex has a lower neighbour and will be reached.  One at the start, wherever
+ * it is the front's own, sets it to work.
+ *
+ * Order of work: highest bricks first, as it is low ones that wait for others;
+ * and faces that look out of the region to where lower ones are come last, as
+ * their tetrahedra may come by themselves.
+ *
+ * A brick is committed when no open face has a vertex of it and all of its
+ * vertices are reached: its stars are closed for good.  A sweep over the list
+ * now and then finds such bricks: it marks those that a face touches, and
+ * whatever is opened meanwhile marks its own.
+ *
+ * Memory: struct incode_exchange, in the front, and incode_exchange_bytes:
+ * three bits a brick.  Work: a sweep looks at 256 lists or 512 entries a call,
+ * and at each face once for four that are built; to let faces go, it looks at
+ * the lists of a brick; a tetrahedron that is taken toggles four faces.
+ *
+ *     incode_front_exchange(&front, &peers, lo, maps);
+ *     incode_front_start(&front, &job);
+ *     (void)incode_front_take(&front, built);   // by another
+ */
+#ifndef INCODE_EXCHANGE_H
+#define INCODE_EXCHANGE_H
+
+#include "front.h"
+
+/* Bytes of the maps for so many bricks. */
+static inline size_t incode_exchange_bytes(uint32_t bricks)
+{
+    return 3 * (((size_t)bricks + 63) / 64) * sizeof(uint64_t);
+}
+
+/* From now on the front exchanges.  lo: of the box of all points.  maps:
+ * incode_exchange_bytes of all bricks, aligned to 8 bytes; they stay.  The
+ * owner rule is INCODE_OWNER_LOWEST, the face rule INCODE_FACE_OWN. */
+void incode_front_exchange(struct incode_front *front,
+                           const struct incode_front_peers *peers,
+                           const double lo[3], uint64_t *maps);
+
+/* A tetrahedron that another front has built, of positive orientation, with an
+ * own vertex; v[3] = INCODE_NONE: a facet of the hull, as it was open.  0; -1:
+ * it is none that can come. */
+int incode_front_take(struct incode_front *front, const uint32_t v[4]);
+
+/* All fronts are quiet, and nothing is under way: first tetrahedra are to be
+ * tried where there are none. */
+void incode_front_seed_all(struct incode_front *front);
+
+/* Whether there is nothing to do until a tetrahedron comes. */
+static inline bool incode_front_is_quiet(const struct incode_front *front)
+{
+    return front->finished || front->exchange.quiet;
+}
+
+/* Own bricks that are not committed. */
+static inline uint32_t incode_front_left(const struct incode_front *front)
+{
+    return front->finished ? 0 : front->exchange.left;
+}
+
+/* ---- for the other files of the front ---- */
+
+/* A job begins. */
+void incode_exchange_start(struct incode_front *front);
+
+/* As incode_front_next and incode_front_count. */
+enum incode_turn incode_exchange_next(struct incode_front *front,
+                                      uint32_t *which);
+enum incode_turn incode_exchange_count(struct incode_front *front,
+                                       uint32_t count);
+
+/* Begins a task; INCODE_TURN_WAIT: all are in use (order.c). */
+enum incode_turn incode_front_begin(struct incode_front *front, uint32_t v,
+                                    bool seed, uint32_t *which);
+
+/* Whether there is room for a star (front.c). */
+bool incode_front_has_room(const struct incode_front *front);
+
+/* Asks for the next spilled brick, if there is one and room for it (order.c).
+ */
+bool incode_front_fetch(struct incode_front *front);
+
+/* Whether a face, or a tetrahedron, is another's to build. */
+static inline bool incode_exchange_is_foreign(const struct incode_front *front,
+                                              const uint32_t *v, unsigned count)
+{
+    return front->exchange.on && !incode_own(front, v[incode_lowest(v, count)]);
+}
+
+/* Whether a tetrahedron is so near a side of the region beyond which there are
+ * lower ones that its faces may look out there; p: its vertices' coordinates.
+ */
+bool incode_exchange_is_near(const struct incode_front *front,
+                             const double *const p[4]);
+
+/* Whether a face does: a step of an edge's length from its centre outward leads
+ * below the region's box. */
+bool incode_exchange_is_outward(const struct incode_front *front,
+                                const double *const p[3]);
+
+/* Opens f or closes its twin, in the list of f[0]. */
+void incode_exchange_toggle(struct incode_front *front, const uint32_t f[3],
+                            enum incode_face_state state);
+
+/* A face of the vertex may be open. */
+void incode_exchange_ready(struct incode_front *front, uint32_t v);
+
+/* A brick that was spilled is whole again. */
+void incode_exchange_returned(struct incode_front *front, uint32_t brick);
+
+/* Tells the others of a tetrahedron or facet of the hull that was built. */
+void incode_exchange_share(struct incode_front *front, const uint32_t v[4]);
+
+#endif

@@ -1,0 +1,184 @@
+/* Triangulators that share one active face list: whatever the order in which
+ * they hear of each other, the triangulation is the same, each tetrahedron is
+ * built once, and each brick is committed once. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/mesh/gen.h"
+#include "several.h"
+#include "tests/unit/reference.h"
+
+static void expect(const struct several *start, const struct host_points *p,
+                   const char *digest, const char *name)
+{
+    static struct several all;
+    memcpy(&all, start, sizeof all);
+    several_run(&all, p->xyz, p->count);
+    if (strcmp(all.solo.digest.text, digest) != 0)
+        fail_msg("%s, %u regions, index %d, seed %llu: %s, expected %s", name,
+                 start->solo.regions, start->solo.index,
+                 (unsigned long long)start->seed, all.solo.digest.text, digest);
+    several_close(&all);
+}
+
+static void expect_all(const struct host_points *points, const char *name)
+{
+    static const uint32_t counts[] = {1, 2, 4, 8, 16, 32};
+    struct host_tetrahedra tets = {0};
+    struct host_digest digest;
+    static struct several start;
+    uint64_t seed = 7;
+    reference_delaunay(points->xyz, (uint32_t)points->count, &tets);
+    host_tetrahedra_sort(&tets);
+    host_digest(&tets, &digest);
+    host_tetrahedra_free(&tets);
+    for (unsigned k = 0; k < 24; k++) {
+        seed = seed * UINT64_C(6364136223846793005) + 1442695040888963;
+        memset(&start, 0, sizeof start);
+        start.solo.index = k % 8 == 7   ? INCODE_NAIVE
+                           : k % 8 == 3 ? INCODE_GRID
+                                        : INCODE_KD;
+        start.solo.regions = counts[k % 6];
+        start.solo.partition = (enum host_partition)(seed % 3);
+        start.solo.memory = seed >> 62 & 1 ? 0 : 1 << 20;
+        start.solo.shuffle = seed >> 61 & 1 ? seed : 0;
+        start.solo.chance = seed >> 60 & 1 ? seed : 0;
+        start.solo.units = seed >> 59 & 1;
+        start.solo.pressure = k % 4 == 1 ? 600 : 0;
+        start.seed = seed | 1;
+        start.one_by_one = seed >> 58 & 1;
+        expect(&start, points, digest.text, name);
+    }
+}
+
+static void made_sets(void **unused)
+{
+    (void)unused;
+    static const char *const kinds[] = {
+        "uniform", "bubbles", "bluntfin", "sphere", "grid", "rotated", "hub"};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        struct host_points points = {0};
+        struct host_error error = {0};
+        if (host_gen(kinds[i], 800, 5, &points, &error) != 0)
+            fail_msg("%s", error.text);
+        expect_all(&points, kinds[i]);
+        host_points_free(&points);
+    }
+}
+
+static void degenerate_sets(void **unused)
+{
+    (void)unused;
+    static const char *const names[] = {
+        "deg_cgal_T3_1",           "deg_cgal_grid5",
+        "deg_cgal_nested_cubes",   "deg_mourner_orient3d_denormal",
+        "deg_octahedron",          "deg_quickhull3d_issue2",
+        "deg_spirula_60_thin_tet", "deg_trimesh_1446"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        struct host_points points = {0};
+        char file[96];
+        (void)snprintf(file, sizeof file, "%s.xyz", names[i]);
+        if (!reference_data(file, &points)) {
+            print_message("%s: not there\n", file);
+            skip();
+        }
+        expect_all(&points, names[i]);
+        host_points_free(&points);
+    }
+}
+
+/* A share of what is built in vain, and how evenly it is spread: what the paper
+ * repeated 1.34 times at 32 nodes, for 20,000 points. */
+static void little_in_vain(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    static struct several all;
+    all = (struct several){.seed = 5,
+                           .solo = {.index = INCODE_KD,
+                                    .regions = 32,
+                                    .partition = HOST_OWNED,
+                                    .memory = 1 << 20}};
+    if (host_gen("uniform", 20000, 5, &points, &error) != 0)
+        fail_msg("%s", error.text);
+    several_run(&all, points.xyz, points.count);
+    assert_in_range(all.built, all.kept, all.kept + all.kept * 12 / 100);
+    for (uint32_t i = 0; i < all.solo.regions; i++)
+        assert_in_range(all.node[i].solo.t->front.counts.kept,
+                        all.kept / 32 * 4 / 5, all.kept / 32 * 6 / 5);
+    several_close(&all);
+    host_points_free(&points);
+}
+
+/* What cannot come of another is told so, and changes nothing. */
+static void refusals(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    static struct several all;
+    all =
+        (struct several){.seed = 5, .solo = {.index = INCODE_KD, .regions = 2}};
+    if (host_gen("uniform", 500, 5, &points, &error) != 0)
+        fail_msg("%s", error.text);
+    several_open(&all, points.xyz, points.count);
+    struct incode_triangulator *t = all.node[1].solo.t;
+    uint32_t first = all.node[1].solo.job.first * INCODE_BRICK_POINTS;
+    uint32_t past = all.solo.order.bricks * INCODE_BRICK_POINTS;
+    const uint32_t wrong[][4] = {
+        {first, first + 1, first + 2, first + 3}, /* its own */
+        {0, 1, 2, 3},                             /* nothing to it */
+        {0, first, first, first + 1},             /* a vertex twice */
+        {0, first, first + 1, past},              /* no point */
+        {first, first + 1, first + 2, INCODE_NONE}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
+        assert_int_equal(incode_triangulator_take(t, wrong[i]), -1);
+    assert_int_equal(t->front.afl.count, 0);
+    several_work(&all);
+    several_gather(&all);
+    assert_int_equal(incode_triangulator_take(t, wrong[0]), -1);
+    several_close(&all);
+    host_points_free(&points);
+}
+
+/* A tetrahedron that comes twice is noticed. */
+static void twice(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    static struct several all;
+    all =
+        (struct several){.seed = 5, .solo = {.index = INCODE_KD, .regions = 2}};
+    if (host_gen("uniform", 500, 5, &points, &error) != 0)
+        fail_msg("%s", error.text);
+    several_open(&all, points.xyz, points.count);
+    while (all.share_count == 0)
+        (void)solo_step(&all.node[0].solo, 1);
+    struct incode_triangulator *t = all.node[1].solo.t;
+    const struct several_share share = all.share[0];
+    assert_int_equal(share.to, 1);
+    assert_int_equal(incode_triangulator_take(t, share.v), 0);
+    assert_null(incode_triangulator_fault(t));
+    (void)incode_triangulator_take(t, share.v);
+    assert_non_null(incode_triangulator_fault(t));
+    several_close(&all);
+    host_points_free(&points);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(made_sets),      cmocka_unit_test(degenerate_sets),
+        cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),
+        cmocka_unit_test(twice),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

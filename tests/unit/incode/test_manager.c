@@ -1,0 +1,220 @@
+/* A face manager and tetrahedron builders together, without a node: whatever
+ * is late, and in whatever order, the result is that of the triangulator. */
+#include "host/mesh/gen.h"
+#include "tests/unit/emulated.h"
+#include "tests/unit/incode/lend_scene.h"
+#include "tests/unit/incode/solo.h"
+#include "tests/unit/reference.h"
+
+static void expect(const double *xyz, uint64_t n, struct host_digest *digest)
+{
+    struct solo solo = {
+        .index = INCODE_KD, .regions = 1, .build = INCODE_BUILD_FACES};
+    solo_run(&solo, xyz, n);
+    *digest = solo.digest;
+    solo_close(&solo);
+}
+
+static void run(struct lend *lend, const struct host_points *set,
+                const struct host_digest *digest)
+{
+    lend_run(lend, set->xyz, set->count);
+    assert_string_equal(lend->digest.text, digest->text);
+}
+
+static void make(const char *kind, uint64_t n, struct host_points *set)
+{
+    struct host_error error = {0};
+    if (host_gen(kind, n, 5, set, &error) != 0)
+        fail_msg("%s", error.text);
+}
+
+/* Every kind of points, every index, one builder and several, at once and by
+ * chance. */
+static void kinds(void **unused)
+{
+    (void)unused;
+    static const char *const names[] = {"uniform", "bluntfin", "rotated",
+                                        "sphere",  "grid",     "hub"};
+    static const uint32_t shapes[][3] = {
+        {1, 96, 2}, {1, 1, 1}, {3, 8, 2}, {7, 5, 3}};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        struct host_points set = {0};
+        struct host_digest digest;
+        make(names[i], SANITIZED ? 200 : 500, &set);
+        expect(set.xyz, set.count, &digest);
+        for (unsigned k = 0; k < 4; k++) {
+            for (uint64_t chance = 0; chance < 3; chance++) {
+                struct lend lend = {.builders = shapes[k][0],
+                                    .faces = shapes[k][1],
+                                    .jobs = shapes[k][2],
+                                    .chance = chance * (i + k + 1),
+                                    .shuffle = chance,
+                                    .units = chance == 2 ? 3 : 0};
+                run(&lend, &set, &digest);
+                lend_close(&lend);
+            }
+        }
+        host_points_free(&set);
+    }
+}
+
+static void indexes(void **unused)
+{
+    (void)unused;
+    struct host_points set = {0};
+    struct host_digest digest;
+    make("uniform", 400, &set);
+    expect(set.xyz, set.count, &digest);
+    static const uint8_t indexes_in_turn[] = {INCODE_NAIVE, INCODE_GRID};
+    for (unsigned i = 0; i < 2; i++) {
+        struct lend lend = {.builders = 3,
+                            .faces = 4,
+                            .jobs = 2,
+                            .index = indexes_in_turn[i],
+                            .chance = 5};
+        run(&lend, &set, &digest);
+        lend_close(&lend);
+    }
+    host_points_free(&set);
+}
+
+/* Faces are lent, then spilled, then lent again: what comes late of them does
+ * not count. */
+static void spilled(void **unused)
+{
+    (void)unused;
+    struct host_points set = {0};
+    struct host_digest digest;
+    make("uniform", SANITIZED ? 1000 : 2500, &set);
+    expect(set.xyz, set.count, &digest);
+    for (uint32_t k = 0; k < 4; k++) {
+        struct lend lend = {.builders = 1 + 2 * k,
+                            .faces = 1 + 30 * k,
+                            .jobs = 2,
+                            .chance = k + 1,
+                            .pressure = 500};
+        run(&lend, &set, &digest);
+        assert_true(lend.all.afl_spilled > 0);
+        lend_close(&lend);
+    }
+    host_points_free(&set);
+}
+
+/* A list that asks for more faces than there are open ever. */
+static void job_larger_than_the_list(void **unused)
+{
+    (void)unused;
+    struct host_points set = {0};
+    struct host_digest digest;
+    make("uniform", 12, &set);
+    expect(set.xyz, set.count, &digest);
+    for (uint32_t builders = 1; builders <= LEND_BUILDERS; builders *= 2) {
+        struct lend lend = {.builders = builders,
+                            .faces = INCODE_LIST_MAX,
+                            .jobs = INCODE_LISTS_MAX};
+        run(&lend, &set, &digest);
+        assert_true(lend.all.afl_max < INCODE_LIST_MAX);
+        lend_close(&lend);
+    }
+    host_points_free(&set);
+}
+
+/* A single tetrahedron: all its faces are of the hull, and the list is empty
+ * when they are answered. */
+static void all_faces_on_the_hull(void **unused)
+{
+    (void)unused;
+    double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const struct host_points set = {.xyz = xyz, .count = 4};
+    for (uint32_t builders = 1; builders <= 3; builders++) {
+        struct lend lend = {.builders = builders, .faces = 4, .jobs = 2};
+        lend_run(&lend, set.xyz, set.count);
+        assert_int_equal(lend.tets.count, 1);
+        assert_int_equal(lend.all.hull_facets, 4);
+        assert_int_equal(lend.empty_faces, 4);
+        assert_int_equal(lend.all.seeds, 1);
+        lend_close(&lend);
+    }
+}
+
+/* A job without bricks: nothing is lent, and it is done. */
+static void empty_list(void **unused)
+{
+    (void)unused;
+    double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    struct lend lend = {.builders = 1, .faces = 4, .jobs = 1};
+    struct incode_list list;
+    lend_open(&lend, xyz, 4);
+    incode_manager_start(&lend.manager, &(struct incode_job){0});
+    assert_int_equal(incode_manager_lend(&lend.manager, 4, &list), 0);
+    for (int i = 0; incode_manager_step(&lend.manager, 1) != INCODE_FINISHED;
+         i++)
+        assert_in_range(i, 0, 10);
+    assert_int_equal(incode_manager_lend(&lend.manager, 4, &list), 0);
+    lend_close(&lend);
+}
+
+/* What no builder says, and what no manager asks. */
+static void unsound(void **unused)
+{
+    (void)unused;
+    double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    static const struct incode_answers wrong[] = {
+        {0, 1, {{0, 1, 2, 3}}},
+        {4, 1, {{0, 1, 2, 3}}},
+        {INCODE_LIST_FACES, INCODE_LIST_MAX + 1, {{0, 1, 2, 3}}},
+        {INCODE_LIST_FACES, 1, {{0, 1, 1, 3}}},
+        {INCODE_LIST_FACES, 1, {{0, 1, 2, 2}}},
+        {INCODE_LIST_FACES, 1, {{0, 1, 64, 3}}},
+        {INCODE_LIST_FACES, 1, {{0, 1, 2, 64}}},
+        {INCODE_LIST_FIRST, 1, {{0, 1, 2, INCODE_NONE}}},
+        {INCODE_LIST_COUNT, 1, {{0, 0, 0, 0}}},
+        {INCODE_LIST_COUNT, 1, {{0, 65, 0, 0}}}};
+    static const struct incode_list lists[] = {
+        {0, 1, {{0, 1, 2}}},
+        {INCODE_LIST_FACES, 0, {{0, 1, 2}}},
+        {INCODE_LIST_FACES, 97, {{0, 1, 2}}},
+        {INCODE_LIST_FACES, 1, {{0, 1, 64}}},
+        {INCODE_LIST_FACES, 1, {{0, 1, 1}}},
+        {INCODE_LIST_FIRST, 1, {{64, 0, 0}}},
+        {INCODE_LIST_FIRST, 2, {{0, 0, 0}, {1, 0, 0}}},
+        {INCODE_LIST_COUNT, 1, {{1, 0, 0}}}};
+    struct lend lend = {.builders = 1, .faces = 4, .jobs = 1};
+    struct incode_list list;
+    lend_open(&lend, xyz, 4);
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        lend.manager.lists = 0;
+        incode_manager_start(&lend.manager, &(struct incode_job){.last = 1});
+        assert_true(incode_manager_lend(&lend.manager, 4, &list) > 0);
+        incode_manager_take(&lend.manager, &wrong[i]);
+        assert_int_equal(incode_manager_step(&lend.manager, 1), INCODE_BROKEN);
+    }
+    lend.manager.lists = 0;
+    incode_manager_start(&lend.manager, &(struct incode_job){.last = 1});
+    incode_manager_take(
+        &lend.manager, /* nobody has asked */
+        &(struct incode_answers){INCODE_LIST_COUNT, 1, {{0, 4, 0, 0}}});
+    assert_non_null(incode_manager_fault(&lend.manager));
+    struct incode_builder *b = &lend.builder[0].builder;
+    for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
+        b->fault = NULL;
+        assert_true(incode_builder_take(b, &lists[i]));
+        assert_int_equal(incode_builder_step(b, 1), INCODE_BROKEN);
+    }
+    lend_close(&lend);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(kinds),
+        cmocka_unit_test(indexes),
+        cmocka_unit_test(spilled),
+        cmocka_unit_test(job_larger_than_the_list),
+        cmocka_unit_test(all_faces_on_the_hull),
+        cmocka_unit_test(empty_list),
+        cmocka_unit_test(unsound),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
