@@ -15,16 +15,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "incode/list.h"
 #include "incode/triangulator.h"
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 7,              /* both ends must agree */
+    NODE_PROTOCOL = 8,              /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
     NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got */
     NODE_FAULT_TEXT_MAX = 200,      /* bytes */
     NODE_FACES_A_MESSAGE = 128, /* faces in one NODE_SPILL or NODE_UNSPILL */
-    NODE_TABLES_MAX = 8         /* of a role, in its memory map */
+    NODE_REGIONS_A_MESSAGE = 256,
+    NODE_BUILDERS_MAX = 1023, /* of a face manager */
+    NODE_OUT_MAX = 6,         /* regions put and not taken, or not told of */
+    NODE_TABLES_MAX = 8       /* of a role, in its memory map */
 };
 
 enum node_message_type {
@@ -37,6 +41,8 @@ enum node_message_type {
     NODE_REPORT,    /* nothing: asks for NODE_FINISHED, without a job */
     NODE_STOP,      /* nothing, to all: the run is over */
     NODE_PING,      /* struct node_ping_message: asks for NODE_PONG */
+    NODE_REGIONS,   /* struct node_regions_message, then first bricks */
+    NODE_OUT,       /* struct incode_job: to be put into the tuple space */
     /* To the host. */
     NODE_READY = 32,   /* struct node_ready_message */
     NODE_PAGE_REQUEST, /* uint32 page numbers; also to a holder */
@@ -45,15 +51,34 @@ enum node_message_type {
     NODE_UNSPILL_REQUEST, /* struct node_spill_header */
     NODE_FINISHED,        /* struct node_finished_message */
     NODE_FAULT,           /* text without a final 0 */
-    NODE_PONG             /* struct node_pong_message */
+    NODE_PONG,            /* struct node_pong_message */
+    NODE_TAKEN,           /* struct node_taken_message */
+    /* From a face manager to a builder, and back: incode/list.h. */
+    NODE_LIST = 64, /* struct incode_list, as much as is in use */
+    NODE_ANSWERS,   /* struct incode_answers, likewise */
+    /* From a node to another: transport/TUPLES.md. */
+    NODE_TUPLES = 72,
+    /* Between nodes of an exchange. */
+    NODE_SHARE = 80, /* struct node_shared, one after another */
+    NODE_WAVE,       /* struct node_wave_message */
+    NODE_WAVE_ANSWER /* struct node_wave_answer_message */
 };
 
 /* What a node does in a generation of the wiring: a row of roles/roles.c. */
 enum node_role_number {
-    NODE_WORKER = 1,         /* triangulates the jobs that it is given */
-    NODE_HOLDER = 2,         /* keeps pages for others */
-    NODE_ROLES = NODE_HOLDER /* the last */
+    NODE_WORKER = 1,        /* triangulates the jobs that it is given */
+    NODE_HOLDER = 2,        /* keeps pages for others */
+    NODE_MANAGER = 3,       /* lends the faces of its jobs to builders */
+    NODE_BUILDER = 4,       /* finds apexes for a manager */
+    NODE_LINDA_MANAGER = 5, /* as those two, over a tuple space of which */
+    NODE_LINDA_BUILDER = 6, /* each carries a share */
+    NODE_EXCHANGE = 7,      /* triangulates with all others: exchange.h */
+    NODE_LINDA_WORKER = 8,  /* a worker that takes its job from that space */
+    NODE_ROLES = NODE_LINDA_WORKER /* the last */
 };
+
+/* No page: see struct node_pong_message. */
+#define NODE_AWAITS_OTHERS (INCODE_NONE - 1)
 
 /* Counted messages are all that go between the host and one node, NODE_STOP
  * apart; both sides count them anew in each generation of the cube's wiring.
@@ -73,8 +98,10 @@ struct node_pong_message {
     uint32_t refused;  /* bit d: who is at the other end has not its key */
     uint32_t work;     /* steps and messages of its role since this start: a
                           change is progress, of whatever size */
-    uint32_t awaited;  /* a page that it has asked for and not got, or
-                          INCODE_NONE: who keeps it holds the node up */
+    uint32_t awaited;  /* a page that it has asked for and not got: who keeps it
+                          holds the node up; or NODE_AWAITS_OTHERS: it has
+                          nothing to do until they get on; or INCODE_NONE */
+    uint32_t owing;    /* a node that owes it answers, or CUBE_HOST: likewise */
 };
 
 /* Begins a node's role; sent once a generation to each node.  There are no
@@ -104,9 +131,26 @@ struct node_setup_message {
 
     /* The points and how to search them: incode/triangulator.h. */
     struct incode_setup setup;
+
+    /* What follows is a face manager's or a builder's, and else 0.  Of a
+     * builder: its manager, another node. */
+    uint16_t manager;
+
+    /* Of a manager: faces a list, 1 to INCODE_LIST_MAX (incode/list.h). */
+    uint16_t faces_per_job;
+
+    /* Lists that a builder may have at a time, 1 to INCODE_LISTS_MAX
+     * (incode/builder.h). */
+    uint16_t jobs_per_worker;
+
+    uint16_t reserved2; /* 0 */
+
+    /* Of a manager: its builders, node i in bit i % 8 of byte i / 8; one or
+     * more, and not itself. */
+    uint8_t builders[(NODE_BUILDERS_MAX + 1) / 8];
 };
 
-/* A range of bricks, for a worker that has no other. */
+/* A range of bricks, for a worker or a face manager that has no other. */
 struct node_job_message {
     /* Of this job, 1 or more and of no other job of the run: results of another
      * epoch are not counted. */
@@ -127,12 +171,53 @@ struct node_result_header {
     uint32_t sent;
 };
 
+/* A node has taken a region out of the tuple space: bricks [first, last). */
+struct node_taken {
+    uint32_t node, first, last;
+};
+
+struct node_taken_message {
+    struct node_result_header header; /* of epoch 0 */
+    struct node_taken taken;
+};
+
 struct node_spill_header {
     uint32_t epoch;
     uint32_t brick; /* of NODE_UNSPILL and its request */
     uint32_t count; /* faces that follow */
     uint32_t last;  /* NODE_UNSPILL: no more of this brick */
     uint32_t sent;  /* NODE_UNSPILL and its request */
+};
+
+/* The bricks with which regions `first`, `first` + 1 .. begin, `count` of them,
+ * follow: of each node, and after the last one of a node that there is not. */
+struct node_regions_message {
+    uint32_t first, count;
+};
+
+/* A tetrahedron of positive orientation that another node has built, for an
+ * owner of one of its vertices; v[3] = INCODE_NONE: a facet of the hull. */
+struct node_shared {
+    uint32_t v[4];
+};
+
+enum node_wave_command {
+    NODE_WAVE_READY = 1, /* who can receive from others answers */
+    NODE_WAVE_COUNT,     /* who is quiet answers */
+    NODE_WAVE_SEED       /* the same, and tries first tetrahedra before */
+};
+
+struct node_wave_message {
+    uint32_t number; /* 1 and up, one after another */
+    uint32_t command;
+};
+
+/* Sums over a node and those below it. */
+struct node_wave_answer_message {
+    uint32_t number;
+    uint32_t reserved;       /* 0 */
+    uint64_t sent, received; /* struct node_shared */
+    uint64_t left;           /* bricks that are not committed */
 };
 
 /* The memory map of a node, in bytes: all of it, what its board holds outside
@@ -177,10 +262,12 @@ struct node_finished_message {
 /* The layouts are the same on every processor. */
 static_assert(sizeof(struct incode_face) == 12, "face layout");
 static_assert(sizeof(struct incode_job) == 56, "job layout");
-static_assert(sizeof(struct node_pong_message) == 36, "pong layout");
+static_assert(sizeof(struct node_pong_message) == 40, "pong layout");
 static_assert(sizeof(struct node_job_message) == 64, "job layout");
+static_assert(sizeof(struct node_shared) == 16, "share layout");
+static_assert(sizeof(struct node_wave_answer_message) == 32, "wave layout");
 static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
-static_assert(sizeof(struct node_setup_message) == 96, "setup layout");
+static_assert(sizeof(struct node_setup_message) == 232, "setup layout");
 static_assert(offsetof(struct node_setup_message, setup) == 16, "setup layout");
 static_assert(sizeof(struct node_map) == 32 + 8 * NODE_TABLES_MAX,
               "map layout");
@@ -194,6 +281,8 @@ static_assert(offsetof(struct node_finished_message, statistics) == 80,
               "statistics layout");
 static_assert(sizeof(struct node_finished_message) <= CUBE_PAYLOAD_MAX,
               "statistics fit a message");
+static_assert(sizeof(struct incode_answers) <= CUBE_PAYLOAD_MAX,
+              "answers fit a message");
 static_assert(4 + INCODE_PAGE_BYTES <= CUBE_PAYLOAD_MAX,
               "a page fits a message");
 static_assert(sizeof(struct node_spill_header) +

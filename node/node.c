@@ -189,6 +189,11 @@ static bool read_setup(struct node *n, const struct cube_message *message,
             return false;
         }
     }
+    if (setup->reserved2 != 0) {
+        node_fault_set(&n->fault, "invalid setup: what is reserved is #",
+                       setup->reserved2, 0);
+        return false;
+    }
     return true;
 }
 
@@ -234,10 +239,10 @@ static void take_ping(struct node *n, const struct cube_message *message)
 static bool is_expected(struct node *n, const struct cube_message *message)
 {
     uint8_t type = message->type;
-    bool host_only = type == NODE_SETUP || type == NODE_JOB ||
-                     type == NODE_CREDIT || type == NODE_UNSPILL ||
-                     type == NODE_REPORT || type == NODE_STOP ||
-                     type == NODE_PING;
+    bool host_only =
+        type == NODE_SETUP || type == NODE_JOB || type == NODE_CREDIT ||
+        type == NODE_UNSPILL || type == NODE_REPORT || type == NODE_STOP ||
+        type == NODE_PING || type == NODE_REGIONS || type == NODE_OUT;
     if (host_only && message->source != CUBE_HOST) {
         node_fault_set(&n->fault,
                        "message of type # from node #, expected the host", type,
@@ -368,6 +373,9 @@ static bool send_pong(struct node *n)
     n->pong.work = n->work;
     n->pong.awaited =
         n->role == NULL ? INCODE_NONE : n->role->awaited(n->role_arena);
+    n->pong.owing = n->role == NULL || n->role->owing == NULL
+                        ? CUBE_HOST
+                        : n->role->owing(n->role_arena);
     return node_counted_write(&n->counted, CUBE_HOST, NODE_PONG, &n->pong,
                               sizeof n->pong) == 0;
 }
@@ -425,12 +433,11 @@ static void send_fault(struct node *n)
                                        n->fault.text, n->fault.size) == 0;
 }
 
-static unsigned serve_role(struct node *n)
+/* What the role has to say, and what is asked of it. */
+static unsigned send_role(struct node *n)
 {
     const struct node_role *role = n->role;
-    node_pace_begin(&n->pace, n->now_us);
-    unsigned moved =
-        role->work(n->role_arena, &n->pace) + role->send(n->role_arena);
+    unsigned moved = role->send(n->role_arena);
     n->work += moved;
     uint32_t epoch = role->done(n->role_arena);
     if (!node_fault_is_set(&n->fault) && epoch != 0 &&
@@ -473,7 +480,7 @@ static bool may_stop(struct node *n)
     return true;
 }
 
-enum node_event node_step(struct node *node)
+unsigned node_receive(struct node *node)
 {
     struct cube_message message;
     node->now_us = node->board->now_us(node->board->context);
@@ -485,7 +492,28 @@ enum node_event node_step(struct node *node)
         cube_release(node->cube);
         moved++;
     }
-    bool sound = !node_fault_is_set(&node->fault) && node->role != NULL;
+    return moved;
+}
+
+static bool is_sound(const struct node *n)
+{
+    return !node_fault_is_set(&n->fault) && n->role != NULL;
+}
+
+unsigned node_work(struct node *node)
+{
+    if (!is_sound(node) || node->owes_pong || node->owes_ready) {
+        return 0;
+    }
+    node_pace_begin(&node->pace, node->now_us);
+    unsigned worked = node->role->work(node->role_arena, &node->pace);
+    node->work += worked;
+    return worked;
+}
+
+enum node_event node_send(struct node *node, unsigned moved)
+{
+    bool sound = is_sound(node);
     if (node_fault_is_set(&node->fault) && !node->fault_sent) {
         send_fault(node);
     } else if (node->owes_pong) {
@@ -493,13 +521,19 @@ enum node_event node_step(struct node *node)
     } else if (sound && node->owes_ready) {
         node->owes_ready = !send_ready(node);
     } else if (sound) {
-        moved += serve_role(node);
+        moved += send_role(node);
         moved += node_fault_is_set(&node->fault); /* to be told at once */
     }
     if (may_stop(node)) {
         return NODE_STOPPED;
     }
     return moved > 0 ? NODE_BUSY : NODE_IDLE;
+}
+
+enum node_event node_step(struct node *node)
+{
+    unsigned moved = node_receive(node);
+    return node_send(node, moved + node_work(node));
 }
 
 uint64_t node_wait_us(const struct node *node)
@@ -514,6 +548,19 @@ uint64_t node_wait_us(const struct node *node)
 uint32_t node_held(const struct node *node)
 {
     return node->role == NULL ? 0 : node->role->held(node->role_arena);
+}
+
+void node_account(const struct node *node, struct node_finished_message *totals)
+{
+    *totals = node->before;
+    if (node->role != NULL) {
+        role_totals(node, totals);
+    }
+}
+
+const struct cube_statistics *node_messages(const struct node *node)
+{
+    return cube_statistics(node->cube);
 }
 
 void node_run(struct node *node)

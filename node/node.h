@@ -36,11 +36,27 @@ size_t node_arena_needed(const struct node_identity *identity, size_t memory,
 
 enum node_event node_step(struct node *node);
 
+/* A step in its parts, for who times nodes by their work and has their links
+ * beside their processors.  Moves frames, passes on messages of others and
+ * takes its own; lets the role compute: how much was done. */
+unsigned node_receive(struct node *node);
+unsigned node_work(struct node *node);
+
+/* Sends what may leave; `moved`: what the other parts did. */
+enum node_event node_send(struct node *node, unsigned moved);
+
 /* Microseconds until node_step must be called even if no byte comes. */
 uint64_t node_wait_us(const struct node *node);
 
 /* Slots of the role's queues that are in use: 0 when no job is open. */
 uint32_t node_held(const struct node *node);
+
+/* Its statistics since its start, as a report to the host has them but for
+ * what the board and the links know, and its messages: for who times nodes by
+ * their work. */
+void node_account(const struct node *node,
+                  struct node_finished_message *totals);
+const struct cube_statistics *node_messages(const struct node *node);
 
 /* Steps and sleeps until the host ends the run. */
 void node_run(struct node *node);

@@ -43,3 +43,27 @@ void node_pace_end(struct node_pace *pace, uint32_t units)
 {
     look(pace, units);
 }
+
+unsigned node_pace_work(struct node_pace *pace,
+                        bool (*step)(void *context, uint32_t units,
+                                     uint32_t *spent),
+                        void *context)
+{
+    unsigned worked = 0;
+    uint32_t units = 0; /* since the last look at the clock */
+    bool goes_on = true;
+    while (goes_on && worked < NODE_STEPS) {
+        uint32_t spent = 0;
+        goes_on = step(context, pace->units, &spent);
+        worked += goes_on;
+        units += spent;
+        if (goes_on && node_pace_is_due(pace, units)) {
+            goes_on = node_pace_goes_on(pace, units);
+            units = 0;
+        }
+    }
+    if (units > 0) {
+        node_pace_end(pace, units);
+    }
+    return worked;
+}

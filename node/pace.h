@@ -27,7 +27,8 @@ enum {
     NODE_PACE_STEP_US = NODE_PACE_US / 2,
     NODE_PACE_LAST_US = NODE_PACE_US * 3 / 8,
     NODE_PACE_LOOKS = 4, /* a step's time */
-    NODE_PACE_UNITS_MAX = 4096
+    NODE_PACE_UNITS_MAX = 4096,
+    NODE_STEPS = 32 /* of a role between looks at links, at most */
 };
 
 struct node_pace {
@@ -57,5 +58,13 @@ bool node_pace_goes_on(struct node_pace *pace, uint32_t units);
 
 /* Work ends with so many, that is, fewer. */
 void node_pace_end(struct node_pace *pace, uint32_t units);
+
+/* Steps between two looks at the links: as many as NODE_STEPS and the time
+ * allow, while `step` does something.  It may work about so many units, and
+ * sets how many it has.  How many steps did something. */
+unsigned node_pace_work(struct node_pace *pace,
+                        bool (*step)(void *context, uint32_t units,
+                                     uint32_t *spent),
+                        void *context);
 
 #endif

@@ -69,6 +69,10 @@ struct node_role {
     /* A page that it has asked for and not got; INCODE_NONE: there is none. */
     uint32_t (*awaited)(const void *self);
 
+    /* A node that owes it answers to a list; CUBE_HOST: none.  NULL: it has no
+     * lists. */
+    uint32_t (*owing)(const void *self);
+
     /* Slots of its queues in use; 0 when no job is open. */
     uint32_t (*held)(const void *self);
 

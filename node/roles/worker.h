@@ -16,16 +16,6 @@
 
 #include "roles.h"
 
-enum {
-    NODE_STEPS = 32, /* triangulator's steps between looks at links, at most */
-    NODE_WANTED_MAX = 64, /* pages asked for and not yet sent for */
-    /* Messages on their way out: one for each 64 KiB of memory, within. */
-    NODE_RESULT_SLOTS_MIN = 4,
-    NODE_RESULT_SLOTS_MAX = 32,
-    NODE_SPILL_SLOTS_MIN = 9,
-    NODE_SPILL_SLOTS_MAX = 16
-};
-
 extern const struct node_role node_worker_role;
 
 #endif

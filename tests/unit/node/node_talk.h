@@ -301,12 +301,21 @@ static inline size_t talk_compose(uint8_t type, uint8_t *data)
     uint32_t number = talk_byte();
     struct incode_face faces[2] = {{{3, 4, 70}},
                                    {{5, INCODE_NONE, INCODE_NONE}}};
+    const uint32_t kind = 1 + number % 3, count = 1 + number / 3 % 3;
+    const uint32_t list[] = {kind, count, 3, 4,   70, 5, 9,
+                             66,   1,     2, 130, 8,  7, 6};
     switch (type) {
     case NODE_SETUP:
         setup.setup.index = (uint8_t)(number % 3);
         setup.setup.face_rule = number >> 2 & 1;
         setup.setup.build = (uint8_t)(number / 3 % 3);
-        setup.role = number >> 3 & 1 ? NODE_HOLDER : NODE_WORKER;
+        setup.role = number >> 3 & 1 ? (uint8_t)(NODE_HOLDER + talk_byte() % 3)
+                                     : NODE_WORKER;
+        setup.builders[0] =
+            setup.role == NODE_MANAGER ? 3 & ~(1 << TALK_SELF) : 0;
+        setup.manager = !TALK_SELF;
+        setup.faces_per_job = 1 + talk_byte() % 96;
+        setup.jobs_per_worker = 1 + talk_byte() % 16;
         setup.holders =
             number >> 4 == 0 ? talk_byte() % 4 : setup.role == NODE_HOLDER;
         setup.setup.bricks = number >> 5 == 1 ? talk_byte() : TALK_BRICKS;
@@ -333,6 +342,11 @@ static inline size_t talk_compose(uint8_t type, uint8_t *data)
     case NODE_PAGE_REQUEST:
         memcpy(data, &page, sizeof page);
         return sizeof page;
+    case NODE_LIST:
+    case NODE_ANSWERS:
+        memcpy(data, list, sizeof list);
+        return type == NODE_LIST ? incode_list_bytes(count)
+                                 : incode_answers_bytes(count);
     case NODE_PING:
         memcpy(data, &number, sizeof number);
         return sizeof number;
@@ -420,9 +434,10 @@ static inline void talk_listen(void)
 static inline void talk_run(const uint8_t *bytes, size_t size)
 {
     static const uint8_t types[] = {
-        NODE_SETUP,   NODE_JOB,    NODE_PAGE,         NODE_PAGE,  NODE_CREDIT,
-        NODE_UNSPILL, NODE_REPORT, NODE_PAGE_REQUEST, NODE_PING,  NODE_READY,
-        NODE_RESULT,  NODE_PAGE,   NODE_JOB,          NODE_SETUP, NODE_FAULT};
+        NODE_SETUP,   NODE_JOB,     NODE_PAGE,         NODE_PAGE,  NODE_CREDIT,
+        NODE_UNSPILL, NODE_REPORT,  NODE_PAGE_REQUEST, NODE_PING,  NODE_READY,
+        NODE_RESULT,  NODE_PAGE,    NODE_JOB,          NODE_SETUP, NODE_FAULT,
+        NODE_LIST,    NODE_ANSWERS, NODE_LIST};
     uint8_t data[CUBE_PAYLOAD_MAX];
     talk_learn_expected();
     uint64_t expected = talk.expected;
@@ -446,7 +461,8 @@ static inline void talk_run(const uint8_t *bytes, size_t size)
             length = talk_mutate(data, length);
         }
         /* The neighbour brings pages and asks for them, and tries the rest. */
-        bool by_neighbour = type == NODE_PAGE || type == NODE_PAGE_REQUEST
+        bool by_neighbour = type == NODE_PAGE || type == NODE_PAGE_REQUEST ||
+                                    type == NODE_LIST || type == NODE_ANSWERS
                                 ? talk_byte() % 2 == 0
                                 : talk_byte() % 32 == 0;
         talk_demand(talk_say(by_neighbour ? 0 : 1, type, data, length));

@@ -19,7 +19,9 @@ static void test_layouts(void **unused)
                      24);
     assert_int_equal(offsetof(struct node_setup_message, setup.lo), 32);
     assert_int_equal(offsetof(struct node_setup_message, setup.cells), 80);
-    assert_int_equal(sizeof(struct node_setup_message), 96);
+    assert_int_equal(offsetof(struct node_setup_message, manager), 96);
+    assert_int_equal(offsetof(struct node_setup_message, builders), 104);
+    assert_int_equal(sizeof(struct node_setup_message), 232);
     assert_int_equal(offsetof(struct node_job_message, job.lo), 16);
     assert_int_equal(sizeof(struct node_job_message), 64);
     assert_int_equal(sizeof(struct node_spill_header), 20);

@@ -1,0 +1,228 @@
+#include "exchange.h"
+
+#include <string.h>
+
+#include "shares.h"
+#include "triangulation.h"
+#include "waves.h"
+
+struct exchange {
+    struct node_fault *fault;
+    uint16_t self;
+    uint16_t nodes;
+    struct node_triangulation triangulation;
+    struct node_shares shares;
+    uint64_t received; /* of others */
+    struct node_waves waves;
+};
+
+/* ---- memory ---- */
+
+static size_t own_bytes(const struct node_setup_message *setup)
+{
+    return node_aligned(sizeof(struct exchange)) +
+           node_shares_bytes(setup->nodes);
+}
+
+static size_t exchange_arena_min(size_t memory,
+                                 const struct node_setup_message *setup)
+{
+    return own_bytes(setup) + node_triangulation_min(memory, setup);
+}
+
+static bool exchange_start(void *self, size_t bytes,
+                           const struct node_setup_message *setup,
+                           struct node_counted *counted,
+                           struct node_fault *fault)
+{
+    struct exchange *e = self;
+    if (bytes < own_bytes(setup)) {
+        node_fault_set(fault, "the node's memory does not hold its outboxes", 0,
+                       0);
+        return false;
+    }
+    if (setup->setup.build != INCODE_BUILD_FACES) {
+        node_fault_set(fault, "invalid setup: an exchange that builds by way #",
+                       setup->setup.build, 0);
+        return false;
+    }
+    if (setup->setup.face_rule != INCODE_FACE_OWN ||
+        setup->setup.owner_rule != INCODE_OWNER_LOWEST) {
+        node_fault_set(fault,
+                       "invalid setup: an exchange of face rule # and owner "
+                       "rule #",
+                       setup->setup.face_rule, setup->setup.owner_rule);
+        return false;
+    }
+    memset(e, 0, sizeof *e);
+    e->fault = fault;
+    e->self = counted->self;
+    e->nodes = setup->nodes;
+    node_shares_init(&e->shares,
+                     (uint8_t *)self + node_aligned(sizeof(struct exchange)),
+                     setup, counted);
+    node_waves_init(&e->waves, setup, counted, fault);
+    const struct incode_front_peers peers = node_shares_peers(&e->shares);
+    return node_triangulation_start(&e->triangulation, self, bytes,
+                                    own_bytes(setup), setup, &peers, counted,
+                                    fault);
+}
+
+/* ---- messages ---- */
+
+static void take_shares(struct exchange *e, const struct cube_message *message)
+{
+    struct incode_triangulator *t = e->triangulation.triangulator;
+    struct node_shared share;
+    for (size_t at = 0; at + sizeof share <= message->size;
+         at += sizeof share) {
+        memcpy(&share, message->data + at, sizeof share);
+        if (incode_triangulator_take(t, share.v) != 0) {
+            node_fault_set(e->fault, "vertex # of node #, of no tetrahedron",
+                           share.v[0], message->source);
+        }
+        e->received++;
+    }
+    e->triangulation.bytes_in += message->size;
+    if (message->size % sizeof share != 0) {
+        node_fault_set(e->fault, "tetrahedra in # bytes from node #",
+                       message->size, message->source);
+    }
+}
+
+/* What node 0 asks all nodes for. */
+static void follow(struct exchange *e, uint8_t command)
+{
+    if (command == NODE_WAVE_SEED) {
+        incode_triangulator_seed(e->triangulation.triangulator);
+    }
+}
+
+static void exchange_message(void *self, const struct cube_message *message,
+                             uint64_t now_us)
+{
+    struct exchange *e = self;
+    switch (message->type) {
+    case NODE_SHARE:
+        take_shares(e, message);
+        break;
+    case NODE_WAVE:
+    case NODE_WAVE_ANSWER:
+        if (node_waves_take(&e->waves, message)) {
+            follow(e, e->waves.command);
+        }
+        break;
+    case NODE_REGIONS:
+        if (!node_shares_regions(&e->shares, message->data, message->size)) {
+            node_fault_set(e->fault, "regions in # bytes, after # of them",
+                           message->size, e->shares.known);
+        }
+        break;
+    default:
+        if (!node_triangulation_message(&e->triangulation, message, now_us)) {
+            node_fault_set(e->fault, "message of type # for an exchange",
+                           message->type, 0);
+        }
+    }
+}
+
+/* ---- work ---- */
+
+static unsigned exchange_work(void *self, struct node_pace *pace)
+{
+    struct exchange *e = self;
+    /* Not before all others can receive. */
+    return e->waves.begun ? node_triangulation_work(&e->triangulation, pace)
+                          : 0;
+}
+
+static bool is_quiet(const struct exchange *e)
+{
+    return e->shares.used == 0 &&
+           incode_triangulator_is_quiet(e->triangulation.triangulator);
+}
+
+static unsigned exchange_send(void *self)
+{
+    struct exchange *e = self;
+    const struct node_triangulation *t = &e->triangulation;
+    uint8_t command;
+    unsigned sent = node_shares_send(&e->shares) +
+                    node_triangulation_send(&e->triangulation);
+    const struct node_waves_state state = {
+        .ready = t->jobs.epoch != 0 && node_shares_ready(&e->shares),
+        .quiet = is_quiet(e),
+        .sent = e->shares.sent,
+        .received = e->received,
+        .left = incode_triangulator_left(t->triangulator)};
+    /* Jobs are given out when all nodes have their role. */
+    if (e->self == 0 && t->jobs.epoch != 0 && e->waves.number == 0) {
+        node_waves_begin(&e->waves);
+    }
+    sent += node_waves_send(&e->waves, &state, &command);
+    follow(e, command);
+    return sent;
+}
+
+static uint32_t exchange_awaited(const void *self)
+{
+    const struct exchange *e = self;
+    const struct node_triangulation *t = &e->triangulation;
+    bool waits = t->jobs.working && (!e->waves.begun || is_quiet(e));
+    return waits && !t->drained ? NODE_AWAITS_OTHERS
+                                : incode_triangulator_awaited(t->triangulator);
+}
+
+static uint32_t exchange_held(const void *self)
+{
+    const struct exchange *e = self;
+    return node_triangulation_held(&e->triangulation) + e->shares.used;
+}
+
+static uint32_t exchange_done(const void *self)
+{
+    const struct exchange *e = self;
+    return e->shares.used == 0 ? node_triangulation_done(&e->triangulation) : 0;
+}
+
+static void exchange_end(void *self, uint64_t now_us)
+{
+    struct exchange *e = self;
+    node_triangulation_end(&e->triangulation, now_us);
+}
+
+static void exchange_totals(const void *self,
+                            struct node_finished_message *totals,
+                            uint64_t now_us)
+{
+    const struct exchange *e = self;
+    node_triangulation_totals(&e->triangulation, totals, now_us);
+    totals->bytes_out += e->shares.bytes_out;
+}
+
+static void exchange_map(const void *self, struct node_map *map)
+{
+    const struct exchange *e = self;
+    size_t bytes = node_shares_bytes(e->nodes);
+    node_triangulation_map(&e->triangulation, map, 1);
+    map->tables[0].bytes = (uint32_t)bytes;
+    map->tables[0].count = NODE_SHARE_BATCHES;
+    map->tables[1].bytes -= (uint32_t)bytes;
+}
+
+const struct node_role node_exchange_role = {
+    .name = "exchange",
+    .tables = {{"tetrahedra on their way to other nodes", "batches"},
+               NODE_TRIANGULATION_NAMES},
+    .arena_min = exchange_arena_min,
+    .start = exchange_start,
+    .message = exchange_message,
+    .work = exchange_work,
+    .send = exchange_send,
+    .done = exchange_done,
+    .end = exchange_end,
+    .awaited = exchange_awaited,
+    .held = exchange_held,
+    .totals = exchange_totals,
+    .map = exchange_map,
+};

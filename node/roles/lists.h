@@ -1,0 +1,63 @@
+/* Lists of faces and answers as messages from node to node: the carrier of a
+ * manager and its builders in the strategies `master-slaves` and `hybrid`.  The
+ * builder with the fewest lists gets the next one.
+ *
+ * Memory: node_lists_bytes of the role's arena, for what has come and waits: a
+ * place for the answers to each list that is out, which is kept before the list
+ * leaves, so that whatever comes is read.  Where memory has fewer places than
+ * builders may have lists, fewer lists are out.  Work: a look at the builders a
+ * list, else constant.
+ *
+ *     node_lists_init(&lists, memory, 8, NODE_LIST, 2, &counted, &fault);
+ *     node_lists_add(&lists, builder);
+ *     struct node_carrier carrier = node_lists_carrier(&lists);
+ */
+#ifndef NODE_LISTS_H
+#define NODE_LISTS_H
+
+#include "carrier.h"
+#include "node/counted.h"
+#include "node/fault.h"
+#include "node/message.h"
+#include "node/outbox.h"
+
+struct node_lists {
+    struct node_counted *counted;
+    struct node_fault *fault;
+    uint8_t sends; /* NODE_LIST, or NODE_ANSWERS; the other one comes */
+    struct node_outbox inbox;
+    uint32_t out;      /* lists sent, and not answered: all of them, */
+    uint32_t each_max; /* at most so many of a peer, */
+    uint32_t next;     /* the peer to be looked at first */
+    uint32_t peers;    /* who they go to */
+    uint16_t peer[NODE_BUILDERS_MAX];
+    uint8_t owed[NODE_BUILDERS_MAX]; /* by each peer */
+    uint64_t bytes_in, bytes_out;
+};
+
+/* Bytes for so many messages that wait. */
+size_t node_lists_bytes(uint32_t places);
+
+/* sends: NODE_LIST (a manager, each_max lists a builder) or NODE_ANSWERS (a
+ * builder, to one manager, a place for each list that this may send).  memory:
+ * aligned to NODE_ALIGNMENT.  counted and fault stay. */
+void node_lists_init(struct node_lists *lists, void *memory, uint32_t places,
+                     uint8_t sends, uint32_t each_max,
+                     struct node_counted *counted, struct node_fault *fault);
+
+/* Another peer, up to NODE_BUILDERS_MAX. */
+void node_lists_add(struct node_lists *lists, uint16_t peer);
+
+struct node_carrier node_lists_carrier(struct node_lists *lists);
+
+/* NODE_LIST or NODE_ANSWERS; what is not sound is a fault. */
+void node_lists_take(struct node_lists *lists,
+                     const struct cube_message *message);
+
+/* A peer that owes answers; CUBE_HOST: none does. */
+uint16_t node_lists_owing(const struct node_lists *lists);
+
+/* Messages that wait. */
+uint32_t node_lists_held(const struct node_lists *lists);
+
+#endif

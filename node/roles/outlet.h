@@ -1,0 +1,74 @@
+/* What a role with a front sends to the host, and takes back: finished
+ * tetrahedra and commits under credit, and spilled faces.  It is the front's
+ * outside (incode/front/job.h).
+ *
+ * Memory: node_outlet_bytes of the role's arena, for messages on their way out.
+ * Work: that of copying what it is given.
+ *
+ *     node_outlet_init(&outlet, memory, bytes, &setup, &counted, &fault);
+ *     node_outlet_begin(&outlet, jobs.epoch);
+ *     sent = node_outlet_send(&outlet);   // and so in every step
+ */
+#ifndef NODE_OUTLET_H
+#define NODE_OUTLET_H
+
+#include "incode/front/job.h"
+#include "node/counted.h"
+#include "node/fault.h"
+#include "node/outbox.h"
+#include "node/result.h"
+
+struct node_outlet {
+    struct node_counted *counted;
+    struct node_fault *fault;
+    uint32_t epoch;             /* of the job */
+    struct node_outbox results; /* leave under credit */
+    uint32_t credit, sent;      /* results allowed, results sent */
+    struct node_result_writer writer;
+    bool open;                 /* writer fills a slot of results */
+    struct node_outbox spills; /* leave as the link takes them */
+    uint32_t spill_count;      /* faces in the open message of spills */
+    uint64_t bytes_out;
+};
+
+/* Bytes for a role whose arena, or memory as a whole, has so many. */
+size_t node_outlet_bytes(size_t bytes);
+
+/* memory: aligned to NODE_ALIGNMENT, node_outlet_bytes(bytes) of it.  counted
+ * and fault stay. */
+void node_outlet_init(struct node_outlet *outlet, void *memory, size_t bytes,
+                      const struct node_setup_message *setup,
+                      struct node_counted *counted, struct node_fault *fault);
+
+/* As a front sees it. */
+struct incode_front_outside node_outlet_outside(struct node_outlet *outlet);
+
+/* A job begins: what leaves from now on is of its epoch. */
+void node_outlet_begin(struct node_outlet *outlet, uint32_t epoch);
+
+/* Whether it takes the results of a step; without room, a front waits. */
+bool node_outlet_has_room(const struct node_outlet *outlet);
+
+/* No more results are to come: the last message of them may leave. */
+void node_outlet_close(struct node_outlet *outlet);
+
+/* NODE_CREDIT; what is not sound is a fault. */
+void node_outlet_take_credit(struct node_outlet *outlet, const uint8_t *data,
+                             size_t size);
+
+/* NODE_UNSPILL: true with *header and its faces, for incode_front_unspill;
+ * false where it is of another job, or not sound, which is a fault. */
+bool node_outlet_take_unspill(struct node_outlet *outlet, const uint8_t *data,
+                              size_t size, struct node_spill_header *header,
+                              struct incode_face faces[NODE_FACES_A_MESSAGE]);
+
+/* The front knows of no such faces. */
+void node_outlet_refuse_unspill(struct node_outlet *outlet, uint32_t brick);
+
+/* Sends what may leave; the number of messages. */
+unsigned node_outlet_send(struct node_outlet *outlet);
+
+/* Messages and faces that have not left. */
+uint32_t node_outlet_held(const struct node_outlet *outlet);
+
+#endif

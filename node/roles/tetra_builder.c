@@ -1,0 +1,163 @@
+#include "tetra_builder.h"
+
+#include <string.h>
+
+#include "incode/predicates/check.h"
+#include "node/keepers.h"
+
+size_t node_tetra_builder_min(const struct node_setup_message *setup)
+{
+    uint32_t lists = setup->jobs_per_worker;
+    lists = lists < 1 ? 1 : lists > INCODE_LISTS_MAX ? INCODE_LISTS_MAX : lists;
+    return incode_builder_min(lists);
+}
+
+static bool is_sound(const struct node_setup_message *setup,
+                     struct node_fault *fault)
+{
+    const char *why = incode_setup_fault(&setup->setup);
+    if (why != NULL) {
+        node_fault_set(fault, why, 0, 0);
+        return false;
+    }
+    if (setup->jobs_per_worker < 1 ||
+        setup->jobs_per_worker > INCODE_LISTS_MAX) {
+        node_fault_set(fault,
+                       "invalid setup: # lists a builder, allowed are 1..#",
+                       setup->jobs_per_worker, INCODE_LISTS_MAX);
+        return false;
+    }
+    return true;
+}
+
+bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
+                              size_t bytes,
+                              const struct node_setup_message *setup,
+                              const struct node_carrier *carrier,
+                              struct node_counted *counted,
+                              struct node_fault *fault)
+{
+    if (!is_sound(setup, fault) ||
+        !node_keepers_fit(setup, counted->self, false, fault)) {
+        return false;
+    }
+    if (bytes < node_tetra_builder_min(setup)) {
+        node_fault_set(fault, "the node's memory is too small for a builder", 0,
+                       0);
+        return false;
+    }
+    memset(t, 0, sizeof *t);
+    t->fault = fault;
+    t->carrier = *carrier;
+    node_requests_init(&t->requests, setup->holders, counted, fault);
+    const struct incode_page_source source = node_requests_source(&t->requests);
+    incode_builder_init(&t->builder, memory, bytes, &setup->setup,
+                        setup->jobs_per_worker, &source);
+    return true;
+}
+
+bool node_tetra_builder_message(struct node_tetra_builder *t,
+                                const struct cube_message *message)
+{
+    uint32_t page;
+    const uint8_t *bytes;
+    size_t count;
+    if (message->type != NODE_PAGE) {
+        return message->type == NODE_CREDIT;
+    }
+    t->bytes_in += message->size;
+    if (node_requests_take(&t->requests, message->data, message->size, &page,
+                           &bytes, &count)) {
+        int status = incode_maker_page(&t->builder.maker, page, bytes, count);
+        node_requests_judge(&t->requests, status, page, count);
+    }
+    return true;
+}
+
+/* ---- work ---- */
+
+static bool take_list(struct node_tetra_builder *t)
+{
+    struct incode_list list;
+    size_t size;
+    const void *data;
+    if (incode_builder_held(&t->builder) == t->builder.lists ||
+        (data = t->carrier.first(t->carrier.context, &size)) == NULL) {
+        return false;
+    }
+    bool fits = size >= offsetof(struct incode_list, v) && size <= sizeof list;
+    list.count = 0;
+    memcpy(&list, data, fits ? size : 0);
+    t->carrier.drop(t->carrier.context);
+    if (!fits || size != incode_list_bytes(list.count)) {
+        node_fault_set(t->fault, "a list of # in # bytes", list.count,
+                       (uint32_t)size);
+        return false;
+    }
+    return incode_builder_take(&t->builder, &list);
+}
+
+static bool send_answers(struct node_tetra_builder *t)
+{
+    const struct incode_answers *answers = incode_builder_answers(&t->builder);
+    if (answers == NULL || !t->carrier.has_room(t->carrier.context)) {
+        return false;
+    }
+    t->carrier.send(t->carrier.context, answers,
+                    incode_answers_bytes(answers->count));
+    incode_builder_drop(&t->builder);
+    return true;
+}
+
+static bool work_on(void *context, uint32_t units, uint32_t *spent)
+{
+    struct node_tetra_builder *t = context;
+    uint64_t before = t->builder.spent;
+    if (node_fault_is_set(t->fault)) {
+        return false;
+    }
+    bool moved = take_list(t);
+    enum incode_step step = incode_builder_step(&t->builder, units);
+    moved = send_answers(t) || moved;
+    if (step == INCODE_BROKEN) {
+        node_fault_set(t->fault, incode_builder_fault(&t->builder), 0, 0);
+    }
+    *spent = (uint32_t)(t->builder.spent - before);
+    return moved || step == INCODE_WORKED;
+}
+
+unsigned node_tetra_builder_work(struct node_tetra_builder *t,
+                                 struct node_pace *pace)
+{
+    return node_pace_work(pace, work_on, t);
+}
+
+uint32_t node_tetra_builder_held(const struct node_tetra_builder *t)
+{
+    return incode_builder_held(&t->builder);
+}
+
+uint32_t node_tetra_builder_awaited(const struct node_tetra_builder *t)
+{
+    return incode_pager_awaited(&t->builder.maker.pager);
+}
+
+void node_tetra_builder_totals(const struct node_tetra_builder *t,
+                               struct node_finished_message *totals)
+{
+    totals->bytes_in = t->bytes_in;
+    totals->bytes_out = t->requests.bytes_out;
+    incode_builder_statistics(&t->builder, &totals->statistics);
+    totals->memory_high_water = totals->statistics.memory_high_water;
+}
+
+void node_tetra_builder_map(const struct node_tetra_builder *t,
+                            struct node_map *map)
+{
+    const struct incode_pager *pager = &t->builder.maker.pager;
+    size_t frames = incode_pager_bytes(pager->frame_count);
+    map->tables[0].bytes = (uint32_t)(t->builder.bytes - frames);
+    map->tables[1].bytes = (uint32_t)frames;
+    map->tables[1].count = pager->frame_count;
+    map->pages = pager->frame_count;
+}

@@ -1,0 +1,62 @@
+/* What is the same in all tetrahedron builders, whatever carries their lists
+ * (carrier.h): a maker that answers them (incode/builder.h), and the pages that
+ * it asks for.  A role that has one calls these functions with its own.
+ *
+ * Memory: the struct, the lists at work, and the rest of what it is given for
+ * page frames.  Work: as much as the pace has it; a step goes on with a list.
+ *
+ *     node_tetra_builder_start(&tetra, memory, bytes, &setup, &carrier,
+ *                              &counted, &fault);
+ *     worked = node_tetra_builder_work(&tetra, &pace);
+ *     sent = node_requests_send(&tetra.requests);
+ */
+#ifndef NODE_TETRA_BUILDER_H
+#define NODE_TETRA_BUILDER_H
+
+#include "carrier.h"
+#include "incode/builder.h"
+#include "node/pace.h"
+#include "requests.h"
+
+struct node_tetra_builder {
+    struct node_fault *fault;
+    struct node_carrier carrier;
+    struct node_requests requests;
+    uint64_t bytes_in;
+    struct incode_builder builder;
+};
+
+/* Bytes beside the struct that suffice for this setup. */
+size_t node_tetra_builder_min(const struct node_setup_message *setup);
+
+/* memory: aligned to NODE_ALIGNMENT.  counted and fault stay.  False: it has
+ * told why. */
+bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
+                              size_t bytes,
+                              const struct node_setup_message *setup,
+                              const struct node_carrier *carrier,
+                              struct node_counted *counted,
+                              struct node_fault *fault);
+
+/* Messages of the host or a holder: a page.  Credit is passed over, as it has
+ * no results.  False: it is another one. */
+bool node_tetra_builder_message(struct node_tetra_builder *t,
+                                const struct cube_message *message);
+
+/* Steps that did something. */
+unsigned node_tetra_builder_work(struct node_tetra_builder *t,
+                                 struct node_pace *pace);
+
+/* As in a role: lists that it has, and a page that it waits for. */
+uint32_t node_tetra_builder_held(const struct node_tetra_builder *t);
+uint32_t node_tetra_builder_awaited(const struct node_tetra_builder *t);
+
+/* The first two tables, and pages: maker, page frames. */
+void node_tetra_builder_map(const struct node_tetra_builder *t,
+                            struct node_map *map);
+
+/* All but the bytes of the carrier, the role's own memory, and its time. */
+void node_tetra_builder_totals(const struct node_tetra_builder *t,
+                               struct node_finished_message *totals);
+
+#endif

@@ -1,0 +1,197 @@
+#include "triangulation.h"
+
+#include <string.h>
+
+#include "incode/predicates/check.h"
+#include "node/arena.h"
+#include "node/keepers.h"
+
+size_t node_triangulation_min(size_t memory,
+                              const struct node_setup_message *setup)
+{
+    return node_outlet_bytes(memory) + incode_arena_min(&setup->setup);
+}
+
+bool node_triangulation_start(struct node_triangulation *t, void *arena,
+                              size_t bytes, size_t own,
+                              const struct node_setup_message *setup,
+                              const struct incode_front_peers *peers,
+                              struct node_counted *counted,
+                              struct node_fault *fault)
+{
+    uint8_t *memory = arena;
+    size_t before = own + node_outlet_bytes(bytes);
+    const char *why = NULL;
+    if (bytes < before) {
+        node_fault_set(fault, "the node's memory does not hold its outboxes", 0,
+                       0);
+        return false;
+    }
+    if (!node_keepers_fit(setup, counted->self, false, fault)) {
+        return false;
+    }
+    memset(t, 0, sizeof *t);
+    t->fault = fault;
+    t->before = before;
+    t->exchanges = peers->share != NULL;
+    node_jobs_init(&t->jobs, setup->setup.bricks, fault);
+    node_requests_init(&t->requests, setup->holders, counted, fault);
+    node_outlet_init(&t->outlet, memory + own, bytes, setup, counted, fault);
+    const struct incode_outside outside = {
+        .pages = node_requests_source(&t->requests),
+        .front = node_outlet_outside(&t->outlet),
+        .peers = *peers};
+    t->triangulator = incode_triangulator_init(memory + before, bytes - before,
+                                               &setup->setup, &outside, &why);
+    if (t->triangulator == NULL) {
+        node_fault_set(fault, why, 0, 0);
+    }
+    return t->triangulator != NULL;
+}
+
+static void take_job(struct node_triangulation *t,
+                     const struct cube_message *message, uint64_t now_us)
+{
+    struct incode_job job;
+    if (!node_jobs_take(&t->jobs, message, now_us, &job)) {
+        return;
+    }
+    node_outlet_begin(&t->outlet, t->jobs.epoch);
+    /* A region without points has nothing to be worked on. */
+    t->drained = job.first == job.last;
+    if (!t->drained) {
+        incode_triangulator_start(t->triangulator, &job);
+    }
+}
+
+static void take_page(struct node_triangulation *t, const uint8_t *data,
+                      size_t size)
+{
+    uint32_t page;
+    const uint8_t *bytes;
+    size_t count;
+    if (node_requests_take(&t->requests, data, size, &page, &bytes, &count)) {
+        int status =
+            incode_triangulator_page(t->triangulator, page, bytes, count);
+        node_requests_judge(&t->requests, status, page, count);
+    }
+}
+
+static void take_unspill(struct node_triangulation *t, const uint8_t *data,
+                         size_t size)
+{
+    struct node_spill_header header;
+    struct incode_face faces[NODE_FACES_A_MESSAGE];
+    if (node_outlet_take_unspill(&t->outlet, data, size, &header, faces) &&
+        incode_triangulator_unspill(t->triangulator, header.brick, faces,
+                                    header.count, header.last != 0) != 0) {
+        node_outlet_refuse_unspill(&t->outlet, header.brick);
+    }
+}
+
+bool node_triangulation_message(struct node_triangulation *t,
+                                const struct cube_message *message,
+                                uint64_t now_us)
+{
+    switch (message->type) {
+    case NODE_JOB:
+        take_job(t, message, now_us);
+        return true;
+    case NODE_PAGE:
+        take_page(t, message->data, message->size);
+        break;
+    case NODE_UNSPILL:
+        take_unspill(t, message->data, message->size);
+        break;
+    case NODE_CREDIT:
+        node_outlet_take_credit(&t->outlet, message->data, message->size);
+        break;
+    default:
+        return false;
+    }
+    t->bytes_in += message->size;
+    return true;
+}
+
+/* One step of at most so many units; false: there is nothing to do. */
+static bool work_on(void *context, uint32_t units, uint32_t *spent)
+{
+    struct node_triangulation *t = context;
+    if (!t->jobs.working || t->drained || node_fault_is_set(t->fault) ||
+        (!t->exchanges && !node_outlet_has_room(&t->outlet))) {
+        return false;
+    }
+    uint64_t before = incode_triangulator_spent(t->triangulator);
+    incode_triangulator_allow(t->triangulator, units);
+    enum incode_step step = incode_triangulator_step(t->triangulator);
+    if (step == INCODE_BROKEN) {
+        node_fault_set(t->fault, incode_triangulator_fault(t->triangulator), 0,
+                       0);
+    }
+    t->drained = step == INCODE_FINISHED;
+    *spent = (uint32_t)(incode_triangulator_spent(t->triangulator) - before);
+    return step == INCODE_WORKED || step == INCODE_FINISHED;
+}
+
+unsigned node_triangulation_work(struct node_triangulation *t,
+                                 struct node_pace *pace)
+{
+    unsigned worked = node_pace_work(pace, work_on, t);
+    if (t->drained) {
+        node_outlet_close(&t->outlet);
+    }
+    return worked;
+}
+
+unsigned node_triangulation_send(struct node_triangulation *t)
+{
+    return node_requests_send(&t->requests) + node_outlet_send(&t->outlet);
+}
+
+uint32_t node_triangulation_held(const struct node_triangulation *t)
+{
+    return node_outlet_held(&t->outlet) + node_requests_held(&t->requests);
+}
+
+uint32_t node_triangulation_done(const struct node_triangulation *t)
+{
+    return t->jobs.working && t->drained && node_triangulation_held(t) == 0
+               ? t->jobs.epoch
+               : 0;
+}
+
+void node_triangulation_end(struct node_triangulation *t, uint64_t now_us)
+{
+    INCODE_ASSERT(node_triangulation_done(t) != 0);
+    node_jobs_end(&t->jobs, now_us);
+    t->drained = false;
+}
+
+void node_triangulation_totals(const struct node_triangulation *t,
+                               struct node_finished_message *totals,
+                               uint64_t now_us)
+{
+    totals->wall_us = node_jobs_wall_us(&t->jobs, now_us);
+    totals->bytes_in = t->bytes_in;
+    totals->bytes_out = t->requests.bytes_out + t->outlet.bytes_out;
+    incode_triangulator_statistics(t->triangulator, &totals->statistics);
+    totals->memory_high_water =
+        t->before + totals->statistics.memory_high_water;
+}
+
+void node_triangulation_map(const struct node_triangulation *t,
+                            struct node_map *map, unsigned table)
+{
+    const struct incode_map *m = incode_triangulator_map(t->triangulator);
+    const size_t bytes[NODE_TRIANGULATION_TABLES][2] = {
+        {t->before, 0},
+        {m->control, 0},
+        {m->afl, m->afl_faces},
+        {m->bricks, m->brick_entries},
+        {m->frames, m->frame_count}};
+    for (unsigned i = 0; i < NODE_TRIANGULATION_TABLES; i++) {
+        map->tables[table + i].bytes = (uint32_t)bytes[i][0];
+        map->tables[table + i].count = (uint32_t)bytes[i][1];
+    }
+    map->pages = (uint32_t)m->frame_count;
+}

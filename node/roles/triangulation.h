@@ -1,0 +1,77 @@
+/* What roles with a triangulator have in common: its job, its pages, what it
+ * gives away, and the time that it has.
+ *
+ * Memory: the struct, and of the role's arena the outlet, then the
+ * triangulator.  Work: `work` closes at most NODE_STEPS stars, fewer where the
+ * time does not suffice, and `send` sends what the link takes.
+ *
+ *     if (!node_triangulation_message(&t, &message, now_us))
+ *         node_fault_set(&fault, "message of type #", message.type, 0);
+ *     moved = node_triangulation_work(&t, &pace);
+ *     moved += node_triangulation_send(&t);   // and so in every step
+ */
+#ifndef NODE_TRIANGULATION_H
+#define NODE_TRIANGULATION_H
+
+#include "jobs.h"
+#include "node/pace.h"
+#include "outlet.h"
+#include "requests.h"
+
+enum { NODE_TRIANGULATION_TABLES = 5 };
+
+/* As a role's memory map names its tables. */
+#define NODE_TRIANGULATION_NAMES                                               \
+    {"results and spilled faces on their way out", NULL},                      \
+        {"triangulator, its local points and tasks", NULL},                    \
+        {"active face list", "faces"}, {"open bricks", "entries"},             \
+    {                                                                          \
+        "page frames", "pages of 1568 bytes"                                   \
+    }
+
+struct node_triangulation {
+    struct node_fault *fault;
+    struct incode_triangulator *triangulator;
+    struct node_jobs jobs;
+    bool exchanges; /* it spills for what others send, room or not */
+    bool drained;   /* the triangulator is done, results still leave */
+    struct node_requests requests;
+    struct node_outlet outlet;
+    size_t before; /* bytes of the arena before the triangulator's */
+    uint64_t bytes_in;
+};
+
+/* Bytes of arena that suffice beside the role's own. */
+size_t node_triangulation_min(size_t memory,
+                              const struct node_setup_message *setup);
+
+/* Begins in the arena, of which the first `own` bytes are the role's.  peers:
+ * of an exchange, or share = NULL.  counted and fault stay.  False: it does not
+ * fit, which is a fault. */
+bool node_triangulation_start(struct node_triangulation *t, void *arena,
+                              size_t bytes, size_t own,
+                              const struct node_setup_message *setup,
+                              const struct incode_front_peers *peers,
+                              struct node_counted *counted,
+                              struct node_fault *fault);
+
+/* Takes a message from the host or a holder; false: its type is another. */
+bool node_triangulation_message(struct node_triangulation *t,
+                                const struct cube_message *message,
+                                uint64_t now_us);
+
+/* As those of a role (roles.h); map: its first free table and those after it.
+ */
+unsigned node_triangulation_work(struct node_triangulation *t,
+                                 struct node_pace *pace);
+unsigned node_triangulation_send(struct node_triangulation *t);
+uint32_t node_triangulation_done(const struct node_triangulation *t);
+void node_triangulation_end(struct node_triangulation *t, uint64_t now_us);
+uint32_t node_triangulation_held(const struct node_triangulation *t);
+void node_triangulation_totals(const struct node_triangulation *t,
+                               struct node_finished_message *totals,
+                               uint64_t now_us);
+void node_triangulation_map(const struct node_triangulation *t,
+                            struct node_map *map, unsigned table);
+
+#endif

@@ -1,0 +1,70 @@
+/* Whether all nodes of a cube have nothing to do: waves along the binomial tree
+ * of node 0, in which the parent of node i is i & (i - 1).  A wave goes down
+ * from node 0 at once; its answers come up, each when a node is quiet and has
+ * those of its children, with what all of them have sent to others and had from
+ * them.  Two waves with the same sums, as much received as sent, mean that the
+ * whole cube was quiet between them, and nothing was under way (the four
+ * counters of Mattern, Distributed Computing 2:161-175, 1987).
+ *
+ * The first wave is the barrier at the start: it is answered by who is ready to
+ * receive.  The next lets all begin.  Where the cube is quiet and work is left,
+ * one tells all to seed; where that has been, it is stuck.
+ *
+ * Memory: the struct.  Work: constant a call, but for a look at the children.
+ *
+ *     node_waves_begin(&waves);   // at node 0, when all have their role
+ *     if (node_waves_take(&waves, &message) && waves.command == NODE_WAVE_SEED)
+ *         incode_front_seed_all(&front);
+ *     sent = node_waves_send(&waves, &state, &command);   // in every step
+ */
+#ifndef NODE_WAVES_H
+#define NODE_WAVES_H
+
+#include <stdbool.h>
+
+#include "node/counted.h"
+#include "node/fault.h"
+#include "node/message.h"
+
+/* Of one node, as it is now. */
+struct node_waves_state {
+    bool ready;              /* to receive from others */
+    bool quiet;              /* it has nothing to do, and nothing to send */
+    uint64_t sent, received; /* to and from others */
+    uint64_t left;           /* work that it has not done */
+};
+
+struct node_waves {
+    struct node_counted *counted;
+    struct node_fault *fault;
+    uint16_t children;  /* links d: node self | 1 << d is one */
+    uint32_t number;    /* of the wave; 0: there was none */
+    uint8_t command;    /* of the wave: enum node_wave_command */
+    bool begun;         /* the barrier is passed */
+    bool open;          /* this node has not answered */
+    uint16_t to_tell;   /* children that have not been told */
+    uint16_t to_answer; /* children that have not answered */
+    bool seeded;        /* at node 0: all have been told to */
+    bool over;          /* at node 0: no work is left */
+    struct node_wave_answer_message sum, before;
+};
+
+void node_waves_init(struct node_waves *waves,
+                     const struct node_setup_message *setup,
+                     struct node_counted *counted, struct node_fault *fault);
+
+/* At node 0: the first wave. */
+void node_waves_begin(struct node_waves *waves);
+
+/* NODE_WAVE or its answer.  True: a wave has come, waves->command says what it
+ * is for. */
+bool node_waves_take(struct node_waves *waves,
+                     const struct cube_message *message);
+
+/* Passes on what is to be; the number of messages.  At node 0, *command is what
+ * the cube is told that this node has to follow as well, or 0. */
+unsigned node_waves_send(struct node_waves *waves,
+                         const struct node_waves_state *state,
+                         uint8_t *command);
+
+#endif
