@@ -28,7 +28,26 @@ struct cut {
     size_t first, n;
     double lo[3], hi[3];
     int depth;
+    unsigned above, below; /* bit d: along d, regions lie beyond that side */
 };
+
+/* Of n points in a box, cut along d into equal parts: how many fewer the lower
+ * one is to have, as the tetrahedra across the cut are its own; and so are
+ * those across the upper side of the upper part, but not those across the lower
+ * side of the lower one.  Of uniform points, a point has 6.8 tetrahedra, and a
+ * cut crosses some 7 for each point beside it. */
+static size_t owned_shift(const struct cut *c, const double lo[3],
+                          const double hi[3], int d)
+{
+    int sides = 2 - (int)(c->above >> d & 1) - (int)(c->below >> d & 1);
+    double length = 0.5 * hi[d] - 0.5 * lo[d], across = 1;
+    for (int e = 0; e < 3; e++) {
+        across *= e == d ? 1 : (0.5 * hi[e] - 0.5 * lo[e]) / length;
+    }
+    double points = (double)c->n;
+    double shift = sides * 0.26 * cbrt(points * points * across);
+    return shift < points / 8 ? (size_t)shift : c->n / 8;
+}
 
 /* Equal counts, in whole bricks and whole box pages where that costs at most
  * one part in 64 of the balance. */
@@ -64,6 +83,9 @@ static void cut_regions(void *argument)
         host_kd_box(items, c->n, lo, hi);
         d = c->n > 0 ? host_kd_longest(lo, hi) : 0;
         k = half_rank(c->n);
+        if (c->partition == HOST_OWNED && k > 0) {
+            k -= owned_shift(c, lo, hi, d);
+        }
         host_kd_rank(items, c->n, k, d, 0);
         host_kd_box(items + k, c->n - k, lo, hi);
         wall = k < c->n ? lo[d] : c->hi[d];
@@ -75,6 +97,8 @@ static void cut_regions(void *argument)
     lower.n = k;
     upper.first += k, upper.n -= k;
     lower.hi[d] = upper.lo[d] = wall;
+    lower.above |= 1u << d;
+    upper.below |= 1u << d;
     if (c->threads > 1 && c->n >= FORK_POINTS) {
         struct host_fork fork;
         lower.threads = c->threads / 2;
@@ -433,6 +457,15 @@ int host_order_make(struct host_order *order, const char *where,
         host_order_free(order);
     }
     return error->code;
+}
+
+void host_order_join(struct host_order *order)
+{
+    struct host_region *all = &order->region[0];
+    *all = (struct host_region){.last = order->bricks, .points = order->points};
+    memcpy(all->lo, order->lo, sizeof all->lo);
+    memcpy(all->hi, order->hi, sizeof all->hi);
+    order->regions = 1;
 }
 
 void host_order_free(struct host_order *order)

@@ -22,7 +22,9 @@
 #include "host/base/error.h"
 #include "incode/pages/pages.h"
 
-enum host_partition { HOST_ADAPTIVE, HOST_UNIFORM };
+/* Regions of equal numbers of points, equal cells, or as equal numbers of
+ * tetrahedra as can be told beforehand, where the lowest vertex owns. */
+enum host_partition { HOST_ADAPTIVE, HOST_UNIFORM, HOST_OWNED };
 
 /* Bricks [first, last) hold the points of the region; none where it is empty.
  * lo..hi is its cell of the space; the cells tile the box of all points.  A
@@ -61,6 +63,9 @@ int host_order_make(struct host_order *order, const char *where,
                     const double *xyz, uint64_t rows,
                     enum host_partition partition, uint32_t regions, bool grid,
                     struct host_error *error);
+
+/* Makes one region of all. */
+void host_order_join(struct host_order *order);
 
 void host_order_free(struct host_order *order);
 

@@ -10,6 +10,7 @@
 #include "host/formats/formats.h"
 #include "host/order/names.h"
 #include "host/service/strategies/strategies.h"
+#include "incode/builder.h"
 
 enum {
     KEY_STRATEGY = 256,
@@ -23,7 +24,9 @@ enum {
     KEY_PATIENCE,
     KEY_CUBE,
     KEY_MEMORY,
+    KEY_LINDA,
     KEY_CLUSTER,
+    KEY_BUILDERS,
     KEY_FACES_PER_JOB,
     KEY_JOBS_PER_WORKER,
     KEY_STATS,
@@ -71,12 +74,27 @@ static const struct argp_option options_of_run[] = {
      "How a node finds tetrahedra: by faces (InCoDe); by points inserted brick "
      "after brick, as long as what is not final fits in its memory; or auto, "
      "the default: by points where it has some of a surface, or all bricks of "
-     "a volume, that fits. Other indexes than kd, and the face rule paper, go "
-     "by "
-     "faces",
+     "a volume, that fits. Indexes but kd, the face rule paper, and strategies "
+     "but sequential, spatial and linda-spatial, go by faces",
      1},
     {"nodes", KEY_NODES, "N", 0,
      "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
+    {"linda", KEY_LINDA, "NAME", 0,
+     "Of --strategy linda: master-slaves (the default) or spatial", 1},
+    {"cluster", KEY_CLUSTER, "N", 0,
+     "Nodes a cluster of hybrid, a power of two. Default: 4", 1},
+    {"builders", KEY_BUILDERS, "N", 0,
+     "Tetrahedron builders of each face manager. Default: all other nodes, of "
+     "hybrid those of its cluster",
+     1},
+    {"faces-per-job", KEY_FACES_PER_JOB, "M", 0,
+     "Faces that a face manager sends a builder at a time, 1 .. 96. Default: "
+     "the number of nodes that share its list; of linda 30",
+     1},
+    {"jobs-per-worker", KEY_JOBS_PER_WORKER, "N", 0,
+     "Such lists that a builder may have at a time, 1 .. 16. Default: 2; of "
+     "linda 3",
+     1},
     {"memory", KEY_MEMORY, "BYTES", 0,
      "Data memory of a node, stack included: 640K .. 1G; a small cube does "
      "with less, and an error says with how much. Default: 4M",
@@ -118,14 +136,12 @@ static const struct argp_option options_of_run[] = {
     {"seed", KEY_SEED, "N", 0, "Seed of --host-stall", 3},
     {"node-program", KEY_NODE_PROGRAM, "FILE", 0,
      "Start FILE for a node instead of incode-node", 3},
-    {"cluster", KEY_CLUSTER, "N", OPTION_HIDDEN, NULL, 3},
-    {"faces-per-job", KEY_FACES_PER_JOB, "N", OPTION_HIDDEN, NULL, 3},
-    {"jobs-per-worker", KEY_JOBS_PER_WORKER, "N", OPTION_HIDDEN, NULL, 3},
     {0}};
 
 struct parse {
     struct host_run_options *options;
     struct host_error *error;
+    unsigned linda; /* of the rows of --linda */
     uint64_t given; /* bits of keys from KEY_STRATEGY on */
 };
 
@@ -237,8 +253,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
     switch (key) {
     case KEY_STRATEGY:
         o->strategy = host_strategy_row(
-            (unsigned)choose(p, "strategy", value, host_strategy_name,
-                             host_strategies_elsewhere));
+            (unsigned)choose(p, "strategy", value, host_strategy_name, NULL));
         return true;
     case KEY_PARTITION:
         o->partition = (enum host_partition)choose(p, "partition", value,
@@ -260,6 +275,9 @@ static bool parse_names(int key, const char *value, struct parse *p)
         o->link = host_link_row(
             (unsigned)choose(p, "link", value, host_link_name, NULL));
         return true;
+    case KEY_LINDA:
+        p->linda = (unsigned)choose(p, "linda", value, host_linda_name, NULL);
+        return true;
     case KEY_BOARD:
         o->board = host_board_row((unsigned)choose(
             p, "board", value, host_board_name, host_boards_elsewhere));
@@ -267,6 +285,28 @@ static bool parse_names(int key, const char *value, struct parse *p)
     default:
         return false;
     }
+}
+
+/* How a strategy shares the work: keys from KEY_CLUSTER on. */
+static bool parse_sharing(int key, const char *value, struct parse *p)
+{
+    struct host_sharing *s = &p->options->sharing;
+    const struct {
+        const char *name;
+        unsigned *into;
+        uint64_t min, max;
+    } row[] = {{"cluster", &s->cluster, 2, HOST_NODES_MAX},
+               {"builders", &s->builders, 1, NODE_BUILDERS_MAX},
+               {"faces-per-job", &s->faces_per_job, 1, INCODE_LIST_MAX},
+               {"jobs-per-worker", &s->jobs_per_worker, 1, INCODE_LISTS_MAX}};
+    int i = key - KEY_CLUSTER;
+    uint64_t n = 0;
+    if (i < 0 || i >= (int)(sizeof row / sizeof row[0])) {
+        return false;
+    }
+    (void)number(p, row[i].name, value, row[i].min, row[i].max, &n);
+    *row[i].into = (unsigned)n;
+    return true;
 }
 
 static bool parse_testing(int key, const char *value, struct parse *p)
@@ -356,7 +396,8 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     if (key >= KEY_STRATEGY && key < KEY_END) {
         p->given |= UINT64_C(1) << (key - KEY_STRATEGY);
     }
-    if (parse_names(key, value, p) || parse_testing(key, value, p)) {
+    if (parse_names(key, value, p) || parse_sharing(key, value, p) ||
+        parse_testing(key, value, p)) {
         return 0;
     }
     switch (key) {
@@ -381,13 +422,6 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     case KEY_CUBE:
         p->options->cube = value;
         return 0;
-    case KEY_CLUSTER:
-    case KEY_FACES_PER_JOB:
-    case KEY_JOBS_PER_WORKER:
-        host_fail(p->error, HOST_USAGE,
-                  "--cluster, --faces-per-job, --jobs-per-worker: belong to "
-                  "strategies that are not in this version; leave them out");
-        return 0;
     default:
         return parse_report(key, value, p);
     }
@@ -403,6 +437,7 @@ static int check_together(const struct parse *p)
 {
     const struct host_run_options *o = p->options;
     bool cube = o->cube != NULL, ranks = !cube && o->link->ranks;
+    unsigned heeds = o->strategy == NULL ? 0 : o->strategy->sharing;
     const struct {
         int key;
         bool vain;
@@ -418,7 +453,17 @@ static int check_together(const struct parse *p)
         {KEY_HOST_RATE_TIME, !given(p, KEY_HOST_RATE),
          "--host-rate-time: goes with --host-rate alone"},
         {KEY_SEED, !given(p, KEY_HOST_STALL),
-         "--seed: goes with --host-stall alone"}};
+         "--seed: goes with --host-stall alone"},
+        {KEY_LINDA, o->strategy == NULL || o->strategy->linda == NULL,
+         "--linda: goes with --strategy linda alone"},
+        {KEY_CLUSTER, (heeds & HOST_SHARING_CLUSTER) == 0,
+         "--cluster: goes with a strategy of clusters alone, as hybrid"},
+        {KEY_BUILDERS, (heeds & HOST_SHARING_BUILDERS) == 0,
+         "--builders: goes with a strategy of face managers alone"},
+        {KEY_FACES_PER_JOB, (heeds & HOST_SHARING_LISTS) == 0,
+         "--faces-per-job: goes with a strategy of face managers alone"},
+        {KEY_JOBS_PER_WORKER, (heeds & HOST_SHARING_LISTS) == 0,
+         "--jobs-per-worker: goes with a strategy of face managers alone"}};
     for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
         if (options[i].vain && given(p, options[i].key)) {
             return host_fail(p->error, HOST_USAGE, "%s; leave it out",
@@ -525,7 +570,7 @@ static int parse_run(int argc, char **argv, unsigned flags,
         NULL,
         complete_help,
         NULL};
-    struct parse parse = {options, error, 0};
+    struct parse parse = {options, error, 0, 0};
     host_run_defaults(options);
     int status = host_options_parse(&argp, argc, argv, flags, &parse, error);
     if (status != 0) {
@@ -534,6 +579,10 @@ static int parse_run(int argc, char **argv, unsigned flags,
     if (options->throttle.bytes_a_second != 0 &&
         options->throttle.slow_us == 0) {
         options->throttle.slow_us = 30000000;
+    }
+    if (options->strategy != NULL && options->strategy->linda != NULL &&
+        given(&parse, KEY_LINDA)) {
+        options->strategy = host_strategy_linda(parse.linda);
     }
     return check_together(&parse);
 }

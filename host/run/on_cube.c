@@ -70,6 +70,11 @@ int host_run_on_cube(struct host_run_options *options, struct host_error *error)
     options->memory = the_file.memory;
     options->board = the_file.board;
     options->link = host_cube_link(&the_file);
+    for (unsigned i = 0; i < the_file.nodes; i++) {
+        options->processors += !the_file.local[i];
+    }
+    const struct host_cube_wire *wire = host_cube_host_wire(&the_file, 0);
+    options->wire_bytes_s = wire != NULL && wire->serial ? wire->baud / 10 : 0;
     options->begin = begin;
     return 0;
 }

@@ -16,7 +16,9 @@
 #include "host/mesh/facets.h"
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
+#include "memory_needed.h"
 #include "report.h"
+#include "settle.h"
 #include "stats.h"
 
 void host_run_defaults(struct host_run_options *options)
@@ -44,44 +46,6 @@ static double processor_seconds(void)
     struct timespec used;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
     return (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
-}
-
-/* The largest power of two of nodes that have a processor each. */
-static unsigned suitable_nodes(void)
-{
-    long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    unsigned nodes = 1;
-    while (nodes < HOST_PROCESSES_MAX && (long)nodes * 2 <= processors) {
-        nodes *= 2;
-    }
-    return nodes;
-}
-
-unsigned host_run_nodes(const struct host_run_options *options)
-{
-    if (options->nodes != 0) {
-        return options->nodes;
-    }
-    unsigned nodes =
-        options->strategy == NULL ? 0 : options->strategy->nodes_default;
-    return nodes != 0 ? nodes : suitable_nodes();
-}
-
-/* Nodes and strategy, where they were left open. */
-static void settle(const struct host_run_options *options, uint64_t points,
-                   struct host_run_result *result)
-{
-    result->strategy = options->strategy;
-    result->partition = options->partition;
-    result->index = options->index;
-    result->link = options->link;
-    result->board = options->board;
-    result->memory = options->memory;
-    result->nodes = host_run_nodes(options);
-    if (result->strategy == NULL) {
-        struct host_task task = {points, result->memory, result->nodes};
-        result->strategy = host_strategy_auto(&task);
-    }
 }
 
 void host_run_sum(const struct host_service *service,
@@ -116,6 +80,11 @@ void host_run_sum(const struct host_service *service,
     }
 }
 
+static uint64_t at_least(uint64_t count, uint64_t least)
+{
+    return count > least ? count : least;
+}
+
 /* The part on the nodes: ordered points in, rows of input rows out. */
 static int run_service(const struct host_run_options *options,
                        const struct host_order *order,
@@ -131,81 +100,45 @@ static int run_service(const struct host_run_options *options,
     service->setup.setup.shuffle_seed = options->shuffle_seed;
     int status = host_service_run(service, error);
     host_run_sum(service, result);
+    /* A tetrahedron builder that was lost has taken its counts with it. */
+    result->built = at_least(result->built, tets->count);
+    result->make_tetra_calls = at_least(result->make_tetra_calls, tets->count);
     result->time_io_s += 1e-6 * (double)service->pages_us;
     return status;
 }
 
-static unsigned cube_dimension(unsigned nodes)
+static int check_strategy(const struct host_run_options *options,
+                          const struct host_run_result *result,
+                          struct host_error *error)
 {
-    unsigned dimension = 0;
-    while (1u << dimension < nodes) {
-        dimension++;
-    }
-    return dimension;
+    return host_strategy_check(result->strategy, result->nodes,
+                               &options->sharing, options->face_rule,
+                               options->build, error);
 }
 
-/* The least memory that every node does with. */
-static uint64_t memory_needed(const struct host_run_options *options,
-                              const struct host_strategy *strategy,
-                              unsigned dimension,
-                              const struct node_setup_message *setup)
-{
-    struct node_identity identity = {.dimension = (uint8_t)dimension,
-                                     .window = (uint8_t)options->window,
-                                     .epoch = 1};
-    uint64_t memory = HOST_MEMORY_MIN;
-    while (host_strategy_arena(strategy, 1u << dimension, &identity, memory,
-                               setup) +
-               HOST_STACK_BYTES + HOST_STATIC_BYTES >
-           memory) {
-        memory += 16384;
-    }
-    return memory;
-}
-
-/* What can be done where a cube needs more memory than its nodes have. */
-static const char *memory_advice(const struct host_run_options *options,
-                                 const struct host_strategy *strategy,
-                                 unsigned nodes,
-                                 const struct node_setup_message *setup)
-{
-    struct host_run_options narrow = *options;
-    narrow.window = 0;
-    bool fewer = nodes > 1 &&
-                 memory_needed(options, strategy, 0, setup) <= options->memory;
-    if (options->cube != NULL) {
-        return "";
-    }
-    if (options->window > 0 &&
-        memory_needed(&narrow, strategy, cube_dimension(nodes), setup) <=
-            options->memory) {
-        return fewer ? ", fewer --nodes, or no --window" : ", or no --window";
-    }
-    return fewer ? ", or fewer --nodes" : "";
-}
-
-/* bricks, cells: of the order, where it is known; else 1 and none. */
-static int check_memory(const struct host_run_options *options,
-                        const struct host_strategy *strategy, unsigned nodes,
-                        uint32_t bricks, const uint32_t cells[3],
+static int order_points(const struct host_run_options *options,
+                        const struct host_points *points,
+                        struct host_order *order,
+                        struct host_run_result *result,
                         struct host_error *error)
 {
-    struct node_setup_message setup = {0};
-    setup.setup.bricks = bricks;
-    setup.setup.index = (uint8_t)options->index;
-    memcpy(setup.setup.cells, cells, sizeof setup.setup.cells);
-    uint64_t needed =
-        memory_needed(options, strategy, cube_dimension(nodes), &setup);
-    return needed <= options->memory
-               ? 0
-               : host_fail(error, HOST_USAGE,
-                           "%s%s %lluK: a node of %u needs at least %lluK; "
-                           "give that%s",
-                           options->cube == NULL ? "" : options->cube,
-                           options->cube == NULL ? "--memory" : ": memory",
-                           (unsigned long long)options->memory / 1024, nodes,
-                           (unsigned long long)needed / 1024,
-                           memory_advice(options, strategy, nodes, &setup));
+    host_progress_phase("ordering", NULL);
+    if (host_order_make(
+            order, options->input == NULL ? "points" : options->input,
+            points->xyz, points->count,
+            host_strategy_partition(result->strategy, options->partition),
+            result->strategy->regions(result->nodes),
+            options->index == INCODE_GRID, error) != 0) {
+        return error->code;
+    }
+    result->rows = order->rows;
+    result->points = order->points;
+    result->duplicates = order->duplicates;
+    result->negative_zeros = order->negative_zeros;
+    result->pages = order->tree.pages;
+    (void)host_settle_ordered(options, order, result);
+    return host_memory_check(options, result->strategy, result->nodes,
+                             order->bricks, order->cells, error);
 }
 
 int host_triangulate_on(const struct host_run_options *options,
@@ -229,6 +162,7 @@ int host_triangulate_on(const struct host_run_options *options,
         service.machine = &slowed;
     }
     service.strategy = result->strategy;
+    service.sharing = options->sharing;
     service.window = options->window;
     service.memory = options->quiet ? 0 : result->memory;
     service.memory_of = options->cube;
@@ -237,22 +171,9 @@ int host_triangulate_on(const struct host_run_options *options,
     result->time_start_up_s += seconds_since(start);
     start = host_now_us();
     if (status == 0) {
-        host_progress_phase("ordering", NULL);
-        status = host_order_make(
-            &order, options->input == NULL ? "points" : options->input,
-            points->xyz, points->count, options->partition,
-            result->strategy->regions(result->nodes),
-            options->index == INCODE_GRID, error);
+        status = order_points(options, points, &order, result, error);
         result->time_order_s = seconds_since(start);
-    }
-    if (status == 0) {
-        result->rows = order.rows;
-        result->points = order.points;
-        result->duplicates = order.duplicates;
-        result->negative_zeros = order.negative_zeros;
-        result->pages = order.tree.pages;
-        status = check_memory(options, result->strategy, result->nodes,
-                              order.bricks, order.cells, error);
+        service.strategy = result->strategy;
     }
     if (status == 0) {
         host_progress_phase("triangulating", "Mtet");
@@ -314,9 +235,10 @@ int host_triangulate(const struct host_run_options *options,
     struct host_machine machine;
     uint64_t start = host_now_us();
     host_progress_phase("starting nodes", NULL);
-    settle(options, points->count, result);
-    if (check_memory(options, result->strategy, result->nodes, 1, no_cells,
-                     error) != 0 ||
+    host_settle(options, points->count, result);
+    if (check_strategy(options, result, error) != 0 ||
+        host_memory_check(options, result->strategy, result->nodes, 1, no_cells,
+                          error) != 0 ||
         (options->begin != NULL ? options->begin : begin_on_board)(
             options, result, &machine, error) != 0) {
         return error->code;

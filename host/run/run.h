@@ -21,6 +21,7 @@
 #include "host/mesh/tetrahedra.h"
 #include "host/order/order.h"
 #include "host/service/service.h"
+#include "host/service/strategies/strategies.h"
 
 enum { HOST_OUTPUTS_MAX = 16 };
 
@@ -32,6 +33,7 @@ struct host_run_options {
     const char *output[HOST_OUTPUTS_MAX];
     unsigned outputs;
     const struct host_strategy *strategy; /* NULL: auto */
+    struct host_sharing sharing;
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;
@@ -39,6 +41,10 @@ struct host_run_options {
     const struct host_link *link;
     const struct host_board *board;
     unsigned nodes; /* 0: what suits this machine */
+    /* For `auto`: processors of nodes that are not of this machine, and bytes
+     * a second of the host's wire; 0: there are none, or it is fast. */
+    unsigned processors;
+    uint64_t wire_bytes_s;
     uint64_t memory;
     uint64_t patience_s; /* for a node that does not answer */
     const char *cube;    /* a file that describes real nodes, or NULL */
@@ -60,7 +66,8 @@ struct host_run_result {
     uint64_t rows, points, duplicates, negative_zeros;
     uint64_t tetrahedra, hull_facets;
     struct host_digest digest;
-    const struct host_strategy *strategy; /* the one taken */
+    const struct host_strategy *strategy; /* the one taken, */
+    char why[HOST_WHY_BYTES];             /* by `auto`: why; else empty */
     enum host_partition partition;
     enum incode_index index;
     const struct host_link *link;

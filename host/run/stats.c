@@ -117,6 +117,7 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "hull_facets", r->hull_facets);
     put_text(o, "digest", r->digest.text);
     put_text(o, "strategy", r->strategy->name);
+    put_text(o, "strategy_why", r->why);
     put_text(o, "partition", host_partitions[r->partition]);
     put_text(o, "index", host_indexes[r->index]);
     put_text(o, "link", r->link->name);

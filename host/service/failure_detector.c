@@ -106,6 +106,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
             node->silent_us = s->patience_us - probe_us(s);
         }
         node->awaited = INCODE_NONE;
+        node->owing = CUBE_HOST;
         node->left = false;
         s->report[i].up = s->report[i].ready = false;
         if (lost) {
@@ -184,6 +185,7 @@ int host_detector_pong(struct host_service *service,
     }
     node->work = pong.work;
     node->awaited = pong.awaited;
+    node->owing = pong.owing;
     node->refused = pong.refused;
     node->silent = pong.silent;
     host_doubts_heard(s, message->source, anew && first);

@@ -17,10 +17,13 @@ static bool owes(const struct host_service *s, unsigned i)
 {
     const struct host_node *node = &s->node[i];
     bool ready = !node->setup_due && !s->report[i].ready;
-    bool results = node->working && !node->job_due;
+    bool results =
+        node->working && !node->job_due && node->awaited != NODE_AWAITS_OTHERS;
     bool statistics = s->reporting && !node->report_due && !node->reported;
+    bool other =
+        s->dealt && s->strategy->owes != NULL && s->strategy->owes(&s->work, i);
     return s->started && !s->work.lost[i] && s->report[i].up &&
-           (ready || results || statistics);
+           (ready || results || statistics || other);
 }
 
 /* What it waits for is the host's to send. */
@@ -32,14 +35,16 @@ static bool is_owed(const struct host_service *s, unsigned i)
            (s->setup.credits > 0 && credits >= s->setup.credits / 2);
 }
 
-/* Who holds this node up: who keeps the page that it waits for, or itself. */
+/* Who holds this node up: who keeps the page that it waits for, who owes it
+ * answers, or itself. */
 static unsigned culprit(const struct host_service *s, unsigned i)
 {
     struct node_setup_message setup = s->setup;
     s->strategy->set_up(&s->work, i, &setup);
     uint32_t page = s->node[i].awaited;
-    uint16_t keeper =
+    uint32_t keeper =
         page == INCODE_NONE ? CUBE_HOST : node_keeper(page, setup.holders);
+    keeper = s->node[i].owing != CUBE_HOST ? s->node[i].owing : keeper;
     bool holds = keeper < s->machine->nodes && !s->work.lost[keeper] &&
                  s->node[keeper].still_us > s->patience_us / 2;
     return holds ? keeper : i;

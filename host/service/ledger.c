@@ -3,8 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "incode/front/owner.h"
-
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error)
 {
@@ -111,14 +109,15 @@ int host_ledger_finish(struct host_ledger *ledger, uint32_t node)
     return 0;
 }
 
-/* The brick that owns a tetrahedron. */
-static uint32_t owner(const struct host_order *order, const uint32_t v[4])
+uint32_t host_ledger_owner(const struct host_ledger *ledger,
+                           const struct host_order *order, const uint32_t v[4])
 {
     double at[4][3];
-    for (int i = 0; i < 4; i++)
+    for (int i = 0; i < 4; i++) {
         host_vertex(order, v[i], at[i]);
+    }
     const double *const p[4] = {at[0], at[1], at[2], at[3]};
-    return v[incode_owner(p)] / INCODE_BRICK_POINTS;
+    return v[incode_owner(ledger->owner_rule, v, p)] / INCODE_BRICK_POINTS;
 }
 
 uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
@@ -128,7 +127,8 @@ uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
     uint64_t kept = 0, count = tets->count;
     uint32_t left = ledger->bricks - ledger->committed;
     for (uint64_t i = 0; i < count; i++) {
-        if (host_ledger_committed(ledger, owner(order, tets->v[i]))) {
+        if (host_ledger_committed(
+                ledger, host_ledger_owner(ledger, order, tets->v[i]))) {
             memmove(tets->v[kept], tets->v[i], sizeof tets->v[0]);
             kept++;
         }

@@ -1,7 +1,7 @@
 /* Which bricks are committed, which are out, and under which epoch.  A result
- * counts when the brick that owns it (that of its lexicographically smallest
- * vertex) is committed; what a loss left uncommitted is dropped by
- * host_ledger_abandon, and those bricks are given out again, in ranges.
+ * counts when the brick that owns it (incode/front/owner.h) is committed; what
+ * a loss left uncommitted is dropped by host_ledger_abandon, and those bricks
+ * are given out again, in ranges.
  *
  * Memory: a bit a brick and 16 bytes a node.  Work: constant a call, but for
  * host_ledger_abandon, one pass over the tetrahedra, and host_ledger_next,
@@ -22,6 +22,7 @@
 
 #include "host/mesh/tetrahedra.h"
 #include "host/order/order.h"
+#include "incode/front/owner.h"
 
 struct host_job {
     uint32_t epoch; /* 0: the node has no job */
@@ -32,8 +33,9 @@ static_assert(sizeof(struct host_job) == 16, "16 bytes a node");
 
 struct host_ledger {
     uint32_t bricks, nodes;
-    uint32_t epoch;       /* of the last job given out */
-    uint32_t committed;   /* bricks in all */
+    enum incode_owner_rule owner_rule; /* after init: the smallest vertex */
+    uint32_t epoch;                    /* of the last job given out */
+    uint32_t committed;                /* bricks in all */
     uint32_t cursor;      /* bricks below it are committed or given out */
     uint32_t piece_max;   /* bricks of a range, at most */
     uint64_t *bits;       /* committed bricks */
@@ -43,6 +45,10 @@ struct host_ledger {
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error);
 void host_ledger_free(struct host_ledger *ledger);
+
+/* The brick that owns a tetrahedron of vertices v. */
+uint32_t host_ledger_owner(const struct host_ledger *ledger,
+                           const struct host_order *order, const uint32_t v[4]);
 
 /* The next range of bricks that are neither committed nor given out, within
  * one region of the order; false: none is left. */

@@ -3,7 +3,6 @@
 #include <stdio.h>
 
 #include "idle_nodes.h"
-#include "incode/front/owner.h"
 #include "node/result.h"
 
 enum { WHY_BYTES = 120 };
@@ -15,16 +14,6 @@ static bool is_point(const struct host_order *order, uint32_t vertex)
            vertex % INCODE_BRICK_POINTS < order->fill[brick];
 }
 
-static uint32_t owner_of(const struct host_order *order, const uint32_t v[4])
-{
-    double at[4][3];
-    for (int i = 0; i < 4; i++) {
-        host_vertex(order, v[i], at[i]);
-    }
-    const double *const p[4] = {at[0], at[1], at[2], at[3]};
-    return v[incode_owner(p)] / INCODE_BRICK_POINTS;
-}
-
 static bool is_sound(const struct host_service *s, const struct host_job *job,
                      const uint32_t v[4])
 {
@@ -34,7 +23,7 @@ static bool is_sound(const struct host_service *s, const struct host_job *job,
         v[1] == v[3] || v[2] == v[3]) {
         return false;
     }
-    uint32_t brick = owner_of(s->order, v);
+    uint32_t brick = host_ledger_owner(&s->ledger, s->order, v);
     return brick >= job->first && brick < job->last &&
            !host_ledger_committed(&s->ledger, brick);
 }
@@ -56,7 +45,7 @@ static void describe(const struct host_service *s, const struct host_job *job,
             }
         }
     }
-    uint32_t brick = owner_of(s->order, v);
+    uint32_t brick = host_ledger_owner(&s->ledger, s->order, v);
     snprintf(why, WHY_BYTES, "a result of brick %u, %s", brick,
              brick >= job->first && brick < job->last
                  ? "which it has committed before"

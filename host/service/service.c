@@ -119,6 +119,7 @@ int host_service_open(struct host_service *service, struct host_error *error)
     s->node = calloc(s->machine->nodes, sizeof *s->node);
     s->report = calloc(s->machine->nodes, sizeof *s->report);
     s->work.nodes = s->machine->nodes;
+    s->work.sharing = s->sharing;
     s->work.lost = calloc(s->machine->nodes, sizeof *s->work.lost);
     if (s->node == NULL || s->report == NULL || s->work.lost == NULL) {
         return host_fail_memory(error, "the nodes' queues");
@@ -172,6 +173,8 @@ static void prepare(struct host_service *s)
     s->setup.protocol = NODE_PROTOCOL;
     s->setup.nodes = (uint16_t)s->machine->nodes;
     s->setup.credits = CREDITS_MIN + CREDITS_SHARED / s->machine->nodes;
+    s->setup.setup.owner_rule = (uint8_t)s->strategy->owner_rule;
+    s->ledger.owner_rule = s->strategy->owner_rule;
     s->setup.setup.bricks = order->bricks;
     memcpy(s->setup.setup.lo, order->lo, sizeof order->lo);
     memcpy(s->setup.setup.hi, order->hi, sizeof order->hi);

@@ -57,7 +57,8 @@ struct host_node {
     bool left;               /* for the rest of this generation */
     bool started_anew;       /* as it was not to be trusted with work */
     uint32_t work;           /* as its last pong counted it, */
-    uint32_t awaited;        /* and the page that it waited for */
+    uint32_t awaited;        /* the page that it waited for, */
+    uint32_t owing;          /* and who owed it answers */
     uint32_t refused;        /* links where it met another key */
     uint64_t still_us;       /* without progress: idle_nodes.h */
     bool pinged;             /* a ping has not been answered */
@@ -95,6 +96,7 @@ struct host_service {
     const struct host_order *order;
     struct host_tetrahedra *tets; /* takes rows of vertex numbers */
     const struct host_strategy *strategy;
+    struct host_sharing sharing;
     struct node_setup_message setup;
     unsigned window;      /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */

@@ -3,6 +3,40 @@
 #include <math.h>
 #include <string.h>
 
+/* Ranges a node after a loss: they differ in work, and whoever is free takes
+ * the next; but each has a border, which is worked on from both sides. */
+enum { PIECES = 2 };
+
+/* Measured in runs of two nodes.  One node alone inserts points where what is
+ * not final of them fits it: about 8 n^(2/3) tetrahedra of a volume, of 38
+ * bytes, in half of its memory; of a surface always.  Face by face, surfaces,
+ * stretched grids and lattices take three times as long and more. */
+static double regions_total(const struct host_task *task)
+{
+    double open = 8 * 38 * pow((double)task->points, 2.0 / 3);
+    if (!task->by_points) {
+        return 1.05;
+    }
+    if (task->uneven) {
+        return 3.0;
+    }
+    return open <= (double)task->memory / 2 ? 1.5 : 1.05;
+}
+
+struct host_cost host_regions_cost(const struct host_task *task, double again)
+{
+    double regions = (double)task->nodes / (double)(task->points + 1);
+    double total = regions_total(task) * (1 + again * cbrt(regions));
+    return task->nodes == 1 ? (struct host_cost){1.01, 1.01}
+                            : (struct host_cost){total / task->nodes, total};
+}
+
+struct host_cost host_regions_lists_cost(unsigned groups, unsigned faces)
+{
+    double group = 3 + 30.0 / faces;
+    return (struct host_cost){group / groups, 2 * group};
+}
+
 bool host_regions_first(struct host_work *work, unsigned node,
                         struct incode_job *job)
 {
@@ -54,4 +88,33 @@ bool host_regions_next(struct host_work *work, unsigned node,
 int host_regions_commit(struct host_work *work, unsigned node, uint32_t brick)
 {
     return host_ledger_commit(work->ledger, node, brick);
+}
+
+bool host_regions_is_first(const struct host_work *work, unsigned node)
+{
+    for (unsigned i = 0; i < node; i++) {
+        if (!work->lost[i]) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool host_regions_next_alone(struct host_work *work, unsigned node,
+                             struct incode_job *job)
+{
+    return host_regions_is_first(work, node) &&
+           host_regions_next(work, node, job);
+}
+
+void host_regions_lose(struct host_work *work)
+{
+    uint32_t pieces = work->living > 1 ? PIECES * work->living : 1;
+    (void)host_ledger_abandon(work->ledger, pieces, work->order, work->tets);
+}
+
+/* One node has no use for more ranges than are left. */
+void host_regions_lose_alone(struct host_work *work)
+{
+    (void)host_ledger_abandon(work->ledger, 1, work->order, work->tets);
 }

@@ -11,6 +11,15 @@
 
 #include "strategy.h"
 
+/* Processor time of all nodes where each has a region, if nothing is built
+ * twice, and how much more the busiest has to do where a share `again` of what
+ * lies at a border is. */
+struct host_cost host_regions_cost(const struct host_task *task, double again);
+
+/* The same where one of a group of nodes has the list of faces and lends so
+ * many at a time to the others: a list costs as much as many faces do. */
+struct host_cost host_regions_lists_cost(unsigned groups, unsigned faces);
+
 /* Node i has region i, as long as nothing is done and nobody lost; otherwise
  * nobody has a first job. */
 bool host_regions_first(struct host_work *work, unsigned node,
@@ -19,6 +28,16 @@ bool host_regions_first(struct host_work *work, unsigned node,
 /* The next range of bricks that nobody has. */
 bool host_regions_next(struct host_work *work, unsigned node,
                        struct incode_job *job);
+
+/* The same for the first node that is not lost, and none for others. */
+bool host_regions_next_alone(struct host_work *work, unsigned node,
+                             struct incode_job *job);
+bool host_regions_is_first(const struct host_work *work, unsigned node);
+
+/* What a loss leaves is cut into ranges: some for each node, or as large as
+ * can be for one. */
+void host_regions_lose(struct host_work *work);
+void host_regions_lose_alone(struct host_work *work);
 
 /* A brick of the node's own job. */
 int host_regions_commit(struct host_work *work, unsigned node, uint32_t brick);

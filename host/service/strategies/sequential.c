@@ -3,10 +3,10 @@
 #include "regions.h"
 #include "strategies.h"
 
-static double cost(const struct host_task *task)
+static struct host_cost cost(const struct host_task *task)
 {
     (void)task;
-    return 1.0;
+    return (struct host_cost){1.0, 1.0};
 }
 
 static unsigned regions(unsigned nodes)
@@ -23,22 +23,6 @@ static void set_up(const struct host_work *work, unsigned node,
     setup->role = all && node > 0 ? NODE_HOLDER : NODE_WORKER;
 }
 
-static bool next(struct host_work *work, unsigned node, struct incode_job *job)
-{
-    for (unsigned i = 0; i < node; i++) {
-        if (!work->lost[i]) {
-            return false;
-        }
-    }
-    return host_regions_next(work, node, job);
-}
-
-/* One node has no use for more ranges than are left. */
-static void lose(struct host_work *work)
-{
-    (void)host_ledger_abandon(work->ledger, 1, work->order, work->tets);
-}
-
 const struct host_strategy host_sequential = {
     .name = "sequential",
     .title = "Sequential",
@@ -48,7 +32,7 @@ const struct host_strategy host_sequential = {
     .regions = regions,
     .set_up = set_up,
     .first = host_regions_first,
-    .next = next,
+    .next = host_regions_next_alone,
     .commit = host_regions_commit,
-    .lose = lose,
+    .lose = host_regions_lose_alone,
 };

@@ -3,13 +3,9 @@
 #include "regions.h"
 #include "strategies.h"
 
-/* Ranges a node after a loss: they differ in work, and whoever is free takes
- * the next; but each has a border, which is worked on from both sides. */
-enum { PIECES = 2 };
-
-static double cost(const struct host_task *task)
+static struct host_cost cost(const struct host_task *task)
 {
-    return 1.0 / task->nodes;
+    return host_regions_cost(task, 2.2);
 }
 
 static unsigned regions(unsigned nodes)
@@ -25,12 +21,6 @@ static void set_up(const struct host_work *work, unsigned node,
     setup->role = NODE_WORKER;
 }
 
-static void lose(struct host_work *work)
-{
-    uint32_t pieces = work->living > 1 ? PIECES * work->living : 1;
-    (void)host_ledger_abandon(work->ledger, pieces, work->order, work->tets);
-}
-
 const struct host_strategy host_spatial = {
     .name = "spatial",
     .title = "Spatial decomposition",
@@ -41,5 +31,5 @@ const struct host_strategy host_spatial = {
     .first = host_regions_first,
     .next = host_regions_next,
     .commit = host_regions_commit,
-    .lose = lose,
+    .lose = host_regions_lose,
 };

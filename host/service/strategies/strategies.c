@@ -1,5 +1,7 @@
 #include "strategies.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #define POINT(name) &host_##name,
@@ -7,12 +9,24 @@ static const struct host_strategy *const rows[] = {HOST_STRATEGIES(POINT)};
 
 enum { ROWS = sizeof rows / sizeof rows[0] };
 
-const char host_strategies_elsewhere[] =
-    ",master-slaves,linda,hybrid,exchange,";
-
 const struct host_strategy *host_strategy_row(unsigned i)
 {
     return i < ROWS ? rows[i] : NULL;
+}
+
+const struct host_strategy *host_strategy_linda(unsigned i)
+{
+    unsigned row = 0;
+    while (row < ROWS && (rows[row]->linda == NULL || i-- > 0)) {
+        row++;
+    }
+    return host_strategy_row(row);
+}
+
+const char *host_linda_name(unsigned i)
+{
+    const struct host_strategy *row = host_strategy_linda(i);
+    return row == NULL ? NULL : row->linda;
 }
 
 const struct host_strategy *host_strategy_named(const char *name)
@@ -25,24 +39,94 @@ const struct host_strategy *host_strategy_named(const char *name)
     return NULL;
 }
 
+/* What one node alone takes for a point, and what a point takes on the host's
+ * wire, its page and some 6.7 tetrahedra: measured on uniform points. */
+#define POINT_S 2.5e-6
+enum { POINT_BYTES = 70 };
+
+int host_strategy_check(const struct host_strategy *strategy, unsigned nodes,
+                        const struct host_sharing *sharing,
+                        enum incode_face_rule rule, enum incode_build build,
+                        struct host_error *error)
+{
+    if (strategy->by_faces && build == INCODE_BUILD_POINTS) {
+        return host_fail(error, HOST_USAGE,
+                         "--build points: --strategy %s goes face by face; "
+                         "leave it out",
+                         strategy->name);
+    }
+    return strategy->check == NULL
+               ? 0
+               : strategy->check(nodes, sharing, rule, error);
+}
+
+double host_strategy_time(const struct host_strategy *strategy,
+                          const struct host_task *task)
+{
+    struct host_error refused = {0};
+    if (host_strategy_check(strategy, task->nodes, &task->sharing,
+                            task->face_rule, task->build, &refused) != 0 ||
+        (task->fits != NULL && !task->fits(task->context, strategy))) {
+        return INFINITY;
+    }
+    struct host_cost cost = strategy->cost(task);
+    double all = cost.total / task->processors;
+    double wire = task->wire_bytes_s == 0
+                      ? 0.0
+                      : POINT_BYTES / POINT_S / (double)task->wire_bytes_s;
+    double longest = cost.busiest > all ? cost.busiest : all;
+    return longest > wire ? longest : wire;
+}
+
 const struct host_strategy *host_strategy_auto(const struct host_task *task)
 {
     const struct host_strategy *best = rows[0];
     for (unsigned i = 1; i < ROWS; i++) {
-        best = rows[i]->cost(task) < best->cost(task) ? rows[i] : best;
+        best =
+            host_strategy_time(rows[i], task) < host_strategy_time(best, task)
+                ? rows[i]
+                : best;
     }
     return best;
 }
 
+void host_strategy_why(const struct host_task *task, char text[HOST_WHY_BYTES])
+{
+    const struct host_strategy *best = host_strategy_auto(task);
+    int at = snprintf(text, HOST_WHY_BYTES,
+                      "%s is expected to take %.2f of one node's time",
+                      best->name, host_strategy_time(best, task));
+    for (unsigned i = 0; i < ROWS; i++) {
+        double time = host_strategy_time(rows[i], task);
+        if (rows[i] != best && time < INFINITY && at < HOST_WHY_BYTES) {
+            at += snprintf(text + at, HOST_WHY_BYTES - (size_t)at, ", %s %.2f",
+                           rows[i]->name, time);
+        }
+    }
+}
+
+enum host_partition
+host_strategy_partition(const struct host_strategy *strategy,
+                        enum host_partition asked)
+{
+    return asked == HOST_ADAPTIVE && strategy->owner_rule == INCODE_OWNER_LOWEST
+               ? HOST_OWNED
+               : asked;
+}
+
 size_t host_strategy_arena(const struct host_strategy *strategy, unsigned nodes,
                            const struct node_identity *identity, size_t memory,
+                           const struct host_sharing *sharing,
                            const struct node_setup_message *given)
 {
-    const struct host_work work = {.nodes = nodes, .living = nodes};
+    struct host_work work = {.sharing = *sharing, .nodes = nodes};
     size_t most = 0;
-    for (unsigned i = 0; i < nodes; i++) {
+    for (unsigned i = 0; i <= nodes; i++) {
+        /* Last, what is left for one that has lost all others. */
         struct node_setup_message setup = *given;
-        strategy->set_up(&work, i, &setup);
+        work.living = i < nodes ? nodes : 1;
+        setup.setup.owner_rule = (uint8_t)strategy->owner_rule;
+        strategy->set_up(&work, i < nodes ? i : 0, &setup);
         size_t needed = node_arena_needed(identity, memory, &setup);
         most = needed > most ? needed : most;
     }
@@ -56,5 +140,7 @@ const char *host_strategy_name(unsigned i)
 
 const char *host_strategy_help(unsigned i)
 {
-    return i < ROWS ? rows[i]->help : i == ROWS ? "one of these" : NULL;
+    return i < ROWS    ? rows[i]->help
+           : i == ROWS ? "the one that is expected to be done first"
+                       : NULL;
 }

@@ -26,8 +26,25 @@
 #include "node/message.h"
 #include "transport/cube.h"
 
+/* What a user may say of how a strategy shares the work; 0: nothing, and the
+ * strategy has its own default. */
+struct host_sharing {
+    unsigned cluster;         /* nodes a cluster */
+    unsigned builders;        /* of each face manager */
+    unsigned faces_per_job;   /* in a list, at most */
+    unsigned jobs_per_worker; /* lists a builder may have at a time */
+};
+
+/* Which of it a strategy heeds, a bit each. */
+enum {
+    HOST_SHARING_CLUSTER = 1,
+    HOST_SHARING_BUILDERS = 2,
+    HOST_SHARING_LISTS = 4 /* faces_per_job, jobs_per_worker */
+};
+
 /* What a strategy sees of a run. */
 struct host_work {
+    struct host_sharing sharing;
     unsigned nodes;  /* of the cube */
     unsigned living; /* of them, those that are not lost */
     bool *lost;      /* [nodes]: not in this generation */
@@ -42,27 +59,54 @@ struct host_work {
     void *context; /* of write */
 };
 
+struct host_strategy;
+
 /* What `auto` knows when it chooses. */
 struct host_task {
     uint64_t points;
     uint64_t memory; /* of a node, bytes */
     unsigned nodes;
+    unsigned processors;   /* of them, so many compute at once */
+    uint64_t wire_bytes_s; /* of the host's wire; 0: it holds nobody up */
+    enum incode_face_rule face_rule;
+    enum incode_build build;
+    struct host_sharing sharing;
+    /* Whether the nodes' memory does; NULL: it does for all. */
+    bool (*fits)(const void *context, const struct host_strategy *strategy);
+    const void *context; /* of fits */
+    bool by_points;      /* one node alone may insert them (triangulator.h), */
+    bool uneven; /* and they fill no volume evenly, as far as is known */
+};
+
+/* Processor time, in that of one node alone. */
+struct host_cost {
+    double busiest; /* of the node that has most to do */
+    double total;   /* of all nodes */
 };
 
 struct host_strategy {
-    const char *name;       /* in options and statistics */
-    const char *title;      /* in tables */
-    const char *help;       /* what it does, in a few words */
-    size_t state_bytes;     /* of its own */
+    const char *name;                  /* in options and statistics */
+    const char *title;                 /* in tables */
+    const char *help;                  /* what it does, in a few words */
+    const char *linda;                 /* in --linda; NULL: no Linda program */
+    size_t state_bytes;                /* of its own */
+    enum incode_owner_rule owner_rule; /* of nodes and host */
+    bool by_faces;                     /* whatever is asked for, face by face */
     unsigned nodes_default; /* 0: as many as this machine has processors */
-    /* Time that it is expected to take, in that of one node alone; INFINITY
-     * where it cannot do the task.  `auto` takes the least. */
-    double (*cost)(const struct host_task *task);
+    unsigned sharing;       /* what it heeds of struct host_sharing */
+    /* 0, or HOST_USAGE with the error where it cannot be run so.  NULL: it
+     * always can. */
+    int (*check)(unsigned nodes, const struct host_sharing *sharing,
+                 enum incode_face_rule rule, struct host_error *error);
+    /* Processor time that it is expected to take; INFINITY where it cannot do
+     * the task.  `auto` takes the one that is done first (strategies.h). */
+    struct host_cost (*cost)(const struct host_task *task);
     /* Regions that the order is cut into: a power of two. */
     unsigned (*regions)(unsigned nodes);
     /* Fills in what the node has to know: its role, and what goes with it.  The
      * rest is there already.  Once a node and generation, or more often; before
-     * the run as well, where work has no more than the numbers of nodes. */
+     * the run as well, where work has no more than the numbers of nodes and
+     * the sharing: all of them are living, or one. */
     void (*set_up)(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup);
     /* The first job of a node, when all nodes have their setup: true, or false
@@ -87,6 +131,8 @@ struct host_strategy {
      * none of them. */
     int (*take)(struct host_work *work, const struct cube_message *message,
                 struct host_error *error);
+    /* Whether a node without a job has something to do.  NULL: it has not. */
+    bool (*owes)(const struct host_work *work, unsigned node);
 };
 
 #endif

@@ -86,6 +86,24 @@ static void test_options(void **unused)
     assert_int_equal(o.patience_s, 7);
 }
 
+/* The Linda programs, and what they heed, in any order. */
+static void test_linda(void **unused)
+{
+    static const char *const words[][4] = {
+        {"a.xyz", "--strategy=linda", "--faces-per-job=7", NULL},
+        {"a.xyz", "--linda=master-slaves", "--strategy=linda", NULL},
+        {"a.xyz", "--linda=spatial", "--strategy=linda", NULL}};
+    static const char *const names[] = {"linda", "linda", "linda-spatial"};
+    (void)unused;
+    for (size_t i = 0; i < 3; i++) {
+        struct host_run_options o;
+        struct host_error error;
+        assert_int_equal(parse(words[i], &o, &error), 0);
+        assert_string_equal(o.strategy->name, names[i]);
+        assert_int_equal(o.sharing.faces_per_job, i == 0 ? 7 : 0);
+    }
+}
+
 /* Exit status 2, and the message says what is allowed. */
 static void test_refused(void **unused)
 {
@@ -93,7 +111,8 @@ static void test_refused(void **unused)
     static const struct {
         const char *word, *said;
     } wrong[] = {
-        {"--strategy=linda", "not in this version; allowed: sequential, "},
+        {"--linda=two", "no such name; allowed: master-slaves, spatial"},
+        {"--linda=spatial", "goes with --strategy linda alone"},
         {"--strategy=quick", "no such name"},
         {"--partition=odd", "adaptive, uniform"},
         {"--index=tree", "naive, grid, kd"},
@@ -103,7 +122,14 @@ static void test_refused(void **unused)
         {"--link=a-name-longer-than-any-other-name-that-there-is",
          "no such name; allowed: tcp"},
         {"--board=mps2-an500", "not in this version; allowed: linux"},
-        {"--cluster=4", "not in this version"},
+        {"--cluster=1", "2 to 1024"},
+        {"--cluster=4", "--cluster: goes with"},
+        {"--builders=0", "1 to 1023"},
+        {"--builders=4", "--builders: goes with"},
+        {"--faces-per-job=97", "1 to 96"},
+        {"--faces-per-job=9", "--faces-per-job: goes with"},
+        {"--jobs-per-worker=17", "1 to 16"},
+        {"--jobs-per-worker=2", "--jobs-per-worker: goes with"},
         {"--strategy=spatail", "did you mean spatial? allowed: "},
         {"--nodes=3", "not a power of two, as a cube has nodes; allowed: 1, 2, "
                       "4, 8, 16, 32, 64"},
@@ -268,25 +294,15 @@ static void test_strategies(void **unused)
     }
     assert_true(i >= 3);
     assert_string_equal(host_strategy_name(i - 1), "auto");
-    /* What other versions know is none of this one. */
-    for (const char *c = host_strategies_elsewhere; c[1] != '\0';) {
-        char name[32];
-        assert_int_equal(sscanf(c, ",%31[^,]", name), 1);
-        words[1] = name;
-        assert_null(host_strategy_named(name));
-        assert_int_equal(parse(words, &o, &error), HOST_USAGE);
-        assert_non_null(strstr(error.text, "not in this version; allowed: "));
-        c += strlen(name) + 1;
-    }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults),   cmocka_unit_test(test_options),
-        cmocka_unit_test(test_refused),    cmocka_unit_test(test_in_vain),
-        cmocka_unit_test(test_names),      cmocka_unit_test(test_rows),
-        cmocka_unit_test(test_strategies),
+        cmocka_unit_test(test_defaults), cmocka_unit_test(test_options),
+        cmocka_unit_test(test_linda),    cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_in_vain),  cmocka_unit_test(test_names),
+        cmocka_unit_test(test_rows),     cmocka_unit_test(test_strategies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

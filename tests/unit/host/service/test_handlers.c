@@ -266,10 +266,10 @@ static void test_texts(void **unused)
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 6, expected 7"},
-        {NODE_READY, &ready, 4, "protocol version 6, expected 7"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 7, expected 8"},
+        {NODE_READY, &ready, 4, "protocol version 7, expected 8"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
-        {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 36"},
+        {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 40"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
         {NODE_RESULT, &ready, 2, "results in 2 bytes, expected 8"},
         {NODE_PAGE_REQUEST, &page, 4, "page 1000000 out of range 0.."},
@@ -291,7 +291,7 @@ static void test_texts(void **unused)
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
          "same version"}};
-    assert_int_equal(NODE_PROTOCOL, 7);
+    assert_int_equal(NODE_PROTOCOL, 8);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();

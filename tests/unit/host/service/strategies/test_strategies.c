@@ -74,9 +74,12 @@ static const char *roles(const struct host_strategy *strategy)
     for (unsigned i = 0; i < NODES; i++) {
         struct node_setup_message setup = {0};
         strategy->set_up(&work, i, &setup);
-        text[i] = setup.role == NODE_WORKER   ? 'w'
-                  : setup.role == NODE_HOLDER ? 'h'
-                                              : '?';
+        text[i] = setup.role == NODE_WORKER     ? 'w'
+                  : setup.role == NODE_HOLDER   ? 'h'
+                  : setup.role == NODE_MANAGER  ? 'm'
+                  : setup.role == NODE_BUILDER  ? 'b'
+                  : setup.role == NODE_EXCHANGE ? 'e'
+                                                : '?';
         for (unsigned k = 1; k < NODES; k++) {
             struct node_setup_message other = {0};
             strategy->set_up(&work, k, &other);
@@ -230,6 +233,83 @@ static void test_spatial_loss(void **unused)
     }
 }
 
+/* What NODE_REGIONS have said to each node. */
+static struct {
+    uint32_t first[NODES + 1], known;
+    bool refuse;
+} told[NODES];
+
+static bool write_regions(void *context, unsigned node, uint8_t type,
+                          const void *data, size_t size)
+{
+    struct node_regions_message head;
+    (void)context;
+    if (told[node].refuse) {
+        return false;
+    }
+    assert_int_equal(type, NODE_REGIONS);
+    assert_true(size >= sizeof head);
+    memcpy(&head, data, sizeof head);
+    assert_int_equal(size, sizeof head + 4 * (size_t)head.count);
+    assert_int_equal(head.first, told[node].known);
+    assert_true(told[node].known + head.count <= NODES + 1);
+    memcpy(told[node].first + head.first, (const uint8_t *)data + sizeof head,
+           4 * (size_t)head.count);
+    told[node].known += head.count;
+    return true;
+}
+
+/* All exchange, and are told all regions, once; after a loss they work by
+ * themselves, and hear nothing of them. */
+static void test_exchange(void **unused)
+{
+    (void)unused;
+    const struct host_strategy *s = &host_exchange;
+    struct incode_job job;
+    struct node_setup_message setup = {.setup.build = INCODE_BUILD_AUTO};
+    struct host_error error;
+    begin(s);
+    assert_int_equal(s->check(NODES, &work.sharing, INCODE_FACE_OWN, &error),
+                     0);
+    assert_int_equal(s->check(NODES, &work.sharing, INCODE_FACE_PAPER, &error),
+                     HOST_USAGE);
+    work.write = write_regions;
+    memset(told, 0, sizeof told);
+    assert_string_equal(roles(s), "eeee");
+    s->set_up(&work, 1, &setup);
+    assert_int_equal(s->owner_rule, INCODE_OWNER_LOWEST);
+    assert_int_equal(setup.setup.build, INCODE_BUILD_FACES);
+    told[2].refuse = true;
+    assert_false(s->send(&work, 2));
+    told[2].refuse = false;
+    for (unsigned i = 0; i < NODES; i++) {
+        for (bool more = true; more;) {
+            more = s->send(&work, i);
+        }
+        assert_int_equal(told[i].known, NODES + 1);
+        for (unsigned k = 0; k < NODES; k++) {
+            assert_int_equal(told[i].first[k], order.region[k].first);
+        }
+        assert_int_equal(told[i].first[NODES], order.bricks);
+        assert_true(s->first(&work, i, &job));
+        (void)give(i, &job);
+    }
+    /* All start again, and nothing is done: once more. */
+    s->lose(&work);
+    memset(told, 0, sizeof told);
+    assert_string_equal(roles(s), "eeee");
+    assert_true(s->send(&work, 3));
+    assert_true(s->first(&work, 3, &job));
+    (void)give(3, &job);
+    assert_int_equal(s->commit(&work, 3, order.region[3].first), 0);
+    lose(s, 0);
+    assert_string_equal(roles(s), "wwww");
+    assert_false(s->send(&work, 1));
+    assert_false(s->first(&work, 1, &job));
+    assert_true(s->next(&work, 1, &job));
+    end();
+}
+
 /* Nothing is done, and nodes only start again: each has its region again. */
 static void test_spatial_restart(void **unused)
 {
@@ -247,6 +327,156 @@ static void test_spatial_restart(void **unused)
         assert_int_equal(job.last, order.region[i].last);
     }
     end();
+}
+
+/* Who builds for the manager, one bit each. */
+static unsigned builders_of(const struct host_strategy *strategy,
+                            unsigned manager)
+{
+    struct node_setup_message setup = {0};
+    strategy->set_up(&work, manager, &setup);
+    assert_int_equal(setup.role, NODE_MANAGER);
+    assert_true(setup.faces_per_job > 0 && setup.jobs_per_worker > 0);
+    unsigned builders = setup.builders[0];
+    for (unsigned i = 0; i < NODES; i++) {
+        struct node_setup_message other = {0};
+        strategy->set_up(&work, i, &other);
+        if ((builders >> i & 1) != 0) {
+            assert_int_equal(other.role, NODE_BUILDER);
+            assert_int_equal(other.manager, manager);
+            assert_int_equal(other.jobs_per_worker, setup.jobs_per_worker);
+        }
+    }
+    return builders;
+}
+
+static void test_master_slaves(void **unused)
+{
+    (void)unused;
+    const struct host_strategy *s = &host_master_slaves;
+    struct incode_job job, none;
+    begin(s);
+    assert_string_equal(roles(s), "mbbb");
+    assert_int_equal(builders_of(s, 0), 14);
+    work.sharing = (struct host_sharing){.builders = 2};
+    assert_string_equal(roles(s), "mbbw");
+    assert_int_equal(builders_of(s, 0), 6);
+    work.sharing =
+        (struct host_sharing){.faces_per_job = 7, .jobs_per_worker = 5};
+    struct node_setup_message setup = {0};
+    s->set_up(&work, 0, &setup);
+    assert_int_equal(setup.faces_per_job, 7);
+    assert_int_equal(setup.jobs_per_worker, 5);
+    work.sharing = (struct host_sharing){0};
+    assert_true(s->first(&work, 0, &job));
+    assert_int_equal(job.first, 0);
+    assert_int_equal(job.last, order.bricks);
+    check_box(&job);
+    (void)give(0, &job);
+    for (unsigned i = 0; i < NODES; i++) {
+        assert_false(i > 0 && s->first(&work, i, &none));
+        assert_false(s->next(&work, i, &none));
+    }
+    /* Without its builder it goes on with two, and what is committed stays. */
+    assert_int_equal(s->commit(&work, 0, 0), 0);
+    lose(s, 2);
+    assert_string_equal(roles(s), "mbwb");
+    assert_int_equal(builders_of(s, 0), 10);
+    assert_false(s->first(&work, 0, &job));
+    assert_true(s->next(&work, 0, &job));
+    assert_int_equal(job.first, 1);
+    (void)give(0, &job);
+    /* Without its manager, the next one is it; the last one works alone. */
+    lose(s, 0);
+    assert_string_equal(roles(s), "wmwb");
+    assert_int_equal(builders_of(s, 1), 8);
+    assert_false(s->next(&work, 3, &none));
+    lose(s, 1);
+    assert_string_equal(roles(s), "wwww");
+    assert_true(s->next(&work, 3, &job));
+    (void)give(3, &job);
+    commit_all(s, 3, &job);
+    assert_int_equal(ledger.committed, order.bricks);
+    end();
+}
+
+static void test_hybrid(void **unused)
+{
+    (void)unused;
+    const struct host_strategy *s = &host_hybrid;
+    struct incode_job job, none;
+    begin(s);
+    assert_int_equal(order.regions, NODES);
+    assert_string_equal(roles(s), "mbbb");
+    work.sharing = (struct host_sharing){.cluster = 2};
+    assert_string_equal(roles(s), "mbmb");
+    assert_int_equal(builders_of(s, 0), 2);
+    assert_int_equal(builders_of(s, 2), 8);
+    for (unsigned i = 0; i < NODES; i += 2) {
+        assert_true(s->first(&work, i, &job));
+        assert_int_equal(job.first, order.region[i].first);
+        assert_int_equal(job.last, order.region[i + 1].last);
+        check_box(&job);
+        (void)give(i, &job);
+        assert_false(s->first(&work, i + 1, &none));
+    }
+    for (unsigned i = 0; i < NODES; i++) {
+        assert_false(s->next(&work, i, &none));
+    }
+    assert_int_equal(s->commit(&work, 0, 0), 0);
+    /* Nodes only start again: the managers share what is left. */
+    s->lose(&work);
+    assert_string_equal(roles(s), "mbmb");
+    assert_false(s->first(&work, 0, &none));
+    assert_false(s->next(&work, 1, &none));
+    assert_true(s->next(&work, 2, &job));
+    /* After a loss all that are left work. */
+    lose(s, 1);
+    assert_string_equal(roles(s), "wwww");
+    for (unsigned i = 0; s->next(&work, i == 1 ? 3 : i, &job);
+         i = (i + 1) % NODES) {
+        (void)give(i == 1 ? 3 : i, &job);
+        commit_all(s, i == 1 ? 3 : i, &job);
+    }
+    assert_int_equal(ledger.committed, order.bricks);
+    end();
+}
+
+static void check_refused(const struct host_strategy *s, unsigned nodes,
+                          struct host_sharing sharing,
+                          enum incode_face_rule rule, const char *text)
+{
+    struct host_error error = {0};
+    assert_int_equal(s->check(nodes, &sharing, rule, &error),
+                     text == NULL ? 0 : HOST_USAGE);
+    assert_true(text == NULL || strstr(error.text, text) != NULL);
+}
+
+static void test_refusals(void **unused)
+{
+    (void)unused;
+    static const struct host_strategy *const rows[] = {&host_master_slaves,
+                                                       &host_hybrid};
+    const struct host_sharing none = {0};
+    for (unsigned i = 0; i < 2; i++) {
+        const struct host_strategy *s = rows[i];
+        check_refused(s, 1, none, INCODE_FACE_OWN, "--nodes 2");
+        check_refused(s, 2, none, INCODE_FACE_OWN, NULL);
+        check_refused(s, 8, none, INCODE_FACE_PAPER, "--face-rule paper");
+        check_refused(s, 4, (struct host_sharing){.builders = 3},
+                      INCODE_FACE_OWN, NULL);
+        check_refused(s, 4, (struct host_sharing){.builders = 4},
+                      INCODE_FACE_OWN, "--builders 4");
+    }
+    const struct host_strategy *s = &host_hybrid;
+    check_refused(s, 8, (struct host_sharing){.cluster = 8}, INCODE_FACE_OWN,
+                  NULL);
+    check_refused(s, 8, (struct host_sharing){.cluster = 3}, INCODE_FACE_OWN,
+                  "--cluster 3");
+    check_refused(s, 8, (struct host_sharing){.cluster = 16}, INCODE_FACE_OWN,
+                  "--cluster 16");
+    check_refused(s, 8, (struct host_sharing){.cluster = 2, .builders = 2},
+                  INCODE_FACE_OWN, "--builders 2");
 }
 
 /* The first node that is given bricks at the beginning, and its job; NODES: a
@@ -296,36 +526,6 @@ static void test_lost_tetrahedra(void **unused)
     assert_true(tried > 0);
 }
 
-/* Every row can be run and named, and only by its own name. */
-static void test_table(void **unused)
-{
-    (void)unused;
-    const struct host_task task = {1000, 4u << 20, NODES};
-    unsigned rows = 0;
-    for (; host_strategy_row(rows) != NULL; rows++) {
-        const struct host_strategy *s = host_strategy_row(rows);
-        char wanted[64];
-        assert_string_equal(host_strategy_name(rows), s->name);
-        assert_string_equal(host_strategy_help(rows), s->help);
-        assert_ptr_equal(host_strategy_named(s->name), s);
-        assert_true(s->title[0] != '\0' && s->help[0] != '\0');
-        assert_true(s->cost(&task) > 0.0);
-        snprintf(wanted, sizeof wanted, ",%s,", s->name);
-        assert_null(strstr(host_strategies_elsewhere, wanted));
-        for (unsigned nodes = 1; nodes <= 1024; nodes *= 2) {
-            unsigned regions = s->regions(nodes);
-            assert_true(regions > 0 && (regions & (regions - 1)) == 0);
-        }
-    }
-    assert_true(rows >= 2);
-    assert_string_equal(host_strategy_name(rows), "auto");
-    assert_non_null(host_strategy_help(rows));
-    assert_null(host_strategy_name(rows + 1));
-    assert_null(host_strategy_help(rows + 1));
-    assert_null(host_strategy_named("auto"));
-    assert_null(host_strategy_row(UINT32_MAX));
-}
-
 /* The memory that is asked for does for every role that a strategy gives, and
  * is no more than one of them needs. */
 static void test_arena(void **unused)
@@ -333,34 +533,24 @@ static void test_arena(void **unused)
     (void)unused;
     const struct node_identity identity = {.dimension = 2, .epoch = 1};
     const struct node_setup_message given = {.setup = {.bricks = 100}};
+    const struct host_sharing sharing = {0};
     for (unsigned r = 0; host_strategy_row(r) != NULL; r++) {
         const struct host_strategy *s = host_strategy_row(r);
-        size_t bytes =
-            host_strategy_arena(s, NODES, &identity, 1u << 20, &given);
+        size_t bytes = host_strategy_arena(s, NODES, &identity, 1u << 20,
+                                           &sharing, &given);
         bool needed = false;
         begin(s);
-        for (unsigned i = 0; i < NODES; i++) {
+        for (unsigned i = 0; i <= NODES; i++) {
             struct node_setup_message setup = given;
-            s->set_up(&work, i, &setup);
+            work.living = i < NODES ? NODES : 1; /* all others were lost */
+            setup.setup.owner_rule = (uint8_t)s->owner_rule;
+            s->set_up(&work, i % NODES, &setup);
             size_t one = node_arena_needed(&identity, 1u << 20, &setup);
             assert_true(one <= bytes);
             needed = needed || one == bytes;
         }
         assert_true(needed);
         end();
-    }
-}
-
-static void test_auto(void **unused)
-{
-    (void)unused;
-    for (unsigned nodes = 1; nodes <= 64; nodes *= 2) {
-        const struct host_task task = {20000, 4u << 20, nodes};
-        const struct host_strategy *best = host_strategy_auto(&task);
-        assert_ptr_equal(best, nodes == 1 ? &host_sequential : &host_spatial);
-        for (unsigned r = 0; host_strategy_row(r) != NULL; r++) {
-            assert_true(best->cost(&task) <= host_strategy_row(r)->cost(&task));
-        }
     }
 }
 
@@ -371,10 +561,12 @@ int main(void)
         cmocka_unit_test(test_spatial_first),
         cmocka_unit_test(test_spatial_loss),
         cmocka_unit_test(test_spatial_restart),
+        cmocka_unit_test(test_master_slaves),
+        cmocka_unit_test(test_hybrid),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_exchange),
         cmocka_unit_test(test_lost_tetrahedra),
-        cmocka_unit_test(test_table),
         cmocka_unit_test(test_arena),
-        cmocka_unit_test(test_auto),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -1,0 +1,27 @@
+/* What a run's options leave open: how many nodes, and by which strategy.
+ * `auto` is settled twice: before the points are ordered, as if they filled a
+ * volume evenly, for the order is cut into regions; and once more when their
+ * bricks tell whether they do.
+ *
+ * Memory: none.  Work: a look at a thousand bricks.
+ *
+ *     host_settle(&options, points.count, &result);
+ *     (void)host_settle_ordered(&options, &order, &result);
+ *     printf("%s, as %s\n", result.strategy->name, result.why);
+ */
+#ifndef HOST_SETTLE_H
+#define HOST_SETTLE_H
+
+#include "run.h"
+
+/* Fills in the result's strategy, nodes and what else is as in the options. */
+void host_settle(const struct host_run_options *options, uint64_t points,
+                 struct host_run_result *result);
+
+/* Settles `auto` again, by the order; true where it has another strategy now,
+ * for which the order's regions have been joined if it wants one alone. */
+bool host_settle_ordered(const struct host_run_options *options,
+                         struct host_order *order,
+                         struct host_run_result *result);
+
+#endif

@@ -1,0 +1,85 @@
+#include "builders.h"
+
+#include "incode/builder.h"
+
+/* Two lists for each builder from the start, as in the paper. */
+enum { JOBS_PER_WORKER = 2 };
+
+static bool is_lost(const struct host_work *work, unsigned node)
+{
+    return work->lost != NULL && work->lost[node];
+}
+
+/* How many of the group before this node are there. */
+static unsigned place(const struct host_work *work,
+                      const struct host_builders *group, unsigned node)
+{
+    unsigned before = 0;
+    for (unsigned i = group->first; i < node; i++) {
+        before += !is_lost(work, i);
+    }
+    return before;
+}
+
+static void appoint(const struct host_work *work,
+                    const struct host_builders *group, unsigned manager,
+                    struct node_setup_message *setup)
+{
+    unsigned left = group->builders;
+    setup->role = NODE_MANAGER;
+    for (unsigned i = manager + 1; i < group->last && left > 0; i++) {
+        if (!is_lost(work, i)) {
+            setup->builders[i / 8] |= (uint8_t)(1u << i % 8);
+            left--;
+        }
+    }
+}
+
+void host_builders_set_up(const struct host_work *work,
+                          const struct host_builders *group, unsigned node,
+                          struct node_setup_message *setup)
+{
+    const struct host_sharing *sharing = &work->sharing;
+    unsigned faces = sharing->faces_per_job != 0 ? sharing->faces_per_job
+                                                 : group->faces_per_job;
+    unsigned lists = sharing->jobs_per_worker != 0 ? sharing->jobs_per_worker
+                                                   : JOBS_PER_WORKER;
+    unsigned there = place(work, group, group->last);
+    unsigned at = place(work, group, node), manager = group->first;
+    setup->role = NODE_WORKER;
+    if (work->living == 1 || there < 2 || at > group->builders ||
+        is_lost(work, node)) {
+        return;
+    }
+    while (is_lost(work, manager)) {
+        manager++;
+    }
+    setup->jobs_per_worker = (uint16_t)lists;
+    if (at > 0) {
+        setup->role = NODE_BUILDER;
+        setup->manager = (uint16_t)manager;
+        return;
+    }
+    setup->faces_per_job =
+        (uint16_t)(faces < INCODE_LIST_MAX ? faces : INCODE_LIST_MAX);
+    appoint(work, group, manager, setup);
+}
+
+int host_builders_check(const char *name, unsigned group,
+                        const struct host_sharing *sharing,
+                        enum incode_face_rule rule, struct host_error *error)
+{
+    if (rule != INCODE_FACE_OWN) {
+        return host_fail(error, HOST_USAGE,
+                         "--face-rule paper: asks for points, which a face "
+                         "manager of --strategy %s has not; leave it out",
+                         name);
+    }
+    if (sharing->builders >= group) {
+        return host_fail(error, HOST_USAGE,
+                         "--builders %u: %u nodes have %u beside their face "
+                         "manager; give 1 to %u",
+                         sharing->builders, group, group - 1, group - 1);
+    }
+    return 0;
+}

@@ -1,0 +1,87 @@
+/* What `auto` makes of points that fill a volume, and of points that do not. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "host/mesh/gen.h"
+#include "host/run/settle.h"
+
+enum { POINTS = 5000, NODES = 2 };
+
+static struct host_run_result result;
+
+/* Settles a run on so many points of that kind; true: again, by their order.
+ * *regions: that the order has in the end. */
+static bool settle(struct host_run_options *options, const char *kind,
+                   uint32_t *regions)
+{
+    struct host_points points = {0};
+    struct host_order order;
+    struct host_error error = {0};
+    assert_int_equal(host_gen(kind, POINTS, 1, &points, &error), 0);
+    result = (struct host_run_result){0};
+    options->nodes = NODES;
+    options->processors = NODES; /* whatever this machine has */
+    host_settle(options, points.count, &result);
+    assert_int_equal(result.nodes, NODES);
+    assert_int_equal(
+        host_order_make(
+            &order, kind, points.xyz, points.count,
+            host_strategy_partition(result.strategy, options->partition),
+            result.strategy->regions(NODES), false, &error),
+        0);
+    bool again = host_settle_ordered(options, &order, &result);
+    *regions = order.regions;
+    assert_int_equal(order.region[0].first, 0);
+    assert_int_equal(order.region[order.regions - 1].last, order.bricks);
+    host_order_free(&order);
+    host_points_free(&points);
+    return again;
+}
+
+static void volumes_and_others(void **unused)
+{
+    (void)unused;
+    struct host_run_options options;
+    uint32_t regions;
+    host_run_defaults(&options);
+    assert_false(settle(&options, "uniform", &regions));
+    assert_ptr_not_equal(result.strategy, &host_sequential);
+    assert_int_equal(regions, NODES);
+    static const char *const kinds[] = {"sphere", "grid", "bluntfin"};
+    for (unsigned i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+        assert_true(settle(&options, kinds[i], &regions));
+        assert_ptr_equal(result.strategy, &host_sequential);
+        assert_int_equal(regions, 1);
+        assert_true(result.why[0] != '\0');
+    }
+    /* Face by face, one node alone has no advantage. */
+    options.build = INCODE_BUILD_FACES;
+    assert_false(settle(&options, "sphere", &regions));
+    assert_ptr_not_equal(result.strategy, &host_sequential);
+}
+
+static void what_is_asked_for_stays(void **unused)
+{
+    (void)unused;
+    struct host_run_options options;
+    uint32_t regions;
+    host_run_defaults(&options);
+    options.strategy = &host_spatial;
+    assert_false(settle(&options, "sphere", &regions));
+    assert_ptr_equal(result.strategy, &host_spatial);
+    assert_int_equal(regions, NODES);
+    assert_int_equal(result.why[0], '\0');
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(volumes_and_others),
+        cmocka_unit_test(what_is_asked_for_stays),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
