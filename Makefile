@@ -47,7 +47,8 @@ NODE_INCLUDE = -I$(BUILD)/include
 # The rooms.  What stands in incode/, transport/ and node/ is freestanding;
 # drivers, boards and the host have a system beneath them.
 files = $(shell find $(1) -name '*.c' | LC_ALL=C sort)
-freestanding := $(call files,incode node) $(wildcard transport/*.c)
+freestanding := $(call files,incode node transport/tuples) \
+	$(wildcard transport/*.c)
 drivers      := $(filter-out %/mpi.c,$(wildcard transport/drivers/*.c))
 # Those that need what a static node has not.
 host_drivers := transport/drivers/serial_port.c
@@ -189,14 +190,22 @@ $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 -include $(shell find $(BUILD) -name '*.d' -type f 2>/dev/null)
 
 # The program with a fault in it, for the test that the simulation finds it.
-planted: $(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch
+planted_programs := $(addprefix $(BUILD)/tests/incode-,twice lost-batch answer \
+	taken-by-two kept)
+planted: $(planted_programs)
 $(BUILD)/tests/incode-twice: planted = incode/triangulator.c -DINCODE_PLANT_TWICE
 $(BUILD)/tests/incode-twice: incode/triangulator.c
+$(BUILD)/tests/incode-kept: planted = incode/front/star.c -DINCODE_PLANT_KEPT
+$(BUILD)/tests/incode-kept: incode/front/star.c
 $(BUILD)/tests/incode-lost-batch: planted = \
 	host/service/handlers.c -DINCODE_PLANT_LOST_BATCH
 $(BUILD)/tests/incode-lost-batch: host/service/handlers.c
-$(BUILD)/tests/incode-twice $(BUILD)/tests/incode-lost-batch: \
-		$(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
+$(BUILD)/tests/incode-taken-by-two: planted = \
+	transport/tuples/request.c -DINCODE_PLANT_TAKEN_BY_TWO
+$(BUILD)/tests/incode-taken-by-two: transport/tuples/request.c
+$(BUILD)/tests/incode-answer: planted = incode/manager.c -DINCODE_PLANT_ANSWER
+$(BUILD)/tests/incode-answer: incode/manager.c
+$(planted_programs): $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $(planted) $(filter %.o %.a,$^) $(HOST_LIBS) -o $@
@@ -356,7 +365,8 @@ run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev libpng-d
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps \
 	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi
-bench_packages = $(run_packages) g++ libcgal-dev libtet1.5-dev libqhull-dev
+bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
+	libqhull-dev
 full_packages  = $(test_packages) $(bench_packages) debootstrap cpio \
 	qemu-system-arm gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 

@@ -9,6 +9,7 @@
 #include "bench_peers.h"
 #include "host/base/options.h"
 #include "host/base/parse.h"
+#include "host/service/machine.h"
 
 enum {
     KEY_ROUNDS = 256,
@@ -16,12 +17,20 @@ enum {
     KEY_PEERS,
     KEY_LARGE,
     KEY_LIMIT,
-    NODES = 8
+    KEY_QUICK,
+    KEY_CSV,
+    KEY_SVG,
+    KEY_TABLE,
+    KEY_STRATEGY,
+    KEY_BLUNTFIN,
+    KEY_MILLION,
+    NODES = 256,
+    NODES_QUICK = 64
 };
 
 struct arguments {
     const char *what; /* the benchmark */
-    unsigned nodes;
+    struct host_paper_options paper;
     const char *of_paper, *of_peers; /* options given that they alone have */
     struct host_bench_peers_options peers;
     struct host_error *error;
@@ -29,7 +38,19 @@ struct arguments {
 
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Of paper:", 1},
-    {"nodes", 'n', "N", 0, "Up to N nodes. Default: 8", 1},
+    {"quick", KEY_QUICK, NULL, 0, "A tenth of the points, up to 64 nodes", 1},
+    {"table", KEY_TABLE, "LIST", 0,
+     "Some tables alone, with commas between: 1 to 7, 11 (the figure), "
+     "relation, goals, check (of the model)",
+     1},
+    {"nodes", 'n', "N", 0, "Up to N nodes. Default: 256", 1},
+    {"strategy", KEY_STRATEGY, "NAME", 0, "One strategy alone", 1},
+    {"bluntfin", KEY_BLUNTFIN, "FILE", 0,
+     "The grid of NASA's Blunt Fin. Default: one like it", 1},
+    {"million", KEY_MILLION, NULL, 0,
+     "The goal for 1,000,000 points on 1,024 nodes, too", 1},
+    {"csv", KEY_CSV, "FILE", 0, "All rows, as CSV", 1},
+    {"svg", KEY_SVG, "FILE", 0, "Figure 11, by gnuplot", 1},
     {NULL, 0, NULL, 0, "Of peers:", 2},
     {"rounds", KEY_ROUNDS, "N", 0, "Medians of N rounds. Default: 3", 2},
     {"class", KEY_CLASS, "NAME", 0,
@@ -67,15 +88,56 @@ static void parse_argument(struct arguments *a, const char *value)
     }
 }
 
-static error_t parse_bench(int key, char *value, struct argp_state *state)
+/* False: it is not one of its options. */
+static bool parse_paper(int key, const char *value, struct arguments *a)
 {
-    struct arguments *a = state->input;
+    struct host_paper_options *paper = &a->paper;
     switch (key) {
     case 'n':
         a->of_paper = "--nodes";
-        (void)host_parse_nodes(value, HOST_PROCESSES_MAX, "", &a->nodes,
+        (void)host_parse_nodes(value, HOST_NODES_MAX, "", &paper->nodes_max,
                                a->error);
+        return true;
+    case KEY_QUICK:
+        a->of_paper = "--quick";
+        paper->quick = true;
+        return true;
+    case KEY_TABLE:
+        a->of_paper = "--table";
+        paper->tables = value;
+        return true;
+    case KEY_STRATEGY:
+        a->of_paper = "--strategy";
+        paper->strategy = value;
+        return true;
+    case KEY_BLUNTFIN:
+        a->of_paper = "--bluntfin";
+        paper->bluntfin = value;
+        return true;
+    case KEY_MILLION:
+        a->of_paper = "--million";
+        paper->large = true;
+        return true;
+    case KEY_CSV:
+        a->of_paper = "--csv";
+        paper->csv = value;
+        return true;
+    case KEY_SVG:
+        a->of_paper = "--svg";
+        paper->svg = value;
+        return true;
+    default:
+        return false;
+    }
+}
+
+static error_t parse_bench(int key, char *value, struct argp_state *state)
+{
+    struct arguments *a = state->input;
+    if (parse_paper(key, value, a)) {
         return 0;
+    }
+    switch (key) {
     case KEY_ROUNDS:
         a->of_peers = "--rounds";
         parse_whole(a, "--rounds", value, HOST_BENCH_ROUNDS_MAX,
@@ -114,8 +176,10 @@ static const struct argp bench = {
     options,
     parse_bench,
     "paper\nlinks\npeers [DIRECTORY|FILE]...",
-    "Measures this machine: paper prints Tables 2 and 4 of Cignoni, "
-    "Laforenza, Perego, Scopigno and Montani (1995); links prints what a link "
+    "Measures this machine: paper prints Tables 1 to 7 and figure 11 of "
+    "Cignoni, Laforenza, Perego, Scopigno and Montani (1995) beside the "
+    "paper's figures, for up to 256 nodes in virtual time; links prints what a "
+    "link "
     "does over each driver; peers, in the source tree, runs CGAL, TetGen and "
     "Qhull in turn with this program on points that it makes and on those "
     "given, and prints times, ratios and the goals of each class.",
@@ -152,9 +216,8 @@ static int check(const struct arguments *a, struct host_error *error)
 
 int host_bench(int argc, char **argv, struct host_error *error)
 {
-    struct host_run_options run;
-    struct arguments a = {
-        .nodes = NODES, .peers = {.rounds = 3, .limit_s = 60}, .error = error};
+    struct arguments a = {.peers = {.rounds = 3, .limit_s = 60},
+                          .error = error};
     if (host_options_parse(&bench, argc, argv, 0, &a, error) != 0) {
         return error->code;
     }
@@ -173,7 +236,8 @@ int host_bench(int argc, char **argv, struct host_error *error)
     if (strcmp(a.what, "peers") == 0) {
         return host_bench_peers(&a.peers, error);
     }
-    host_run_defaults(&run);
-    run.build = INCODE_BUILD_FACES; /* as the paper's nodes do */
-    return host_bench_paper(&run, a.nodes, error);
+    if (a.paper.nodes_max == 0) {
+        a.paper.nodes_max = a.paper.quick ? NODES_QUICK : NODES;
+    }
+    return host_bench_paper(&a.paper, error);
 }

@@ -30,7 +30,7 @@ static uint64_t memory_of(const struct host_sim_run *r)
     while (needed > memory) {
         memory += 4096;
         needed = host_strategy_arena(p->strategy, p->nodes, &identity, memory,
-                                     &setup) +
+                                     &p->sharing, &setup) +
                  HOST_WORLD_STACK + HOST_WORLD_STATIC;
     }
     return memory + p->memory_more / 64 * 64;
@@ -80,7 +80,8 @@ static int make_work(struct host_sim_run *r, struct host_error *error)
         return error->code;
     }
     return host_order_make(&r->order, "points", r->points.xyz, r->points.count,
-                           p->partition, p->strategy->regions(p->nodes),
+                           host_strategy_partition(p->strategy, p->partition),
+                           p->strategy->regions(p->nodes),
                            p->index == INCODE_GRID, error);
 }
 
@@ -149,6 +150,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
     s->window = p->host_window;
     s->patience_us = p->patience_us;
     s->strategy = p->strategy;
+    s->sharing = p->sharing;
     s->setup.setup.index = (uint8_t)p->index;
     s->setup.setup.face_rule = (uint8_t)p->face_rule;
     s->setup.setup.build = (uint8_t)p->build;

@@ -215,6 +215,9 @@ static int make_wires(struct host_sim_cube *c)
         bool host = i >= c->host_wire;
         sim_wire_init(&c->wire[i].wire, bytes, host ? &o->host_wire : &o->wire,
                       c->now_us, sim_seed(o->seed, 1000 + i));
+        if (o->shared) {
+            sim_wire_share(&c->wire[i].wire, &c->medium_ns);
+        }
         bytes += host ? of_host : each;
     }
     return 0;

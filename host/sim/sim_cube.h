@@ -30,6 +30,7 @@ struct host_sim_cube_options {
                             CUBE_HOST_PORTS_MAX; see cube.h */
     uint16_t spare_node; /* has the host's second wire; 0: none */
     bool second_host;    /* there is a place for one, at node 0 */
+    bool shared;         /* all wires are one medium, as on one Ethernet */
     uint32_t gather_us;  /* bytes that come closer together wake a place once */
     /* What comes to a place, or room that it waited for, will be there at
      * `us`; NULL: nobody need be told. */
@@ -64,8 +65,9 @@ struct host_sim_cube {
     struct host_sim_wire *wire;
     struct host_sim_port *port; /* links_max a place */
     unsigned links_max;
-    uint64_t trace; /* of all bytes sent, their times and wires */
-    uint8_t *bytes; /* of all wires */
+    uint64_t medium_ns; /* when it is free */
+    uint64_t trace;     /* of all bytes sent, their times and wires */
+    uint8_t *bytes;     /* of all wires */
 };
 
 /* The clock is the caller's, and stays where it is. */

@@ -38,19 +38,32 @@ static unsigned draw_nodes(uint64_t *state)
     return 1u << cubes[i].dimension;
 }
 
-/* Of the strategies that keep to one node, or of the others, one at random;
- * NULL: there is none. */
-static const struct host_strategy *draw_row(uint64_t *state, bool one_node)
+static bool is_refused(const struct host_strategy *row, unsigned nodes,
+                       const struct host_sharing *sharing,
+                       enum incode_face_rule rule)
 {
+    struct host_error error = {0};
+    return host_strategy_check(row, nodes, sharing, rule, INCODE_BUILD_AUTO,
+                               &error) != 0;
+}
+
+/* Of the strategies that keep to one node, or of the others, one at random that
+ * goes with so many; NULL: there is none. */
+static const struct host_strategy *draw_row(uint64_t *state, unsigned nodes,
+                                            bool one_node)
+{
+    static const struct host_sharing usual;
     const struct host_strategy *row, *drawn = NULL;
     unsigned rows = 0;
     for (unsigned i = 0; (row = host_strategy_row(i)) != NULL; i++) {
-        rows += (row->nodes_default == 1) == one_node;
+        rows += (row->nodes_default == 1) == one_node &&
+                !is_refused(row, nodes, &usual, INCODE_FACE_OWN);
     }
     uint64_t left = rows == 0 ? 0 : draw(state, 1, rows);
     for (unsigned i = 0; left > 0; i++) {
         drawn = host_strategy_row(i);
-        left -= (drawn->nodes_default == 1) == one_node;
+        left -= (drawn->nodes_default == 1) == one_node &&
+                !is_refused(drawn, nodes, &usual, INCODE_FACE_OWN);
     }
     return drawn;
 }
@@ -60,8 +73,33 @@ static const struct host_strategy *draw_strategy(const struct host_sim_plan *p,
                                                  bool one_node)
 {
     uint64_t state = sim_seed(p->seed, 81);
-    const struct host_strategy *row = draw_row(&state, one_node);
-    return row != NULL ? row : draw_row(&state, !one_node);
+    const struct host_strategy *row = draw_row(&state, p->nodes, one_node);
+    return row != NULL ? row : draw_row(&state, p->nodes, !one_node);
+}
+
+/* What the strategy heeds and does not refuse; from a state of its own. */
+static void draw_sharing(struct host_sim_plan *p)
+{
+    uint64_t state = sim_seed(p->seed, 87);
+    struct host_sharing s = {0};
+    unsigned heeds = p->strategy->sharing;
+    if ((heeds & HOST_SHARING_CLUSTER) != 0 && one_in(&state, 2)) {
+        s.cluster = 1u << draw(&state, 1, 5);
+    }
+    if ((heeds & HOST_SHARING_BUILDERS) != 0 && one_in(&state, 3)) {
+        s.builders = (unsigned)draw(&state, 1, p->nodes);
+    }
+    if ((heeds & HOST_SHARING_LISTS) != 0 && one_in(&state, 2)) {
+        s.faces_per_job = (unsigned)host_sim_draw_log(&state, 1, 96);
+        s.jobs_per_worker = (unsigned)draw(&state, 1, 4);
+    }
+    if (is_refused(p->strategy, p->nodes, &s, INCODE_FACE_OWN)) {
+        s.cluster = s.builders = 0;
+    }
+    if (is_refused(p->strategy, p->nodes, &s, p->face_rule)) {
+        p->face_rule = INCODE_FACE_OWN;
+    }
+    p->sharing = s;
 }
 
 /* From a state of its own: what else a seed stands for does not change. */
@@ -85,6 +123,7 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
                                                   : INCODE_KD;
     p->face_rule = one_in(state, 3) ? INCODE_FACE_PAPER : INCODE_FACE_OWN;
     p->build = draw_build(p);
+    draw_sharing(p);
     p->shuffle_seed = one_in(state, 2) ? sim_draw(state) : 0;
     uint64_t most = p->nodes > 64             ? 600
                     : p->index == INCODE_KD   ? 3000

@@ -12,6 +12,7 @@
 #include <stdio.h>
 
 #include "host/order/order.h"
+#include "host/service/strategies/strategy.h"
 #include "incode/triangulator.h"
 #include "sim_faults.h"
 
@@ -22,6 +23,7 @@ struct host_sim_plan {
     const char *kind; /* of points: gen.h */
     uint64_t points;
     const struct host_strategy *strategy;
+    struct host_sharing sharing;
     enum host_partition partition;
     enum incode_index index;
     enum incode_face_rule face_rule;

@@ -15,7 +15,9 @@ void host_sim_draw_idler(struct host_sim_plan *plan)
     struct host_sim_plan *p = plan;
     uint64_t state = sim_seed(p->seed, 82);
     unsigned first = p->wanted[HOST_SIM_SECOND_HOST];
-    unsigned needed = 2 + p->wanted[HOST_SIM_DEAD_NODE];
+    bool node = p->wanted[HOST_SIM_DEAD_NODE];
+    /* A dead node and a dead wire may cut off another two of four. */
+    unsigned needed = node && p->wanted[HOST_SIM_DEAD_WIRE] ? 8 : 2 + node;
     if (p->nodes < needed || p->nodes > 64 || host_sim_draw(&state, 1, 6) > 1) {
         return;
     }

@@ -11,7 +11,8 @@ enum {
     BOOT_US = 2000,
     START_US_MAX = 100000, /* after which all nodes have been started */
     CONNECT_US = 20000,    /* between attempts, as TCP_PAUSE_MIN_US, */
-    CONNECT_US_MAX = 1000000
+    CONNECT_US_MAX = 1000000,
+    PASS_US = 50 /* between two looks of links whose processor is busy */
 };
 
 /* --- the nodes in the order of their clocks ------------------------------ */
@@ -63,7 +64,7 @@ static void rouse(void *context, unsigned node, uint64_t us)
         return;
     }
     struct host_world_node *n = &w->node[node];
-    us = us < n->busy_until_us ? n->busy_until_us : us;
+    us = us < n->busy_until_us && !w->options.routers ? n->busy_until_us : us;
     if (us < n->wake_us) {
         wake_at(w, node, us);
     }
@@ -132,10 +133,19 @@ void host_world_second_host(struct host_world *world, bool comes)
 
 /* --- nodes --------------------------------------------------------------- */
 
+/* Nanoseconds of this step so far. */
+static uint64_t spent_ns(const struct host_world_node *node)
+{
+    const struct host_world_options *o = &node->world->options;
+    return o->used_ns == NULL || !node->stepping
+               ? 0
+               : o->used_ns(o->used_context, node->node) - node->used_ns;
+}
+
 static uint64_t node_now_us(void *context)
 {
     const struct host_world_node *node = context;
-    return node->world->now_us + node->offset_us;
+    return node->world->now_us + node->offset_us + spent_ns(node) / 1000;
 }
 
 static uint64_t node_busy_us(void *context)
@@ -171,8 +181,11 @@ static void boot(struct host_world *w, unsigned i)
     struct host_world_node *n = &w->node[i];
     const char *why = NULL;
     n->offset_us = sim_draw(&w->random) >> 24;
-    memset(n->board.arena, (int)(sim_draw(&w->random) >> 32 & 0xff),
-           n->board.arena_bytes);
+    if (w->options.used_ns == NULL) {
+        memset(n->board.arena, (int)(sim_draw(&w->random) >> 32 & 0xff),
+               n->board.arena_bytes);
+    }
+    n->used_ns = 0;
     n->board.identity.epoch = w->epoch++;
     n->starts++;
     n->state = HOST_WORLD_UP;
@@ -279,9 +292,51 @@ static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
     return due;
 }
 
+/* Its links may send again what found no room. */
+static void look_for_room(struct host_world *w, unsigned i)
+{
+    for (unsigned d = 0; d < w->node[i].links; d++) {
+        host_sim_cube_port(&w->cube, i, d)->end->out->blocked = false;
+    }
+}
+
+/* The node's processor is busy, its links are not. */
+static void pass(struct host_world *w, unsigned i)
+{
+    struct host_world_node *n = &w->node[i];
+    look_for_room(w, i);
+    (void)node_receive(n->node);
+    uint64_t due = next_duty(w, n), least = w->now_us + PASS_US;
+    due = due < least ? least : due;
+    wake_at(w, i, due < n->busy_until_us ? due : n->busy_until_us);
+}
+
+/* A step of the node itself, charged by its work: microseconds.  What the step
+ * before has worked is sent now, as its time is over. */
+static uint64_t charged_step(struct host_world_node *n, enum node_event *event)
+{
+    n->stepping = true;
+    unsigned moved = node_receive(n->node);
+    *event = node_send(n->node, moved);
+    if (*event != NODE_STOPPED &&
+        node_receive(n->node) + node_work(n->node) > 0) {
+        *event = NODE_BUSY;
+    }
+    uint64_t ns = spent_ns(n);
+    n->stepping = false;
+    n->used_ns += ns / 1000 * 1000;
+    return ns / 1000;
+}
+
 static void step(struct host_world *w, unsigned i)
 {
     struct host_world_node *n = &w->node[i];
+    bool charged = w->options.used_ns != NULL;
+    if (charged && n->node != NULL && n->state == HOST_WORLD_UP &&
+        w->now_us < n->busy_until_us) {
+        pass(w, i);
+        return;
+    }
     uint64_t cost = host_sim_draw(&w->random, 1, 2 * w->options.step_us);
     if (n->state == HOST_WORLD_OFF) {
         plug_in(w, i, true);
@@ -290,23 +345,30 @@ static void step(struct host_world *w, unsigned i)
         wake_at(w, i, n->busy_until_us);
         return;
     }
-    for (unsigned d = 0; d < n->links; d++) {
-        host_sim_cube_port(&w->cube, i, d)->end->out->blocked = false;
+    look_for_room(w, i);
+    enum node_event event = NODE_BUSY;
+    if (n->stand_in != NULL) {
+        event = host_stand_in_step(n->stand_in);
+    } else if (charged) {
+        cost = charged_step(n, &event);
+    } else {
+        event = node_step(n->node);
     }
-    enum node_event event = n->stand_in != NULL
-                                ? host_stand_in_step(n->stand_in)
-                                : node_step(n->node);
     if (event == NODE_STOPPED) {
         n->board.reset(n, 0);
         w->ended++;
         wake_at(w, i, UINT64_MAX);
         return;
     }
-    cost = event == NODE_IDLE ? cost / 8 + 1 : cost;
+    cost = event == NODE_IDLE && !charged ? cost / 8 + 1 : cost;
+    cost = cost > 0 ? cost : 1;
     n->busy_us += cost;
     n->busy_until_us = w->now_us + cost;
     uint64_t due = event == NODE_IDLE ? next_duty(w, n) : 0;
     wake_at(w, i, due < n->busy_until_us ? n->busy_until_us : due);
+    if (w->options.routers && cost > PASS_US) {
+        rouse(w, i, next_duty(w, n));
+    }
 }
 
 /* --- time ---------------------------------------------------------------- */
@@ -364,9 +426,9 @@ static void happen(struct host_world *w, enum what what, unsigned host)
     }
 }
 
-/* Runs the world until that time, or until the host has something to do. */
-static void run_until(struct host_world *w, uint64_t until, bool for_host)
+void host_world_run(struct host_world *world, uint64_t until, bool for_host)
 {
+    struct host_world *w = world;
     while (w->fault == NULL) {
         enum what what;
         unsigned host = 0;
@@ -387,89 +449,11 @@ static void run_until(struct host_world *w, uint64_t until, bool for_host)
     }
 }
 
-/* Each look at the clock costs the host some time. */
-static uint64_t machine_now_us(void *context)
+void host_world_halt(struct host_world *world)
 {
-    struct host_world *w = context;
-    uint64_t us = host_sim_draw(&w->random, 1, 2 * w->options.host_us);
-    us += w->host_pause_us;
-    w->host_pause_us = 0;
-    run_until(w, w->now_us + us, false);
-    return w->now_us;
-}
-
-static void machine_idle(void *context, uint64_t wait_us)
-{
-    struct host_world *w = context;
-    run_until(w, w->now_us + wait_us, true);
-    unsigned host = w->nodes;
-    for (unsigned d = 0; d < host_sim_cube_links(&w->cube, host); d++) {
-        host_sim_cube_port(&w->cube, host, d)->end->out->blocked = false;
+    for (unsigned i = 0; i < world->nodes; i++) {
+        wake_at(world, i, UINT64_MAX);
     }
-}
-
-static int machine_check(void *context, struct host_error *error)
-{
-    const struct host_world *w = context;
-    if (w->fault == NULL) {
-        return 0;
-    }
-    return host_fail(error, HOST_CUBE,
-                     "node %u: %s, after %llu ms and %llu steps; replay it",
-                     w->fault_node, w->fault,
-                     (unsigned long long)w->now_us / 1000,
-                     (unsigned long long)w->steps);
-}
-
-static bool machine_ended(void *context)
-{
-    const struct host_world *w = context;
-    return w->ended == w->nodes || w->fault != NULL;
-}
-
-static void machine_stop(void *context)
-{
-    struct host_world *w = context;
-    for (unsigned i = 0; i < w->nodes; i++) {
-        wake_at(w, i, UINT64_MAX);
-    }
-}
-
-static void machine_missing(void *context, unsigned node, unsigned link)
-{
-    struct host_world *w = context;
-    w->named[host_sim_cube_wire(&w->cube, node, link)] = true;
-}
-
-/* Seeds say what they have to say at their end. */
-static void machine_told(void *context, const char *line)
-{
-    (void)context, (void)line;
-}
-
-struct host_machine host_world_machine(struct host_world *world)
-{
-    struct host_machine machine = {0};
-    machine.context = world;
-    unsigned host = world->nodes;
-    const struct host_sim_cube_options *o = &world->options.cube;
-    machine.nodes = world->nodes;
-    machine.dimension = o->dimension;
-    machine.epoch = world->epoch++;
-    machine.pipe = host_sim_cube_pipe(&world->cube, host, 0);
-    if (o->spare_node != 0) {
-        machine.spare_node = o->spare_node;
-        machine.spare = host_sim_cube_pipe(&world->cube, host, 1);
-    }
-    machine.absent_s = world->options.absent_s;
-    machine.missing = machine_missing;
-    machine.told = machine_told;
-    machine.now_us = machine_now_us;
-    machine.idle = machine_idle;
-    machine.check = machine_check;
-    machine.ended = machine_ended;
-    machine.stop = machine_stop;
-    return machine;
 }
 
 /* --- from nothing, and back ---------------------------------------------- */

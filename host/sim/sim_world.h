@@ -33,6 +33,13 @@ struct host_world_options {
     uint32_t dead_us;                  /* as in struct node_identity */
     uint32_t step_us; /* a step of a node that has work, more or less */
     uint32_t host_us; /* a round of the host's loop */
+    /* Instead of step_us: nanoseconds of processor time that a node has used
+     * since its start, by what it has counted.  A step is charged when it is
+     * done, and what it has sent leaves when that time is over; its clock goes
+     * on within a step.  NULL: chance decides. */
+    uint64_t (*used_ns)(void *context, const struct node *node);
+    void *used_context;
+    bool routers; /* and links pass on messages while a processor is busy */
     uint64_t time_us_max, steps_max; /* then it counts as hanging */
     uint8_t absent_s;                /* as in struct host_machine */
     /* Called whenever strike_us of the world is reached; sets the next. */
@@ -64,6 +71,8 @@ struct host_world_node {
     enum host_world_state state;
     bool unplugged; /* its wires were cut while it is off */
     uint64_t wake_us, busy_until_us, busy_us, offset_us;
+    uint64_t used_ns; /* at the begin of a step, where work is charged */
+    bool stepping;
     uint32_t starts, place; /* in the heap */
     unsigned links;
 };
@@ -89,7 +98,14 @@ int host_world_open(struct host_world *world,
                     const struct host_world_options *options,
                     struct host_error *error);
 void host_world_close(struct host_world *world);
+
+/* What the host's service takes it for: sim_machine.c. */
 struct host_machine host_world_machine(struct host_world *world);
+
+/* Runs the world until that time, or until the host has something to do; ends
+ * its nodes' steps for good. */
+void host_world_run(struct host_world *world, uint64_t until, bool for_host);
+void host_world_halt(struct host_world *world);
 
 /* When a host, 0 or 1, has something to read, or room that it had not. */
 uint64_t host_world_host_due(const struct host_world *world, unsigned host);

@@ -87,6 +87,7 @@ static bool send_pong(struct host_stand_in *one)
     one->pong.sent = one->counted.sent;
     one->pong.links = 0;
     one->pong.awaited = INCODE_NONE;
+    one->pong.owing = CUBE_HOST;
     for (unsigned d = 0; d < cube_links(cube); d++) {
         bool up = cube_link_statistics(cube, d)->sessions > 0;
         one->pong.links |= (uint32_t)up << d;

@@ -323,9 +323,30 @@ usage 'no nodes' 'nodes' run "$good" --nodes 0 -o "$out"
 usage 'negative nodes' 'nodes' run "$good" --nodes=-2 -o "$out"
 usage 'too many nodes' 'nodes' run "$good" --nodes 1048576 -o "$out"
 usage 'nodes not a number' 'nodes' run "$good" --nodes many -o "$out"
-for strategy in linda master-slaves hybrid exchange quick; do
-    usage "strategy $strategy" 'sequential.*spatial' run "$good" \
-        --strategy $strategy -o "$out"
+usage 'unknown strategy' 'sequential.*spatial.*hybrid' run "$good" \
+    --strategy quick -o "$out"
+for strategy in master-slaves hybrid; do
+    share=(run "$good" -o "$out" --strategy "$strategy")
+    usage "$strategy on one node" 'a builder; give --nodes 2' \
+        "${share[@]}" --nodes 1
+    usage "$strategy with the face rule paper" '--face-rule paper: .*leave' \
+        "${share[@]}" --nodes 4 --face-rule paper
+    usage "$strategy with too many builders" '--builders 4: .*give 1 to 3' \
+        "${share[@]}" --nodes 4 --builders 4
+    usage "$strategy without builders" '--builders 0: .*1 to' \
+        "${share[@]}" --nodes 4 --builders 0
+    usage "$strategy with no faces" '--faces-per-job 0: .*1 to 96' \
+        "${share[@]}" --nodes 4 --faces-per-job 0
+    usage "$strategy with too many lists" '--jobs-per-worker 17: .*1 to 16' \
+        "${share[@]}" --nodes 4 --jobs-per-worker 17
+done
+usage 'clusters of three' '--cluster 3: .*a power of two, 2 to 8' run "$good" \
+    -o "$out" --strategy hybrid --nodes 8 --cluster 3
+usage 'clusters larger than the cube' '--cluster 16: .*2 to 8' run "$good" \
+    -o "$out" --strategy hybrid --nodes 8 --cluster 16
+for option in cluster builders faces-per-job jobs-per-worker; do
+    usage "--$option without its strategy" "--$option: goes with .*leave it out" \
+        run "$good" -o "$out" --nodes 4 --strategy spatial --$option 2
 done
 usage 'unknown partition' 'uniform|adaptive' run "$good" --partition odd \
     -o "$out"

@@ -83,3 +83,6 @@ found() {
 }
 found twice
 found lost-batch
+found answer
+found taken-by-two
+found kept

@@ -95,6 +95,15 @@ done
 check 'survival/they were killed in mid-run' "$restarts starts in 20 runs" \
     test $restarts -ge 15
 
+for strategy in master-slaves hybrid; do
+    for node in 0 1 6; do
+        at_work --strategy $strategy
+        sleep 0.1
+        strike KILL $node
+        survives "kill -9 of node $node, $strategy"
+    done
+done
+
 start --strategy spatial
 for node in 0 3 3 6 0; do strike KILL $node; done
 survives 'five kills during bring-up'

@@ -137,7 +137,12 @@ static void put(struct sim_direction *direction, const uint8_t *bytes,
     if (size == 0) {
         return;
     }
-    if (direction->segments == 0 || direction->free_ns < now) {
+    uint64_t *medium = direction->medium_ns;
+    bool others = medium != NULL && *medium != direction->free_ns;
+    if (others && *medium > direction->free_ns) {
+        direction->free_ns = *medium;
+    }
+    if (direction->segments == 0 || direction->free_ns < now || others) {
         direction->free_ns =
             direction->free_ns < now ? now : direction->free_ns;
         struct sim_segment *s = segment_at(direction, direction->segments++);
@@ -149,6 +154,9 @@ static void put(struct sim_direction *direction, const uint8_t *bytes,
     memcpy(direction->bytes, bytes + first, size - first);
     direction->end += size;
     direction->free_ns += size * direction->step_ns;
+    if (medium != NULL) {
+        *medium = direction->free_ns;
+    }
 }
 
 /* Nothing for a while; then another segment. */
@@ -415,6 +423,11 @@ void sim_direction_flush(struct sim_direction *direction)
     direction->free_ns = now_ns(direction);
     direction->inside = false;
     direction->blocked = false;
+}
+
+void sim_wire_share(struct sim_wire *wire, uint64_t *free_ns)
+{
+    wire->direction[0].medium_ns = wire->direction[1].medium_ns = free_ns;
 }
 
 void sim_wire_cut(struct sim_wire *wire, bool cut)

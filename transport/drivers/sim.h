@@ -68,6 +68,7 @@ struct sim_direction {
     uint8_t *bytes;
     uint64_t begin, end, frame; /* taken off; put on; where a frame began */
     uint64_t free_ns, step_ns;
+    uint64_t *medium_ns; /* when what several share is free; NULL: its own */
     struct sim_segment segment[SIM_SEGMENTS];
     uint32_t segment_first, segments;
     uint64_t random;
@@ -102,6 +103,11 @@ void sim_wire_init(struct sim_wire *wire, void *memory,
                    uint64_t seed);
 
 struct link_pipe sim_pipe(struct sim_end *end);
+
+/* From now on its two directions and all that have the same medium take turns,
+ * first come, first served, as on one Ethernet; free_ns: when it is free, 0 at
+ * first. */
+void sim_wire_share(struct sim_wire *wire, uint64_t *free_ns);
 
 /* From now on; NULL: no more faults of chance. */
 void sim_direction_faults(struct sim_direction *direction,

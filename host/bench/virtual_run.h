@@ -1,0 +1,38 @@
+/* A run in virtual time: the host's service and the nodes as they are, in one
+ * process on the simulator's world (host/sim/sim_world.h), without faults.
+ * Each node's work is charged as the machine's model has it (model.h), each
+ * message by the wires; the host's own work is not charged.  The same on every
+ * machine that does the same arithmetic, however many processors it has.
+ *
+ * Memory: that of the nodes as far as they use it, and of the points and
+ * tetrahedra as in run.h.  Work: that of all nodes together, and some
+ * microseconds a message and hop.
+ *
+ *     struct host_virtual_run run = {.machine = &machine, .options = &options};
+ *     if (host_virtual_run(&run, &points, &error) != 0)
+ *         return error.code;
+ *     printf("%.2f s\n", run.result.t_max_s);
+ */
+#ifndef HOST_BENCH_VIRTUAL_RUN_H
+#define HOST_BENCH_VIRTUAL_RUN_H
+
+#include "host/run/run.h"
+#include "model.h"
+
+struct host_virtual_run {
+    const struct host_bench_machine *machine;
+    /* Strategy, nodes (1 .. HOST_NODES_MAX), memory and how to triangulate. */
+    const struct host_run_options *options;
+    /* What came of it, in virtual seconds: the nodes' reports and their sums;
+     * time_triangulation_s from the setup to the last tetrahedron at the host;
+     * time_io_s as in host_bench_io_s, of all pages that the host has sent. */
+    struct host_run_result result;
+    double work_ns; /* of all nodes together, by the prices, not scaled */
+};
+
+/* 0, or what a run ends with. */
+int host_virtual_run(struct host_virtual_run *run,
+                     const struct host_points *points,
+                     struct host_error *error);
+
+#endif
