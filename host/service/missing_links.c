@@ -239,6 +239,27 @@ static void name_all(struct host_service *s)
     }
 }
 
+/* Nodes that need them as well go round them, in a new generation. */
+static void go_round_all(struct host_service *s)
+{
+    struct cube_wiring next = *cube_wiring(s->cube);
+    bool all = true;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        uint32_t missing = missing_of(s, i);
+        for (unsigned d = 0; missing >> d != 0; d++) {
+            struct cube_dead dead = {(uint16_t)i, (uint8_t)d};
+            all = all && ((missing & bit_of(d)) == 0 ||
+                          wiring_add_dead(&next, dead, s->machine->dimension));
+        }
+    }
+    if (!all || !holds_together(s, &next)) {
+        return;
+    }
+    next.gateway = host_generation_gateway(s, &next);
+    s->generations++;
+    cube_renew(s->cube, &next);
+}
+
 static bool all_attentive(const struct host_service *s)
 {
     bool all = true;
@@ -271,6 +292,10 @@ void host_missing_links_look(struct host_service *service, uint64_t elapsed_us)
     if (missing == certain) {
         name_all(s);
         s->cabled = true;
+        if (missing > 0 && s->strategy->meshes && !s->finished &&
+            s->ledger.committed < s->ledger.bricks) {
+            go_round_all(s);
+        }
     } else if (s->finished) {
         call_all(s);
     }

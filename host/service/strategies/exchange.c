@@ -101,6 +101,7 @@ const struct host_strategy host_exchange = {
     .help = "a region a node, faces cross borders",
     .state_bytes = sizeof(struct exchange),
     .owner_rule = INCODE_OWNER_LOWEST,
+    .meshes = true,
     .by_faces = true,
     .check = check,
     .cost = cost,

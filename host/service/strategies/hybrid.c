@@ -100,6 +100,7 @@ const struct host_strategy host_hybrid = {
     .title = "Hybrid",
     .help = "a region a cluster of nodes, master-slaves in each",
     .owner_rule = INCODE_OWNER_LOWEST,
+    .meshes = true,
     .by_faces = true,
     .sharing =
         HOST_SHARING_CLUSTER | HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,

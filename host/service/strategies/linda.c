@@ -67,6 +67,7 @@ const struct host_strategy host_linda = {
     .help = "master-slaves over a tuple space",
     .linda = "master-slaves",
     .owner_rule = INCODE_OWNER_LOWEST,
+    .meshes = true,
     .by_faces = true,
     .sharing = HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,

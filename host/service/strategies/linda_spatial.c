@@ -158,6 +158,7 @@ const struct host_strategy host_linda_spatial = {
     .help = "a region a node, taken from a tuple space",
     .linda = "spatial",
     .state_bytes = sizeof(struct state),
+    .meshes = true,
     .cost = cost,
     .regions = regions,
     .set_up = set_up,

@@ -48,6 +48,7 @@ const struct host_strategy host_master_slaves = {
     .title = "Master-slaves",
     .help = "one node has the list of faces, others find their apexes",
     .owner_rule = INCODE_OWNER_LOWEST,
+    .meshes = true,
     .by_faces = true,
     .sharing = HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,

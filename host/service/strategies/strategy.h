@@ -91,6 +91,7 @@ struct host_strategy {
     const char *linda;                 /* in --linda; NULL: no Linda program */
     size_t state_bytes;                /* of its own */
     enum incode_owner_rule owner_rule; /* of nodes and host */
+    bool meshes;                       /* its nodes send to each other, too */
     bool by_faces;                     /* whatever is asked for, face by face */
     unsigned nodes_default; /* 0: as many as this machine has processors */
     unsigned sharing;       /* what it heeds of struct host_sharing */

@@ -204,6 +204,14 @@ static void test_missing_wire(void **unused)
     prepare();
     world.absent_s = 3;
     start_world();
+    lacks(5, 1); /* the one that is not, but nodes need it themselves */
+    survives_as(&host_exchange);
+    assert_int_equal(result.generations, 2);
+    assert_int_equal(result.missing_wires, 1);
+    assert_true(world.sim.now_us < 6000000);
+    prepare();
+    world.absent_s = 3;
+    start_world();
     lacks(0, 0);
     lacks(3, 0);
     lacks(6, 1);
