@@ -31,6 +31,7 @@ static bool build(void *self, struct tuple *tuple)
     }
     b->share.ended = false;
     tuple->field[1] = TUPLE_UINT32(b->share.taken);
+    b->share.taken = 0; /* the next process counts its own */
     return true;
 }
 

@@ -76,8 +76,8 @@ struct tuples_config {
     /* Bytes of a tuple at most: TUPLES_PATTERN_MAX .. TUPLES_TUPLE_MAX. */
     uint16_t tuple_bytes;
 
-    /* Bytes of tuples in this place, 4 a tuple's header included: a multiple of
-     * 4, and room for one of tuple_bytes at least.  May differ. */
+    /* Bytes of tuples in this place, 12 a tuple's header included: a multiple
+     * of 4, and room for one of tuple_bytes at least.  May differ. */
     uint32_t store_bytes;
 
     /* What eval starts, by number: functions[0 .. function_count). */
