@@ -74,15 +74,16 @@ static const struct argp_option options_of_run[] = {
      "How a node finds tetrahedra: by faces (InCoDe); by points inserted brick "
      "after brick, as long as what is not final fits in its memory; or auto, "
      "the default: by points where it has some of a surface, or all bricks of "
-     "a volume, that fits. Indexes but kd, the face rule paper, and strategies "
-     "but sequential, spatial and linda-spatial, go by faces",
+     "a volume, that fits. Other indexes than kd, the face rule paper, and "
+     "other strategies "
+     "than sequential, spatial and linda-spatial go by faces",
      1},
     {"nodes", KEY_NODES, "N", 0,
      "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
     {"linda", KEY_LINDA, "NAME", 0,
      "Of --strategy linda: master-slaves (the default) or spatial", 1},
     {"cluster", KEY_CLUSTER, "N", 0,
-     "Nodes a cluster of hybrid, a power of two. Default: 4", 1},
+     "Nodes of a cluster in hybrid, a power of two. Default: 4", 1},
     {"builders", KEY_BUILDERS, "N", 0,
      "Tetrahedron builders of each face manager. Default: all other nodes, of "
      "hybrid those of its cluster",

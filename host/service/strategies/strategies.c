@@ -141,6 +141,6 @@ const char *host_strategy_name(unsigned i)
 const char *host_strategy_help(unsigned i)
 {
     return i < ROWS    ? rows[i]->help
-           : i == ROWS ? "the one that is expected to be done first"
+           : i == ROWS ? "the one expected to be done first"
                        : NULL;
 }

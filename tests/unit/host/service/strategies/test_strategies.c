@@ -267,7 +267,7 @@ static void test_exchange(void **unused)
     const struct host_strategy *s = &host_exchange;
     struct incode_job job;
     struct node_setup_message setup = {.setup.build = INCODE_BUILD_AUTO};
-    struct host_error error;
+    struct host_error error = {0};
     begin(s);
     assert_int_equal(s->check(NODES, &work.sharing, INCODE_FACE_OWN, &error),
                      0);
