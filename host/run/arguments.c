@@ -75,8 +75,7 @@ static const struct argp_option options_of_run[] = {
      "after brick, as long as what is not final fits in its memory; or auto, "
      "the default: by points where it has some of a surface, or all bricks of "
      "a volume, that fits. Other indexes than kd, the face rule paper, and "
-     "other strategies "
-     "than sequential, spatial and linda-spatial go by faces",
+     "other strategies than sequential, spatial and linda-spatial go by faces",
      1},
     {"nodes", KEY_NODES, "N", 0,
      "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor", 1},
