@@ -12,6 +12,7 @@
 #define NODE_MESSAGE_H
 
 #include <assert.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -149,6 +150,18 @@ struct node_setup_message {
      * more, and not itself. */
     uint8_t builders[(NODE_BUILDERS_MAX + 1) / 8];
 };
+
+static inline bool node_is_builder(const struct node_setup_message *setup,
+                                   unsigned node)
+{
+    return (setup->builders[node / 8] >> node % 8 & 1) != 0;
+}
+
+static inline void node_add_builder(struct node_setup_message *setup,
+                                    unsigned node)
+{
+    setup->builders[node / 8] |= (uint8_t)(1u << node % 8);
+}
 
 /* A range of bricks, for a worker or a face manager that has no other. */
 struct node_job_message {

@@ -404,8 +404,8 @@ static bool send_finished(struct node *n, uint32_t epoch)
     finished.start = n->board->identity.epoch;
     finished.sent = n->counted.sent;
     finished.links = links_seen(n);
-    INCODE_ASSERT(node_counted_write(&n->counted, CUBE_HOST, NODE_FINISHED,
-                                     &finished, sizeof finished) == 0);
+    node_counted_put(&n->counted, CUBE_HOST, NODE_FINISHED, &finished,
+                     sizeof finished);
     return true;
 }
 

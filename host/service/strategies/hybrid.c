@@ -19,12 +19,6 @@ static struct host_cost cost(const struct host_task *task)
                                    faces != 0 ? faces : cluster);
 }
 
-/* As fine as can be: those of a cluster lie side by side, and are one job. */
-static unsigned regions(unsigned nodes)
-{
-    return nodes;
-}
-
 static unsigned cluster_of(unsigned nodes, const struct host_sharing *sharing)
 {
     unsigned cluster = sharing->cluster != 0 ? sharing->cluster : CLUSTER;
@@ -106,7 +100,7 @@ const struct host_strategy host_hybrid = {
         HOST_SHARING_CLUSTER | HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_each,
     .set_up = set_up,
     .first = first,
     .next = next,

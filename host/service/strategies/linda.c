@@ -18,12 +18,6 @@ static struct host_cost cost(const struct host_task *task)
     return (struct host_cost){2 * lists.busiest, 2 * lists.total};
 }
 
-static unsigned regions(unsigned nodes)
-{
-    (void)nodes;
-    return 1;
-}
-
 static int check(unsigned nodes, const struct host_sharing *sharing,
                  enum incode_face_rule rule, struct host_error *error)
 {
@@ -72,7 +66,7 @@ const struct host_strategy host_linda = {
     .sharing = HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_one,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next_alone,

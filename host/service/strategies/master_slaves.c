@@ -15,12 +15,6 @@ static struct host_cost cost(const struct host_task *task)
     return host_regions_lists_cost(1, faces != 0 ? faces : task->nodes);
 }
 
-static unsigned regions(unsigned nodes)
-{
-    (void)nodes;
-    return 1;
-}
-
 static int check(unsigned nodes, const struct host_sharing *sharing,
                  enum incode_face_rule rule, struct host_error *error)
 {
@@ -53,7 +47,7 @@ const struct host_strategy host_master_slaves = {
     .sharing = HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_one,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next_alone,

@@ -9,12 +9,6 @@ static struct host_cost cost(const struct host_task *task)
     return (struct host_cost){1.0, 1.0};
 }
 
-static unsigned regions(unsigned nodes)
-{
-    (void)nodes;
-    return 1;
-}
-
 static void set_up(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup)
 {
@@ -29,7 +23,7 @@ const struct host_strategy host_sequential = {
     .help = "one node computes, others hold pages",
     .nodes_default = 1,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_one,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next_alone,

@@ -8,11 +8,6 @@ static struct host_cost cost(const struct host_task *task)
     return host_regions_cost(task, 2.2);
 }
 
-static unsigned regions(unsigned nodes)
-{
-    return nodes;
-}
-
 static void set_up(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup)
 {
@@ -26,7 +21,7 @@ const struct host_strategy host_spatial = {
     .title = "Spatial decomposition",
     .help = "a region a node",
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_each,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next,
