@@ -278,6 +278,8 @@ static_assert(sizeof(struct incode_job) == 56, "job layout");
 static_assert(sizeof(struct node_pong_message) == 40, "pong layout");
 static_assert(sizeof(struct node_job_message) == 64, "job layout");
 static_assert(sizeof(struct node_shared) == 16, "share layout");
+static_assert(CUBE_PAYLOAD_MAX / sizeof(struct node_shared) <= INCODE_TAKEN_MAX,
+              "a message of tetrahedra may come at a time");
 static_assert(sizeof(struct node_wave_answer_message) == 32, "wave layout");
 static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
 static_assert(sizeof(struct node_setup_message) == 232, "setup layout");

@@ -1,5 +1,6 @@
 #include "exchange.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "incode/predicates/check.h"
@@ -17,6 +18,10 @@ enum {
 static const char *const TOO_SMALL =
     "the active face list does not take what other nodes send; give the nodes "
     "more memory";
+
+static const char *const UNASKED =
+    "a tetrahedron of another node came while no room for spilled faces was "
+    "left";
 
 static const char *const INCONSISTENT =
     "a tetrahedron at a star that is closed: pages contradict each other, or "
@@ -222,16 +227,32 @@ static bool may_come(const struct incode_front *front, const uint32_t *v,
     return own && incode_exchange_is_foreign(front, v, count);
 }
 
-/* Room for the faces and vertices of one more. */
-static bool has_room(struct incode_front *front)
+/* Of one tetrahedron that another has built. */
+enum { FACES = 4, VERTICES = 3 };
+
+static_assert(INCODE_TAKEN_MAX * (FACES + VERTICES) <= INCODE_SPILL_FACES,
+              "all that may be spilled of a message fits the empty buffer");
+
+bool incode_front_may_take(struct incode_front *front, uint32_t count)
 {
-    enum { FACES = 4, VERTICES = 3 };
+    uint32_t spilled = count * (FACES + VERTICES);
+    INCODE_ASSERT(count <= INCODE_TAKEN_MAX);
+    return front->finished ||
+           front->spill_count + spilled <= INCODE_SPILL_FACES ||
+           incode_front_flush(front);
+}
+
+/* Room for the faces and vertices of one more; if not, why. */
+static const char *room_fault(struct incode_front *front)
+{
     const struct incode_afl *afl = &front->afl;
-    if (front->spill_count + FACES + VERTICES > INCODE_SPILL_FACES &&
-        !incode_front_flush(front))
-        return false;
+    if (!incode_front_may_take(front, 1))
+        return UNASKED;
     return afl->count + FACES <= afl->capacity &&
-           afl->touched_count + FACES + VERTICES <= afl->touched_capacity;
+                   afl->touched_count + FACES + VERTICES <=
+                       afl->touched_capacity
+               ? NULL
+               : TOO_SMALL;
 }
 
 int incode_front_take(struct incode_front *front, const uint32_t v[4])
@@ -242,8 +263,9 @@ int incode_front_take(struct incode_front *front, const uint32_t v[4])
     unsigned count = v[3] == INCODE_NONE ? 3 : 4;
     if (!e->on || front->finished || !may_come(front, v, count))
         return -1;
-    if (!has_room(front)) {
-        front->fault = TOO_SMALL;
+    const char *fault = room_fault(front);
+    if (fault != NULL) {
+        front->fault = fault;
         return 0;
     }
     e->quiet = false;

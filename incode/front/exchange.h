@@ -46,7 +46,8 @@
  *
  *     incode_front_exchange(&front, &peers, lo, maps);
  *     incode_front_start(&front, &job);
- *     (void)incode_front_take(&front, built);   // by another
+ *     if (incode_front_may_take(&front, 1))
+ *         (void)incode_front_take(&front, built);   // by another
  */
 #ifndef INCODE_EXCHANGE_H
 #define INCODE_EXCHANGE_H
@@ -66,9 +67,14 @@ void incode_front_exchange(struct incode_front *front,
                            const struct incode_front_peers *peers,
                            const double lo[3], uint64_t *maps);
 
+/* Whether so many tetrahedra may come now, INCODE_TAKEN_MAX at most: what they
+ * may spill has room.  False: not before there is room outside. */
+bool incode_front_may_take(struct incode_front *front, uint32_t count);
+
 /* A tetrahedron that another front has built, of positive orientation, with an
  * own vertex; v[3] = INCODE_NONE: a facet of the hull, as it was open.  0; -1:
- * it is none that can come. */
+ * it is none that can come.  Where it might not come, or the list is full,
+ * front->fault says so. */
 int incode_front_take(struct incode_front *front, const uint32_t v[4]);
 
 /* All fronts are quiet, and nothing is under way: first tetrahedra are to be
