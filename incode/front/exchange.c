@@ -9,6 +9,7 @@ enum {
     SWEEP_HEADS = 256, /* a call */
     SWEEP_ENTRIES = 512,
     SWEEP_COMMITS = 64,
+    LOOKS = 256,     /* at bricks or entries, a call */
     SWEEP_SHARE = 4, /* tetrahedra for each open face between two sweeps */
     SWEEP_LEAST = 1024,
     SEED_TRIES = 64, /* at the start */
@@ -117,7 +118,7 @@ void incode_exchange_ready(struct incode_front *front, uint32_t v)
         note(e->ready, &e->ready_from,
              position_of(front, v / INCODE_BRICK_POINTS));
     else
-        e->elsewhere = true;
+        e->elsewhere = front->afl.touched_max;
 }
 
 void incode_exchange_returned(struct incode_front *front, uint32_t brick)
@@ -382,11 +383,14 @@ static enum incode_turn finish(struct incode_front *front)
 
 /* ---- order of work ---- */
 
+/* What a look for a vertex comes to: MORE is left to be looked at. */
+enum found { NONE, FOUND, MORE };
+
 /* The next own vertex with faces to be pursued. */
-static bool next_own(struct incode_front *front, uint32_t *v)
+static enum found next_own(struct incode_front *front, uint32_t *v)
 {
     struct incode_exchange *e = &front->exchange;
-    uint32_t position;
+    uint32_t position, looked = 0;
     while (lowest(e, e->ready, &e->ready_from, &position)) {
         uint32_t brick = front->job.last - 1 - position;
         const struct incode_touched *entry =
@@ -398,19 +402,25 @@ static bool next_own(struct incode_front *front, uint32_t *v)
             front->current = position;
             *v = brick * INCODE_BRICK_POINTS + 63 -
                  (uint32_t)__builtin_clzll(ready);
-            return true;
+            return FOUND;
         }
         clear_bit(e->ready, position);
+        if (++looked == LOOKS)
+            return MORE;
     }
-    return false;
+    return NONE;
 }
 
-/* The same in lists of others' vertices. */
-static bool next_elsewhere(struct incode_front *front, uint32_t *v)
+/* The same in lists of others' vertices, from an entry on to all others. */
+static enum found next_elsewhere(struct incode_front *front, uint32_t *v)
 {
-    for (uint32_t i = 0;
-         front->exchange.elsewhere && i < front->afl.touched_max; i++) {
-        const struct incode_touched *entry = &front->afl.touched[i];
+    struct incode_exchange *e = &front->exchange;
+    for (uint32_t looked = 0; e->elsewhere > 0; e->elsewhere--, e->at++) {
+        if (looked++ == LOOKS)
+            return MORE;
+        if (e->at >= front->afl.touched_max)
+            e->at = 0;
+        const struct incode_touched *entry = &front->afl.touched[e->at];
         if (!incode_touched_used(entry) ||
             incode_own_brick(front, entry->brick))
             continue;
@@ -418,32 +428,31 @@ static bool next_elsewhere(struct incode_front *front, uint32_t *v)
         if (ready != 0) {
             *v = entry->brick * INCODE_BRICK_POINTS +
                  (uint32_t)__builtin_ctzll(ready);
-            return true;
+            return FOUND;
         }
         if (entry->faces == 0 && entry->waiting == 0)
             incode_afl_drop(&front->afl, entry->brick);
     }
-    front->exchange.elsewhere = false;
-    return false;
+    return NONE;
 }
 
-/* Lets the faces of one vertex go that were put off; false: there are none. */
+/* Lets the faces of one vertex go that were put off, or looks through a brick
+ * that has none; false: there are none. */
 static bool let_go(struct incode_front *front)
 {
     struct incode_exchange *e = &front->exchange;
     uint32_t position;
-    while (lowest(e, e->deferred, &e->deferred_from, &position)) {
-        uint32_t brick = front->job.last - 1 - position;
-        uint32_t v = (brick + 1) * INCODE_BRICK_POINTS;
-        for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i++) {
-            if (incode_afl_let_go(&front->afl, --v) > 0) {
-                incode_exchange_ready(front, v);
-                return true;
-            }
+    if (!lowest(e, e->deferred, &e->deferred_from, &position))
+        return false;
+    uint32_t v = (front->job.last - position) * INCODE_BRICK_POINTS;
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i++) {
+        if (incode_afl_let_go(&front->afl, --v) > 0) {
+            incode_exchange_ready(front, v);
+            return true;
         }
-        clear_bit(e->deferred, position);
     }
-    return false;
+    clear_bit(e->deferred, position);
+    return true;
 }
 
 /* A vertex here and there, from the last one down, until one has a first
@@ -467,14 +476,16 @@ static bool next_try(struct incode_front *front, uint32_t *v)
 }
 
 /* The next vertex that none has reached, each once. */
-static bool next_seed(struct incode_front *front, uint32_t *v)
+static enum found next_seed(struct incode_front *front, uint32_t *v)
 {
     struct incode_exchange *e = &front->exchange;
-    uint32_t own = front->job.last - front->job.first;
+    uint32_t own = front->job.last - front->job.first, looked = 0;
     for (; e->seeding && e->seed_position < own; e->seed_position++) {
         uint32_t brick = front->job.last - 1 - e->seed_position;
         if (!is_at_hand(front, brick))
-            return false;
+            return NONE;
+        if (looked++ == LOOKS)
+            return MORE;
         const struct incode_touched *entry =
             incode_afl_find(&front->afl, brick);
         uint64_t left =
@@ -488,11 +499,11 @@ static bool next_seed(struct incode_front *front, uint32_t *v)
             uint32_t slot = (uint32_t)__builtin_ctzll(left);
             *v = brick * INCODE_BRICK_POINTS + slot;
             e->seed_slot = slot + 1;
-            return true;
+            return FOUND;
         }
         e->seed_slot = 0;
     }
-    return false;
+    return NONE;
 }
 
 void incode_front_seed_all(struct incode_front *front)
@@ -513,8 +524,10 @@ static enum incode_turn next_of_all(struct incode_front *front, uint32_t *which)
         return incode_front_begin(front, v, true, which);
     if (let_go(front))
         return INCODE_TURN_WORKED;
-    if (next_seed(front, &v))
-        return incode_front_begin(front, v, true, which);
+    enum found found = next_seed(front, &v);
+    if (found != NONE)
+        return found == MORE ? INCODE_TURN_WORKED
+                             : incode_front_begin(front, v, true, which);
     if (front->unspill_pending)
         return INCODE_TURN_WAIT;
     /* What comes back and does not fit goes again: not for ever. */
@@ -549,8 +562,12 @@ enum incode_turn incode_exchange_next(struct incode_front *front,
         begin_sweep(e);
         return INCODE_TURN_WORKED;
     }
-    if (next_own(front, &v) || next_elsewhere(front, &v))
-        return incode_front_begin(front, v, false, which);
+    enum found found = next_own(front, &v);
+    if (found == NONE)
+        found = next_elsewhere(front, &v);
+    if (found != NONE)
+        return found == MORE ? INCODE_TURN_WORKED
+                             : incode_front_begin(front, v, false, which);
     return front->busy != 0 ? INCODE_TURN_WAIT : next_of_all(front, which);
 }
 

@@ -40,9 +40,12 @@
  * whatever is opened meanwhile marks its own.
  *
  * Memory: struct incode_exchange, in the front, and incode_exchange_bytes:
- * three bits a brick.  Work: a sweep looks at 256 lists or 512 entries a call,
- * and at each face once for four that are built; to let faces go, it looks at
- * the lists of a brick; a tetrahedron that is taken toggles four faces.
+ * three bits a brick.  Work: a call of incode_front_next looks at 256 lists of
+ * the hash and all that is in them, or 512 entries and 64 commits of a sweep;
+ * or at 256 bricks or entries in search of a vertex, and at a bit for each own
+ * brick, 64 at a time; or, to let faces go, at the lists of one brick.  Sweeps
+ * look at each face once for four tetrahedra that are built.  One that is taken
+ * toggles four faces.
  *
  *     incode_front_exchange(&front, &peers, lo, maps);
  *     incode_front_start(&front, &job);
