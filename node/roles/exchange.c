@@ -140,6 +140,7 @@ static void exchange_message(void *self, const struct cube_message *message,
 static unsigned exchange_work(void *self, struct node_pace *pace)
 {
     struct exchange *e = self;
+    e->waves.now_us = pace->begun_us;
     /* Not before all others can receive. */
     return e->waves.begun ? node_triangulation_work(&e->triangulation, pace)
                           : 0;
