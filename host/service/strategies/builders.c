@@ -20,14 +20,29 @@ static void appoint(const struct host_work *work,
                     const struct host_builders *group, unsigned manager,
                     struct node_setup_message *setup)
 {
-    unsigned left = group->builders;
+    unsigned left = group->builders, kept = group->holders;
     setup->role = NODE_MANAGER;
     for (unsigned i = manager + 1; i < group->last && left > 0; i++) {
-        if (!host_is_lost(work, i)) {
+        if (host_is_lost(work, i)) {
+            continue;
+        }
+        if (kept > 0) {
+            kept--;
+        } else {
             node_add_builder(setup, i);
             left--;
         }
     }
+}
+
+struct host_builders host_builders_of_all(const struct host_work *work,
+                                          unsigned faces_per_job)
+{
+    unsigned asked = work->sharing.builders, most = work->nodes - 1;
+    unsigned builders = asked != 0 && asked < most ? asked : most;
+    bool all = work->living == work->nodes;
+    return (struct host_builders){0, work->nodes, all ? most - builders : 0,
+                                  builders, faces_per_job};
 }
 
 void host_builders_set_up(const struct host_work *work,
@@ -41,9 +56,14 @@ void host_builders_set_up(const struct host_work *work,
                                                    : JOBS_PER_WORKER;
     unsigned there = place(work, group, group->last);
     unsigned at = place(work, group, node), manager;
+    setup->holders = (uint16_t)group->holders;
     setup->role = NODE_WORKER;
-    if (work->living == 1 || there < 2 || at > group->builders ||
-        host_is_lost(work, node)) {
+    if (work->living == 1 || there < 2 ||
+        at > group->holders + group->builders || host_is_lost(work, node)) {
+        return;
+    }
+    if (at > 0 && at <= group->holders) {
+        setup->role = NODE_HOLDER;
         return;
     }
     manager = host_first_left(work, group->first);

@@ -34,14 +34,11 @@ static void set_up(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup)
 {
     const struct host_sharing *sharing = &work->sharing;
-    const struct host_builders group = {
-        0, work->nodes,
-        sharing->builders != 0 ? sharing->builders : work->nodes - 1,
-        FACES_PER_JOB};
+    const struct host_builders group =
+        host_builders_of_all(work, FACES_PER_JOB);
     struct node_setup_message own = *setup;
-    setup->holders = own.holders = 0;
     host_builders_set_up(work, &group, node, &own);
-    if (own.role == NODE_WORKER) {
+    if (own.role == NODE_WORKER || own.role == NODE_HOLDER) {
         *setup = own;
         return;
     }

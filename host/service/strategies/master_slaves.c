@@ -29,11 +29,7 @@ static int check(unsigned nodes, const struct host_sharing *sharing,
 static void set_up(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup)
 {
-    unsigned builders = work->sharing.builders;
-    const struct host_builders group = {
-        0, work->nodes, builders != 0 ? builders : work->nodes - 1,
-        work->nodes};
-    setup->holders = 0;
+    const struct host_builders group = host_builders_of_all(work, work->nodes);
     host_builders_set_up(work, &group, node, setup);
 }
 

@@ -108,14 +108,19 @@ bool host_regions_next_alone(struct host_work *work, unsigned node,
            host_regions_next(work, node, job);
 }
 
-void host_regions_lose(struct host_work *work)
+/* One node has no use for more ranges than are left. */
+void host_regions_lose_among(struct host_work *work, unsigned takers)
 {
-    uint32_t pieces = work->living > 1 ? PIECES * work->living : 1;
+    uint32_t pieces = takers > 1 ? PIECES * takers : 1;
     (void)host_ledger_abandon(work->ledger, pieces, work->order, work->tets);
 }
 
-/* One node has no use for more ranges than are left. */
+void host_regions_lose(struct host_work *work)
+{
+    host_regions_lose_among(work, work->living);
+}
+
 void host_regions_lose_alone(struct host_work *work)
 {
-    (void)host_ledger_abandon(work->ledger, 1, work->order, work->tets);
+    host_regions_lose_among(work, 1);
 }

@@ -37,9 +37,10 @@ bool host_regions_next(struct host_work *work, unsigned node,
 bool host_regions_next_alone(struct host_work *work, unsigned node,
                              struct incode_job *job);
 
-/* What a loss leaves is cut into ranges: some for each node, or as large as
- * can be for one. */
+/* What a loss leaves is cut into ranges: some for each node, or for each of
+ * those that take jobs, or as large as can be for one. */
 void host_regions_lose(struct host_work *work);
+void host_regions_lose_among(struct host_work *work, unsigned takers);
 void host_regions_lose_alone(struct host_work *work);
 
 /* A brick of the node's own job. */
