@@ -14,6 +14,8 @@ enum {
 static const double *const NOWHERE[4] = {NULL, NULL, NULL, NULL};
 
 static const char *const UNSOUND = "answers that are none to what was asked";
+static const char *const SHORT =
+    "all lists are back, and not all that they asked has an answer";
 
 /* ---- memory ---- */
 
@@ -71,6 +73,7 @@ void incode_manager_start(struct incode_manager *m,
     for (uint32_t i = 0; i < INCODE_COUNTS; i++)
         m->brick[i] = INCODE_NONE;
     memset(&m->seed, 0, sizeof m->seed);
+    memset(m->due, 0, sizeof m->due);
     m->fault = NULL;
 }
 
@@ -125,7 +128,10 @@ uint32_t incode_manager_lend(struct incode_manager *m, uint32_t most,
         list->kind = INCODE_LIST_FACES;
         list->count = incode_front_lend(&m->front, list->v, most);
     }
-    m->lists += list->count > 0;
+    if (list->count > 0) {
+        m->lists++;
+        m->due[list->kind] += list->count;
+    }
     return list->count;
 }
 
@@ -147,13 +153,28 @@ static bool is_sound(const struct incode_manager *m, uint32_t kind,
            v[1] != v[2] && v[3] != v[0] && v[3] != v[1] && v[3] != v[2];
 }
 
+/* As many as some lists of their kind had, and, when the last list is back, as
+ * all of them. */
+static bool fits(const struct incode_manager *m,
+                 const struct incode_answers *answers)
+{
+    uint32_t left = 0;
+    if (m->lists == 0 || answers->count < 1 ||
+        answers->count > INCODE_LIST_MAX || answers->kind < INCODE_LIST_FACES ||
+        answers->kind > INCODE_LIST_COUNT)
+        return false;
+    for (int kind = INCODE_LIST_FACES; kind <= INCODE_LIST_COUNT; kind++)
+        left += m->due[kind];
+    return answers->count <= m->due[answers->kind] &&
+           left - answers->count >= m->lists - 1 &&
+           (left == answers->count || m->lists > 1);
+}
+
 void incode_manager_take(struct incode_manager *m,
                          const struct incode_answers *answers)
 {
     INCODE_ASSERT(incode_manager_is_free(m));
-    bool sound = m->lists > 0 && answers->count <= INCODE_LIST_MAX &&
-                 answers->kind >= INCODE_LIST_FACES &&
-                 answers->kind <= INCODE_LIST_COUNT;
+    bool sound = fits(m, answers);
     for (uint32_t i = 0; sound && i < answers->count; i++)
         sound = is_sound(m, answers->kind, answers->v[i]);
     if (!sound) {
@@ -163,13 +184,16 @@ void incode_manager_take(struct incode_manager *m,
     memcpy(&m->taken, answers, incode_answers_bytes(answers->count));
     m->used = 0;
     m->lists--;
+    m->due[answers->kind] -= answers->count;
 }
 
 static void use_seed(struct incode_manager *m, const uint32_t v[4])
 {
-    bool open = m->seed.asked && v[0] == m->seed.v && is_seed_open(m);
+    bool open = is_seed_open(m);
+    if (!m->seed.asked || v[0] != m->seed.v)
+        m->fault = UNSOUND;
     m->seed.asked = false;
-    if (!open)
+    if (!open || m->fault != NULL)
         return;
     incode_front_done(&m->front, m->seed.task);
     if (!incode_front_is_reached(&m->front, v[0]))
@@ -252,8 +276,24 @@ static enum incode_step work(struct incode_manager *m, uint32_t units)
     return INCODE_WORKED;
 }
 
+/* Whether it waits for an answer that nobody owes: to a face, a vertex or a
+ * brick. */
+static bool is_left_alone(const struct incode_manager *m)
+{
+    uint32_t first, last;
+    if (m->lists > 0 || !incode_manager_is_free(m) ||
+        incode_front_is_finished(&m->front))
+        return false;
+    incode_front_own_left(&m->front, &first, &last);
+    return m->front.afl.held_count > 0 || m->seed.asked ||
+           (first < last && first < m->asked &&
+            m->brick[first % INCODE_COUNTS] != first);
+}
+
 enum incode_step incode_manager_step(struct incode_manager *m, uint32_t units)
 {
+    if (is_left_alone(m) && m->fault == NULL)
+        m->fault = SHORT;
     if (incode_manager_fault(m) != NULL)
         return INCODE_BROKEN;
     enum incode_step step = work(m, units > 0 ? units : 1);

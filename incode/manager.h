@@ -27,11 +27,12 @@ enum { INCODE_COUNTS = 64 /* bricks whose points are known, at most */ };
 
 struct incode_manager {
     struct incode_front front;
-    size_t bytes;                /* of the active face list */
-    struct incode_answers taken; /* at work, */
-    uint32_t used;               /* as far as this */
-    uint32_t lists;              /* lent and not answered */
-    uint32_t asked;              /* bricks below this one have been counted */
+    size_t bytes;                        /* of the active face list */
+    struct incode_answers taken;         /* at work, */
+    uint32_t used;                       /* as far as this */
+    uint32_t lists;                      /* lent and not answered, */
+    uint32_t due[INCODE_LIST_COUNT + 1]; /* and what they ask, by kind */
+    uint32_t asked; /* bricks below this one have been counted */
     uint32_t brick[INCODE_COUNTS], points[INCODE_COUNTS];
     struct {
         uint32_t task, v;
@@ -65,7 +66,9 @@ static inline bool incode_manager_is_free(const struct incode_manager *m)
     return m->used == m->taken.count;
 }
 
-/* Answers to a list, if it is free; incode_answers_bytes of them are read. */
+/* Answers to a list, if it is free; incode_answers_bytes of them are read. What
+ * cannot answer what is lent is a fault, at once where the kind or the number
+ * tells, at the latest when no list is out and something lent has no answer. */
 void incode_manager_take(struct incode_manager *m,
                          const struct incode_answers *answers);
 

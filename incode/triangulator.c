@@ -198,6 +198,12 @@ int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
 
 /* ---- with others ---- */
 
+bool incode_triangulator_may_take(struct incode_triangulator *t, uint32_t count)
+{
+    return t->phase != INCODE_PHASE_FACES ||
+           incode_front_may_take(&t->front, count);
+}
+
 int incode_triangulator_take(struct incode_triangulator *t, const uint32_t v[4])
 {
     return t->phase == INCODE_PHASE_FACES ? incode_front_take(&t->front, v)

@@ -163,6 +163,11 @@ int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 const struct incode_face *faces, size_t count,
                                 bool last);
 
+/* With peers: whether so many of what follows may come now, as
+ * incode_front_may_take. */
+bool incode_triangulator_may_take(struct incode_triangulator *t,
+                                  uint32_t count);
+
 /* With peers: a tetrahedron or facet of the hull that another has built, as
  * incode_front_take.  Returns 0, or -1 where it is none that can come. */
 int incode_triangulator_take(struct incode_triangulator *t,

@@ -22,4 +22,8 @@ struct node_counted {
 int node_counted_write(struct node_counted *counted, uint16_t dest,
                        uint8_t type, const void *data, size_t size);
 
+/* The same where there is room for it: it must succeed. */
+void node_counted_put(struct node_counted *counted, uint16_t dest, uint8_t type,
+                      const void *data, size_t size);
+
 #endif

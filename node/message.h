@@ -12,6 +12,7 @@
 #define NODE_MESSAGE_H
 
 #include <assert.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -150,6 +151,18 @@ struct node_setup_message {
     uint8_t builders[(NODE_BUILDERS_MAX + 1) / 8];
 };
 
+static inline bool node_is_builder(const struct node_setup_message *setup,
+                                   unsigned node)
+{
+    return (setup->builders[node / 8] >> node % 8 & 1) != 0;
+}
+
+static inline void node_add_builder(struct node_setup_message *setup,
+                                    unsigned node)
+{
+    setup->builders[node / 8] |= (uint8_t)(1u << node % 8);
+}
+
 /* A range of bricks, for a worker or a face manager that has no other. */
 struct node_job_message {
     /* Of this job, 1 or more and of no other job of the run: results of another
@@ -265,6 +278,8 @@ static_assert(sizeof(struct incode_job) == 56, "job layout");
 static_assert(sizeof(struct node_pong_message) == 40, "pong layout");
 static_assert(sizeof(struct node_job_message) == 64, "job layout");
 static_assert(sizeof(struct node_shared) == 16, "share layout");
+static_assert(CUBE_PAYLOAD_MAX / sizeof(struct node_shared) <= INCODE_TAKEN_MAX,
+              "a message of tetrahedra may come at a time");
 static_assert(sizeof(struct node_wave_answer_message) == 32, "wave layout");
 static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
 static_assert(sizeof(struct node_setup_message) == 232, "setup layout");

@@ -404,8 +404,8 @@ static bool send_finished(struct node *n, uint32_t epoch)
     finished.start = n->board->identity.epoch;
     finished.sent = n->counted.sent;
     finished.links = links_seen(n);
-    INCODE_ASSERT(node_counted_write(&n->counted, CUBE_HOST, NODE_FINISHED,
-                                     &finished, sizeof finished) == 0);
+    node_counted_put(&n->counted, CUBE_HOST, NODE_FINISHED, &finished,
+                     sizeof finished);
     return true;
 }
 
@@ -480,24 +480,45 @@ static bool may_stop(struct node *n)
     return true;
 }
 
-unsigned node_receive(struct node *node)
+static bool is_sound(const struct node *n)
+{
+    return !node_fault_is_set(&n->fault) && n->role != NULL;
+}
+
+/* Whether the role takes what has come; one that is broken takes all. */
+static bool may_take(struct node *n, const struct cube_message *message)
+{
+    return !is_sound(n) || n->role->may_take == NULL ||
+           n->role->may_take(n->role_arena, message);
+}
+
+/* Reads a link up to what is not to be taken yet. */
+static unsigned read_link(struct node *n, unsigned d)
 {
     struct cube_message message;
-    node->now_us = node->board->now_us(node->board->context);
-    unsigned moved = (unsigned)cube_poll(node->cube, node->now_us);
-    follow_wiring(node);
-    look_at_links(node);
-    while (cube_read(node->cube, &message)) {
-        take_message(node, &message);
-        cube_release(node->cube);
+    unsigned moved = 0;
+    while (cube_read_from(n->cube, d, &message)) {
+        if (!may_take(n, &message)) {
+            cube_put_back(n->cube);
+            break;
+        }
+        take_message(n, &message);
+        cube_release(n->cube);
         moved++;
     }
     return moved;
 }
 
-static bool is_sound(const struct node *n)
+unsigned node_receive(struct node *node)
 {
-    return !node_fault_is_set(&n->fault) && n->role != NULL;
+    node->now_us = node->board->now_us(node->board->context);
+    unsigned moved = (unsigned)cube_poll(node->cube, node->now_us);
+    follow_wiring(node);
+    look_at_links(node);
+    for (unsigned d = 0; d < cube_links(node->cube); d++) {
+        moved += read_link(node, d);
+    }
+    return moved;
 }
 
 unsigned node_work(struct node *node)

@@ -273,12 +273,13 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
 }
 
 /* Whether a held face of v has b or c too. */
-static bool meets_held(const struct incode_afl *afl, uint32_t v, uint32_t b,
+static bool meets_held(struct incode_afl *afl, uint32_t v, uint32_t b,
                        uint32_t c)
 {
     uint32_t i = *head_of(afl, v);
     for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
         const struct incode_afl_node *node = &afl->nodes[i];
+        afl->looks++;
         if (node->key == v && is_held(afl, i) &&
             (node->b == b || node->b == c || node->c == b || node->c == c))
             return true;
@@ -286,20 +287,73 @@ static bool meets_held(const struct incode_afl *afl, uint32_t v, uint32_t b,
     return false;
 }
 
+/* The vertices of a list's held faces.  Of a long list they are told apart by a
+ * bit alone: what looks held then and is not waits until one of them closes. */
+enum { HELD_BITS = 1024 };
+
+struct held_vertices {
+    uint64_t word[HELD_BITS / 64];
+    uint32_t faces; /* of the list, held or not */
+};
+
+static uint32_t held_bit(uint32_t v)
+{
+    return v * UINT32_C(2654435761) >> 22;
+}
+
+static void add_vertex(struct held_vertices *held, uint32_t v)
+{
+    held->word[held_bit(v) / 64] |= UINT64_C(1) << held_bit(v) % 64;
+}
+
+static bool has_vertex(const struct held_vertices *held, uint32_t v)
+{
+    return (held->word[held_bit(v) / 64] >> held_bit(v) % 64 & 1) != 0;
+}
+
+static void find_held(struct incode_afl *afl, uint32_t v,
+                      struct held_vertices *held)
+{
+    uint32_t i = *head_of(afl, v);
+    memset(held, 0, sizeof *held);
+    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
+        const struct incode_afl_node *node = &afl->nodes[i];
+        afl->looks++;
+        held->faces += node->key == v;
+        if (node->key == v && is_held(afl, i)) {
+            add_vertex(held, node->b);
+            add_vertex(held, node->c);
+        }
+    }
+}
+
+/* Whether the face shares an edge at v with a held one, as far as is known. */
+static bool may_meet(struct incode_afl *afl, const struct held_vertices *held,
+                     const struct incode_afl_node *node)
+{
+    return (has_vertex(held, node->b) || has_vertex(held, node->c)) &&
+           (held->faces > INCODE_AFL_CROWD ||
+            meets_held(afl, node->key, node->b, node->c));
+}
+
 uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit)
 {
+    struct held_vertices held;
+    find_held(afl, v, &held);
     uint32_t count = 0, i = *head_of(afl, v);
     for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
         const struct incode_afl_node *node = &afl->nodes[i];
-        if (node->key != v || is_held(afl, i) ||
-            meets_held(afl, v, node->b, node->c))
+        afl->looks++;
+        if (node->key != v || is_held(afl, i) || may_meet(afl, &held, node))
             continue;
         if (count == limit)
             return count;
         pairs[count][0] = node->b;
         pairs[count][1] = node->c;
         hold(afl, i);
+        add_vertex(&held, node->b);
+        add_vertex(&held, node->c);
         count++;
     }
     struct incode_touched *entry =

@@ -54,7 +54,7 @@ struct incode_afl {
     uint32_t touched_capacity, touched_mask, touched_free, touched_count;
     uint32_t touched_max; /* at a time; entries from here on were never used */
     uint32_t crowded;     /* a vertex with a long list, or INCODE_NONE */
-    uint64_t searches, looks; /* for twins; faces looked at */
+    uint64_t searches, looks; /* for twins; faces looked at, then or to hold */
     const char *fault; /* NULL, or a static string: what the faces that it
                           was given cannot be */
     struct incode_touched spare; /* the entry of a brick too many */
@@ -106,6 +106,9 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
 
 /* Tells up to `limit` faces of v that are not held, and holds them: of those
  * that share an edge at v one at a time, as they may have the same tetrahedron.
+ * Work: two looks at each face of the list, and up to INCODE_AFL_CROWD more at
+ * each where there are no more faces of v than that; of a longer list, some
+ * that share no edge are passed over, and offered again when a held one closes.
  */
 uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit);

@@ -1,5 +1,6 @@
 #include "exchange.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "incode/predicates/check.h"
@@ -8,6 +9,7 @@ enum {
     SWEEP_HEADS = 256, /* a call */
     SWEEP_ENTRIES = 512,
     SWEEP_COMMITS = 64,
+    LOOKS = 256,     /* at bricks or entries, a call */
     SWEEP_SHARE = 4, /* tetrahedra for each open face between two sweeps */
     SWEEP_LEAST = 1024,
     SEED_TRIES = 64, /* at the start */
@@ -17,6 +19,10 @@ enum {
 static const char *const TOO_SMALL =
     "the active face list does not take what other nodes send; give the nodes "
     "more memory";
+
+static const char *const UNASKED =
+    "a tetrahedron of another node came while no room for spilled faces was "
+    "left";
 
 static const char *const INCONSISTENT =
     "a tetrahedron at a star that is closed: pages contradict each other, or "
@@ -112,7 +118,7 @@ void incode_exchange_ready(struct incode_front *front, uint32_t v)
         note(e->ready, &e->ready_from,
              position_of(front, v / INCODE_BRICK_POINTS));
     else
-        e->elsewhere = true;
+        e->elsewhere = front->afl.touched_max;
 }
 
 void incode_exchange_returned(struct incode_front *front, uint32_t brick)
@@ -222,16 +228,32 @@ static bool may_come(const struct incode_front *front, const uint32_t *v,
     return own && incode_exchange_is_foreign(front, v, count);
 }
 
-/* Room for the faces and vertices of one more. */
-static bool has_room(struct incode_front *front)
+/* Of one tetrahedron that another has built. */
+enum { FACES = 4, VERTICES = 3 };
+
+static_assert(INCODE_TAKEN_MAX * (FACES + VERTICES) <= INCODE_SPILL_FACES,
+              "all that may be spilled of a message fits the empty buffer");
+
+bool incode_front_may_take(struct incode_front *front, uint32_t count)
 {
-    enum { FACES = 4, VERTICES = 3 };
+    uint32_t spilled = count * (FACES + VERTICES);
+    INCODE_ASSERT(count <= INCODE_TAKEN_MAX);
+    return front->finished ||
+           front->spill_count + spilled <= INCODE_SPILL_FACES ||
+           incode_front_flush(front);
+}
+
+/* Room for the faces and vertices of one more; if not, why. */
+static const char *room_fault(struct incode_front *front)
+{
     const struct incode_afl *afl = &front->afl;
-    if (front->spill_count + FACES + VERTICES > INCODE_SPILL_FACES &&
-        !incode_front_flush(front))
-        return false;
+    if (!incode_front_may_take(front, 1))
+        return UNASKED;
     return afl->count + FACES <= afl->capacity &&
-           afl->touched_count + FACES + VERTICES <= afl->touched_capacity;
+                   afl->touched_count + FACES + VERTICES <=
+                       afl->touched_capacity
+               ? NULL
+               : TOO_SMALL;
 }
 
 int incode_front_take(struct incode_front *front, const uint32_t v[4])
@@ -242,8 +264,9 @@ int incode_front_take(struct incode_front *front, const uint32_t v[4])
     unsigned count = v[3] == INCODE_NONE ? 3 : 4;
     if (!e->on || front->finished || !may_come(front, v, count))
         return -1;
-    if (!has_room(front)) {
-        front->fault = TOO_SMALL;
+    const char *fault = room_fault(front);
+    if (fault != NULL) {
+        front->fault = fault;
         return 0;
     }
     e->quiet = false;
@@ -360,11 +383,14 @@ static enum incode_turn finish(struct incode_front *front)
 
 /* ---- order of work ---- */
 
+/* What a look for a vertex comes to: MORE is left to be looked at. */
+enum found { NONE, FOUND, MORE };
+
 /* The next own vertex with faces to be pursued. */
-static bool next_own(struct incode_front *front, uint32_t *v)
+static enum found next_own(struct incode_front *front, uint32_t *v)
 {
     struct incode_exchange *e = &front->exchange;
-    uint32_t position;
+    uint32_t position, looked = 0;
     while (lowest(e, e->ready, &e->ready_from, &position)) {
         uint32_t brick = front->job.last - 1 - position;
         const struct incode_touched *entry =
@@ -376,19 +402,25 @@ static bool next_own(struct incode_front *front, uint32_t *v)
             front->current = position;
             *v = brick * INCODE_BRICK_POINTS + 63 -
                  (uint32_t)__builtin_clzll(ready);
-            return true;
+            return FOUND;
         }
         clear_bit(e->ready, position);
+        if (++looked == LOOKS)
+            return MORE;
     }
-    return false;
+    return NONE;
 }
 
-/* The same in lists of others' vertices. */
-static bool next_elsewhere(struct incode_front *front, uint32_t *v)
+/* The same in lists of others' vertices, from an entry on to all others. */
+static enum found next_elsewhere(struct incode_front *front, uint32_t *v)
 {
-    for (uint32_t i = 0;
-         front->exchange.elsewhere && i < front->afl.touched_max; i++) {
-        const struct incode_touched *entry = &front->afl.touched[i];
+    struct incode_exchange *e = &front->exchange;
+    for (uint32_t looked = 0; e->elsewhere > 0; e->elsewhere--, e->at++) {
+        if (looked++ == LOOKS)
+            return MORE;
+        if (e->at >= front->afl.touched_max)
+            e->at = 0;
+        const struct incode_touched *entry = &front->afl.touched[e->at];
         if (!incode_touched_used(entry) ||
             incode_own_brick(front, entry->brick))
             continue;
@@ -396,32 +428,31 @@ static bool next_elsewhere(struct incode_front *front, uint32_t *v)
         if (ready != 0) {
             *v = entry->brick * INCODE_BRICK_POINTS +
                  (uint32_t)__builtin_ctzll(ready);
-            return true;
+            return FOUND;
         }
         if (entry->faces == 0 && entry->waiting == 0)
             incode_afl_drop(&front->afl, entry->brick);
     }
-    front->exchange.elsewhere = false;
-    return false;
+    return NONE;
 }
 
-/* Lets the faces of one vertex go that were put off; false: there are none. */
+/* Lets the faces of one vertex go that were put off, or looks through a brick
+ * that has none; false: there are none. */
 static bool let_go(struct incode_front *front)
 {
     struct incode_exchange *e = &front->exchange;
     uint32_t position;
-    while (lowest(e, e->deferred, &e->deferred_from, &position)) {
-        uint32_t brick = front->job.last - 1 - position;
-        uint32_t v = (brick + 1) * INCODE_BRICK_POINTS;
-        for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i++) {
-            if (incode_afl_let_go(&front->afl, --v) > 0) {
-                incode_exchange_ready(front, v);
-                return true;
-            }
+    if (!lowest(e, e->deferred, &e->deferred_from, &position))
+        return false;
+    uint32_t v = (front->job.last - position) * INCODE_BRICK_POINTS;
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i++) {
+        if (incode_afl_let_go(&front->afl, --v) > 0) {
+            incode_exchange_ready(front, v);
+            return true;
         }
-        clear_bit(e->deferred, position);
     }
-    return false;
+    clear_bit(e->deferred, position);
+    return true;
 }
 
 /* A vertex here and there, from the last one down, until one has a first
@@ -445,14 +476,16 @@ static bool next_try(struct incode_front *front, uint32_t *v)
 }
 
 /* The next vertex that none has reached, each once. */
-static bool next_seed(struct incode_front *front, uint32_t *v)
+static enum found next_seed(struct incode_front *front, uint32_t *v)
 {
     struct incode_exchange *e = &front->exchange;
-    uint32_t own = front->job.last - front->job.first;
+    uint32_t own = front->job.last - front->job.first, looked = 0;
     for (; e->seeding && e->seed_position < own; e->seed_position++) {
         uint32_t brick = front->job.last - 1 - e->seed_position;
         if (!is_at_hand(front, brick))
-            return false;
+            return NONE;
+        if (looked++ == LOOKS)
+            return MORE;
         const struct incode_touched *entry =
             incode_afl_find(&front->afl, brick);
         uint64_t left =
@@ -466,11 +499,11 @@ static bool next_seed(struct incode_front *front, uint32_t *v)
             uint32_t slot = (uint32_t)__builtin_ctzll(left);
             *v = brick * INCODE_BRICK_POINTS + slot;
             e->seed_slot = slot + 1;
-            return true;
+            return FOUND;
         }
         e->seed_slot = 0;
     }
-    return false;
+    return NONE;
 }
 
 void incode_front_seed_all(struct incode_front *front)
@@ -491,8 +524,10 @@ static enum incode_turn next_of_all(struct incode_front *front, uint32_t *which)
         return incode_front_begin(front, v, true, which);
     if (let_go(front))
         return INCODE_TURN_WORKED;
-    if (next_seed(front, &v))
-        return incode_front_begin(front, v, true, which);
+    enum found found = next_seed(front, &v);
+    if (found != NONE)
+        return found == MORE ? INCODE_TURN_WORKED
+                             : incode_front_begin(front, v, true, which);
     if (front->unspill_pending)
         return INCODE_TURN_WAIT;
     /* What comes back and does not fit goes again: not for ever. */
@@ -527,8 +562,12 @@ enum incode_turn incode_exchange_next(struct incode_front *front,
         begin_sweep(e);
         return INCODE_TURN_WORKED;
     }
-    if (next_own(front, &v) || next_elsewhere(front, &v))
-        return incode_front_begin(front, v, false, which);
+    enum found found = next_own(front, &v);
+    if (found == NONE)
+        found = next_elsewhere(front, &v);
+    if (found != NONE)
+        return found == MORE ? INCODE_TURN_WORKED
+                             : incode_front_begin(front, v, false, which);
     return front->busy != 0 ? INCODE_TURN_WAIT : next_of_all(front, which);
 }
 

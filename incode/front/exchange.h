@@ -40,13 +40,17 @@
  * whatever is opened meanwhile marks its own.
  *
  * Memory: struct incode_exchange, in the front, and incode_exchange_bytes:
- * three bits a brick.  Work: a sweep looks at 256 lists or 512 entries a call,
- * and at each face once for four that are built; to let faces go, it looks at
- * the lists of a brick; a tetrahedron that is taken toggles four faces.
+ * three bits a brick.  Work: a call of incode_front_next looks at 256 lists of
+ * the hash and all that is in them, or 512 entries and 64 commits of a sweep;
+ * or at 256 bricks or entries in search of a vertex, and at a bit for each own
+ * brick, 64 at a time; or, to let faces go, at the lists of one brick.  Sweeps
+ * look at each face once for four tetrahedra that are built.  One that is taken
+ * toggles four faces.
  *
  *     incode_front_exchange(&front, &peers, lo, maps);
  *     incode_front_start(&front, &job);
- *     (void)incode_front_take(&front, built);   // by another
+ *     if (incode_front_may_take(&front, 1))
+ *         (void)incode_front_take(&front, built);   // by another
  */
 #ifndef INCODE_EXCHANGE_H
 #define INCODE_EXCHANGE_H
@@ -66,9 +70,14 @@ void incode_front_exchange(struct incode_front *front,
                            const struct incode_front_peers *peers,
                            const double lo[3], uint64_t *maps);
 
+/* Whether so many tetrahedra may come now, INCODE_TAKEN_MAX at most: what they
+ * may spill has room.  False: not before there is room outside. */
+bool incode_front_may_take(struct incode_front *front, uint32_t count);
+
 /* A tetrahedron that another front has built, of positive orientation, with an
  * own vertex; v[3] = INCODE_NONE: a facet of the hull, as it was open.  0; -1:
- * it is none that can come. */
+ * it is none that can come.  Where it might not come, or the list is full,
+ * front->fault says so. */
 int incode_front_take(struct incode_front *front, const uint32_t v[4]);
 
 /* All fronts are quiet, and nothing is under way: first tetrahedra are to be

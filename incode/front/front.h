@@ -103,7 +103,9 @@ struct incode_exchange {
     double floor[3];     /* of the region: below are lower ones; or -inf */
     uint32_t words;      /* of a map */
     uint32_t ready_from, deferred_from; /* no bit in words before */
-    bool elsewhere;      /* others' lists may have faces: those of hubs */
+    uint32_t elsewhere; /* entries of others' bricks, from `at` on, whose lists
+                           may have faces: those of hubs */
+    uint32_t at;
     bool quiet;          /* nothing to do until something comes */
     uint32_t fetched;    /* bricks, since something came or was built */
     uint32_t left;       /* own bricks that are not committed */
@@ -130,7 +132,8 @@ struct incode_front {
     struct incode_front_counts counts;
     const char *fault; /* NULL, or a static string */
 
-    /* Order of work (positions: bricks counted from the job's first). */
+    /* Order of work (positions: incode_position; bricks counted from the job's
+     * first, or, in an exchange, from its last one down). */
     uint32_t current;       /* own bricks before this position are passed */
     uint32_t window;        /* positions worked on together */
     uint32_t spill_from;    /* faces of positions from here on are spilled */

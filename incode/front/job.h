@@ -44,6 +44,8 @@ struct incode_front_outside {
     bool (*unspill)(void *context, uint32_t brick);
 };
 
+enum { INCODE_TAKEN_MAX = 128 }; /* tetrahedra of another front at a time */
+
 /* Other fronts, where they share one active face list (exchange.h). */
 struct incode_front_peers {
     void *context;

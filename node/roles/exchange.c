@@ -98,6 +98,15 @@ static void follow(struct exchange *e, uint8_t command)
     }
 }
 
+/* Tetrahedra wait until what they may spill has room on its way to the host. */
+static bool exchange_may_take(void *self, const struct cube_message *message)
+{
+    struct exchange *e = self;
+    uint32_t count = message->size / sizeof(struct node_shared);
+    return message->type != NODE_SHARE ||
+           incode_triangulator_may_take(e->triangulation.triangulator, count);
+}
+
 static void exchange_message(void *self, const struct cube_message *message,
                              uint64_t now_us)
 {
@@ -131,6 +140,7 @@ static void exchange_message(void *self, const struct cube_message *message,
 static unsigned exchange_work(void *self, struct node_pace *pace)
 {
     struct exchange *e = self;
+    e->waves.now_us = pace->begun_us;
     /* Not before all others can receive. */
     return e->waves.begun ? node_triangulation_work(&e->triangulation, pace)
                           : 0;
@@ -217,6 +227,7 @@ const struct node_role node_exchange_role = {
     .arena_min = exchange_arena_min,
     .start = exchange_start,
     .message = exchange_message,
+    .may_take = exchange_may_take,
     .work = exchange_work,
     .send = exchange_send,
     .done = exchange_done,

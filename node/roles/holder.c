@@ -216,8 +216,8 @@ static unsigned ask_host(struct holder *h)
     if (count == 0) {
         return 0;
     }
-    INCODE_ASSERT(node_counted_write(h->counted, CUBE_HOST, NODE_PAGE_REQUEST,
-                                     wanted, count * sizeof wanted[0]) == 0);
+    node_counted_put(h->counted, CUBE_HOST, NODE_PAGE_REQUEST, wanted,
+                     count * sizeof wanted[0]);
     h->bytes_out += count * sizeof wanted[0];
     return 1;
 }

@@ -120,8 +120,9 @@ static bool take_region(struct linda_worker *w)
     }
     const struct node_taken taken = {w->counted->self, job.first, job.last};
     w->busy = true;
-    INCODE_ASSERT(node_share_out_bytes(&w->share, NODE_SHARE_TAKEN, &taken,
-                                       sizeof taken));
+    bool put =
+        node_share_out_bytes(&w->share, NODE_SHARE_TAKEN, &taken, sizeof taken);
+    INCODE_ASSERT(put);
     return true;
 }
 

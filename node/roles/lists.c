@@ -65,8 +65,7 @@ static void send(void *context, const void *data, size_t size)
     struct node_lists *l = context;
     uint32_t i = l->sends == NODE_ANSWERS ? 0 : idlest(l);
     INCODE_ASSERT(i < l->peers);
-    INCODE_ASSERT(
-        node_counted_write(l->counted, l->peer[i], l->sends, data, size) == 0);
+    node_counted_put(l->counted, l->peer[i], l->sends, data, size);
     l->bytes_out += size;
     if (l->sends == NODE_LIST) {
         l->owed[i]++;

@@ -15,16 +15,11 @@ struct manager {
     size_t inbox_bytes;
 };
 
-static bool is_builder(const struct node_setup_message *setup, unsigned i)
-{
-    return (setup->builders[i / 8] >> i % 8 & 1) != 0;
-}
-
 static unsigned count_builders(const struct node_setup_message *setup)
 {
     unsigned count = 0;
     for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++) {
-        count += is_builder(setup, i);
+        count += node_is_builder(setup, i);
     }
     return count;
 }
@@ -51,7 +46,7 @@ static bool builders_fit(const struct node_setup_message *setup, unsigned self,
                          struct node_fault *fault)
 {
     for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++) {
-        if (is_builder(setup, i) && (i >= setup->nodes || i == self)) {
+        if (node_is_builder(setup, i) && (i >= setup->nodes || i == self)) {
             node_fault_set(fault,
                            "invalid setup: node # builds for face manager #", i,
                            self);
@@ -94,7 +89,7 @@ static bool manager_start(void *self, size_t bytes,
     node_lists_init(&m->lists, memory, inbox, NODE_LIST, setup->jobs_per_worker,
                     counted, fault);
     for (unsigned i = 0; i < setup->nodes; i++) {
-        if (is_builder(setup, i)) {
+        if (node_is_builder(setup, i)) {
             node_lists_add(&m->lists, (uint16_t)i);
         }
     }

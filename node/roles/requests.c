@@ -35,8 +35,8 @@ static void send_wanted(struct node_requests *r)
         }
         r->wanted_count = left;
         r->in_flight += count;
-        INCODE_ASSERT(node_counted_write(r->counted, to, NODE_PAGE_REQUEST,
-                                         batch, count * sizeof batch[0]) == 0);
+        node_counted_put(r->counted, to, NODE_PAGE_REQUEST, batch,
+                         count * sizeof batch[0]);
         r->bytes_out += count * sizeof batch[0];
     }
 }

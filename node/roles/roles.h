@@ -47,9 +47,15 @@ struct node_role {
                   struct node_counted *counted, struct node_fault *fault);
 
     /* Takes a message of any type that the node does not answer itself: it must
-     * not hold back what it cannot serve yet. */
+     * not hold back what it cannot serve yet, but for what follows. */
     void (*message)(void *self, const struct cube_message *message,
                     uint64_t now_us);
+
+    /* Whether it takes this message now: one that it does not stays on its
+     * link, and holds back what comes behind.  It may say so only for as long
+     * as messages to the host have no room, as those always get some.  NULL: it
+     * takes all. */
+    bool (*may_take)(void *self, const struct cube_message *message);
 
     /* Computes for as long as the pace has it; the number of steps that did
      * something. */

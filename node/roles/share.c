@@ -18,8 +18,7 @@ static_assert(HEAD + sizeof(struct incode_answers) <= TUPLES_TUPLE_MAX,
 
 static bool is_place(const struct node_setup_message *setup, unsigned node)
 {
-    return node == setup->manager ||
-           (setup->builders[node / 8] >> node % 8 & 1) != 0;
+    return node == setup->manager || node_is_builder(setup, node);
 }
 
 /* How many there are, and which: where node_of is not NULL. */
@@ -320,7 +319,8 @@ static bool has_room(void *context)
 static void send(void *context, const void *data, size_t size)
 {
     struct node_share *s = context;
-    INCODE_ASSERT(node_share_out_bytes(s, s->puts, data, size));
+    bool put = node_share_out_bytes(s, s->puts, data, size);
+    INCODE_ASSERT(put);
     s->out += s->puts == NODE_SHARE_JOB;
 }
 

@@ -82,17 +82,39 @@ bool node_waves_take(struct node_waves *waves,
     return false;
 }
 
+/* At node 0: whether what was sent does not come, however long it is waited
+ * for. */
+static bool is_missing(struct node_waves *w, bool unchanged)
+{
+    if (!unchanged || w->sum.sent == w->sum.received) {
+        w->unchanged = 0;
+        w->unchanged_us = w->now_us;
+        return false;
+    }
+    w->unchanged++;
+    return w->unchanged >= NODE_WAVES_UNCHANGED &&
+           w->now_us - w->unchanged_us >= NODE_WAVES_UNCHANGED_US;
+}
+
 /* At node 0: all have answered.  What is next? */
 static uint8_t conclude(struct node_waves *w)
 {
     const struct node_wave_answer_message *now = &w->sum;
-    bool same = now->sent == now->received && now->sent == w->before.sent &&
-                now->received == w->before.received;
+    bool unchanged =
+        now->sent == w->before.sent && now->received == w->before.received;
+    bool same = unchanged && now->sent == now->received;
     uint8_t next = NODE_WAVE_COUNT;
     if (w->command == NODE_WAVE_READY) {
         same = false;
     } else if (now->left == 0) {
         w->over = true;
+        return 0;
+    }
+    if (is_missing(w, unchanged)) {
+        node_fault_set(w->fault,
+                       "the exchange is stuck: all nodes are quiet, and of # "
+                       "sent to others # have come",
+                       (uint32_t)now->sent, (uint32_t)now->received);
         return 0;
     }
     if (same && w->command == NODE_WAVE_COUNT && w->before.number != 0) {

@@ -10,6 +10,14 @@
  * receive.  The next lets all begin.  Where the cube is quiet and work is left,
  * one tells all to seed; where that has been, it is stuck.
  *
+ * A tetrahedron that was sent and does not come, although no link has lost it,
+ * would have waves go round for ever.  Links may be slow, but the nodes answer
+ * waves meanwhile, and each looks at all of its links before it does; so where
+ * the sums have differed and not changed for NODE_WAVES_UNCHANGED waves and for
+ * NODE_WAVES_UNCHANGED_US, which no living link keeps a frame for, it is a
+ * fault.  One of the two is not enough: waves are quick where links are, and a
+ * node that stands still answers none.
+ *
  * Memory: the struct.  Work: constant a call, but for a look at the children.
  *
  *     node_waves_begin(&waves);   // at node 0, when all have their role
@@ -25,6 +33,8 @@
 #include "node/counted.h"
 #include "node/fault.h"
 #include "node/message.h"
+
+enum { NODE_WAVES_UNCHANGED = 1000, NODE_WAVES_UNCHANGED_US = 60000000 };
 
 /* Of one node, as it is now. */
 struct node_waves_state {
@@ -47,6 +57,10 @@ struct node_waves {
     bool seeded;        /* at node 0: all have been told to */
     bool over;          /* at node 0: no work is left */
     struct node_wave_answer_message sum, before;
+    uint64_t now_us; /* the node's clock, for the caller to set */
+    /* At node 0: waves in which the sums differed as before, and since when. */
+    uint32_t unchanged;
+    uint64_t unchanged_us;
 };
 
 void node_waves_init(struct node_waves *waves,

@@ -5,18 +5,13 @@
 /* Two lists for each builder from the start, as in the paper. */
 enum { JOBS_PER_WORKER = 2 };
 
-static bool is_lost(const struct host_work *work, unsigned node)
-{
-    return work->lost != NULL && work->lost[node];
-}
-
 /* How many of the group before this node are there. */
 static unsigned place(const struct host_work *work,
                       const struct host_builders *group, unsigned node)
 {
     unsigned before = 0;
     for (unsigned i = group->first; i < node; i++) {
-        before += !is_lost(work, i);
+        before += !host_is_lost(work, i);
     }
     return before;
 }
@@ -25,14 +20,29 @@ static void appoint(const struct host_work *work,
                     const struct host_builders *group, unsigned manager,
                     struct node_setup_message *setup)
 {
-    unsigned left = group->builders;
+    unsigned left = group->builders, kept = group->holders;
     setup->role = NODE_MANAGER;
     for (unsigned i = manager + 1; i < group->last && left > 0; i++) {
-        if (!is_lost(work, i)) {
-            setup->builders[i / 8] |= (uint8_t)(1u << i % 8);
+        if (host_is_lost(work, i)) {
+            continue;
+        }
+        if (kept > 0) {
+            kept--;
+        } else {
+            node_add_builder(setup, i);
             left--;
         }
     }
+}
+
+struct host_builders host_builders_of_all(const struct host_work *work,
+                                          unsigned faces_per_job)
+{
+    unsigned asked = work->sharing.builders, most = work->nodes - 1;
+    unsigned builders = asked != 0 && asked < most ? asked : most;
+    bool all = work->living == work->nodes;
+    return (struct host_builders){0, work->nodes, all ? most - builders : 0,
+                                  builders, faces_per_job};
 }
 
 void host_builders_set_up(const struct host_work *work,
@@ -45,15 +55,18 @@ void host_builders_set_up(const struct host_work *work,
     unsigned lists = sharing->jobs_per_worker != 0 ? sharing->jobs_per_worker
                                                    : JOBS_PER_WORKER;
     unsigned there = place(work, group, group->last);
-    unsigned at = place(work, group, node), manager = group->first;
+    unsigned at = place(work, group, node), manager;
+    setup->holders = (uint16_t)group->holders;
     setup->role = NODE_WORKER;
-    if (work->living == 1 || there < 2 || at > group->builders ||
-        is_lost(work, node)) {
+    if (work->living == 1 || there < 2 ||
+        at > group->holders + group->builders || host_is_lost(work, node)) {
         return;
     }
-    while (is_lost(work, manager)) {
-        manager++;
+    if (at > 0 && at <= group->holders) {
+        setup->role = NODE_HOLDER;
+        return;
     }
+    manager = host_first_left(work, group->first);
     setup->jobs_per_worker = (uint16_t)lists;
     if (at > 0) {
         setup->role = NODE_BUILDER;

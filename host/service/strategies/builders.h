@@ -3,7 +3,7 @@
  *
  * Memory: none.  Work: a pass over the nodes.
  *
- *     const struct host_builders group = {first, last, builders, nodes};
+ *     const struct host_builders group = {first, last, 0, builders, nodes};
  *     host_builders_set_up(&work, &group, node, &setup);
  */
 #ifndef HOST_BUILDERS_H
@@ -12,14 +12,20 @@
 #include "strategy.h"
 
 /* Of nodes first .. last - 1 that are not lost, the first is the manager, the
- * next ones, as many as `builders`, build, and what is left stands idle. */
+ * next ones, as many as `holders`, keep pages, those after them, as many as
+ * `builders`, build, and what is left stands idle. */
 struct host_builders {
-    unsigned first, last, builders;
+    unsigned first, last, holders, builders;
     unsigned faces_per_job; /* where the user has not said: within limits */
 };
 
-/* Its role, and what goes with it: that of a worker where it is idle, or where
- * there is nobody else. */
+/* All nodes as one group: those who neither manage nor build keep pages, as
+ * long as nobody is lost. */
+struct host_builders host_builders_of_all(const struct host_work *work,
+                                          unsigned faces_per_job);
+
+/* Its role, and what goes with it, `holders` included: that of a worker where
+ * it is idle, or where there is nobody else. */
 void host_builders_set_up(const struct host_work *work,
                           const struct host_builders *group, unsigned node,
                           struct node_setup_message *setup);

@@ -24,11 +24,6 @@ static struct host_cost cost(const struct host_task *task)
     return (struct host_cost){1.08 * cost.busiest, 1.08 * cost.total};
 }
 
-static unsigned regions(unsigned nodes)
-{
-    return nodes;
-}
-
 /* In this generation: nobody is lost, and nothing is done that the others would
  * have to know. */
 static bool exchanges(const struct host_work *work)
@@ -105,7 +100,7 @@ const struct host_strategy host_exchange = {
     .by_faces = true,
     .check = check,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_each,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next,

@@ -1,6 +1,6 @@
 /* Spatial decomposition among clusters of nodes, master-slaves inside each: the
- * paper's hybrid, which it only estimated.  After a loss what is left is given
- * to workers, as in `spatial`; see HYBRID.md. */
+ * paper's hybrid, which it only estimated.  After a loss clusters go on with
+ * the nodes that they have left; see HYBRID.md. */
 #include <math.h>
 
 #include "builders.h"
@@ -17,12 +17,6 @@ static struct host_cost cost(const struct host_task *task)
     cluster = cluster < task->nodes ? cluster : task->nodes;
     return host_regions_lists_cost(task->nodes / cluster,
                                    faces != 0 ? faces : cluster);
-}
-
-/* As fine as can be: those of a cluster lie side by side, and are one job. */
-static unsigned regions(unsigned nodes)
-{
-    return nodes;
 }
 
 static unsigned cluster_of(unsigned nodes, const struct host_sharing *sharing)
@@ -56,14 +50,18 @@ static void set_up(const struct host_work *work, unsigned node,
 {
     unsigned cluster = cluster_of(work->nodes, &work->sharing);
     unsigned builders = work->sharing.builders, lowest = node - node % cluster;
-    const struct host_builders group = {lowest, lowest + cluster,
+    const struct host_builders group = {lowest, lowest + cluster, 0,
                                         builders != 0 ? builders : cluster - 1,
                                         cluster};
-    setup->holders = 0;
-    setup->role = NODE_WORKER;
-    if (work->living == work->nodes) {
-        host_builders_set_up(work, &group, node, setup);
-    }
+    host_builders_set_up(work, &group, node, setup);
+}
+
+/* Whether it is the first one that is left of its cluster: the face manager, or
+ * a worker where there is no other. */
+static bool is_taker(const struct host_work *work, unsigned node)
+{
+    unsigned cluster = cluster_of(work->nodes, &work->sharing);
+    return node == host_first_left(work, node - node % cluster);
 }
 
 /* The regions of its cluster, for the first node of it. */
@@ -90,9 +88,16 @@ static bool first(struct host_work *work, unsigned node, struct incode_job *job)
 /* A builder has no jobs. */
 static bool next(struct host_work *work, unsigned node, struct incode_job *job)
 {
-    bool worker = work->living < work->nodes;
-    bool manager = node % cluster_of(work->nodes, &work->sharing) == 0;
-    return (worker || manager) && host_regions_next(work, node, job);
+    return is_taker(work, node) && host_regions_next(work, node, job);
+}
+
+static void lose(struct host_work *work)
+{
+    unsigned takers = 0;
+    for (unsigned i = 0; i < work->nodes; i++) {
+        takers += !work->lost[i] && is_taker(work, i);
+    }
+    host_regions_lose_among(work, takers);
 }
 
 const struct host_strategy host_hybrid = {
@@ -106,10 +111,10 @@ const struct host_strategy host_hybrid = {
         HOST_SHARING_CLUSTER | HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_each,
     .set_up = set_up,
     .first = first,
     .next = next,
     .commit = host_regions_commit,
-    .lose = host_regions_lose,
+    .lose = lose,
 };

@@ -18,12 +18,6 @@ static struct host_cost cost(const struct host_task *task)
     return (struct host_cost){2 * lists.busiest, 2 * lists.total};
 }
 
-static unsigned regions(unsigned nodes)
-{
-    (void)nodes;
-    return 1;
-}
-
 static int check(unsigned nodes, const struct host_sharing *sharing,
                  enum incode_face_rule rule, struct host_error *error)
 {
@@ -40,14 +34,11 @@ static void set_up(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup)
 {
     const struct host_sharing *sharing = &work->sharing;
-    const struct host_builders group = {
-        0, work->nodes,
-        sharing->builders != 0 ? sharing->builders : work->nodes - 1,
-        FACES_PER_JOB};
+    const struct host_builders group =
+        host_builders_of_all(work, FACES_PER_JOB);
     struct node_setup_message own = *setup;
-    setup->holders = own.holders = 0;
     host_builders_set_up(work, &group, node, &own);
-    if (own.role == NODE_WORKER) {
+    if (own.role == NODE_WORKER || own.role == NODE_HOLDER) {
         *setup = own;
         return;
     }
@@ -72,7 +63,7 @@ const struct host_strategy host_linda = {
     .sharing = HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_one,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next_alone,

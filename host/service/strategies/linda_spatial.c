@@ -26,25 +26,6 @@ static struct host_cost cost(const struct host_task *task)
     return (struct host_cost){1.1 * cost.busiest, 1.1 * cost.total};
 }
 
-static unsigned regions(unsigned nodes)
-{
-    return nodes;
-}
-
-static bool is_lost(const struct host_work *work, unsigned node)
-{
-    return work->lost != NULL && work->lost[node];
-}
-
-static unsigned keeper(const struct host_work *work)
-{
-    unsigned node = 0;
-    while (is_lost(work, node)) {
-        node++;
-    }
-    return node;
-}
-
 /* One by itself needs no space. */
 static void set_up(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup)
@@ -56,11 +37,11 @@ static void set_up(const struct host_work *work, unsigned node,
         return;
     }
     setup->role = NODE_LINDA_WORKER;
-    setup->manager = (uint16_t)keeper(work);
+    setup->manager = (uint16_t)host_first_left(work, 0);
     setup->faces_per_job = setup->jobs_per_worker = 1;
     for (unsigned i = setup->manager + 1u; i < work->nodes; i++) {
-        if (!is_lost(work, i)) {
-            setup->builders[i / 8] |= (uint8_t)(1u << i % 8);
+        if (!host_is_lost(work, i)) {
+            node_add_builder(setup, i);
         }
     }
 }
@@ -100,7 +81,7 @@ static bool find_next(struct host_work *work, struct state *s)
 static bool send(struct host_work *work, unsigned node)
 {
     struct state *s = work->state;
-    if (!s->dealt || work->living == 1 || node != keeper(work) ||
+    if (!s->dealt || work->living == 1 || node != host_first_left(work, 0) ||
         s->out_count == NODE_OUT_MAX || !find_next(work, s) ||
         !work->write(work->context, node, NODE_OUT, &s->next, sizeof s->next)) {
         return false;
@@ -126,8 +107,9 @@ static int take(struct host_work *work, const struct cube_message *message,
             i++;
         }
     }
-    if (message->size != sizeof m || message->source != keeper(work) ||
-        m.taken.node >= work->nodes || is_lost(work, m.taken.node) ||
+    if (message->size != sizeof m ||
+        message->source != host_first_left(work, 0) ||
+        m.taken.node >= work->nodes || host_is_lost(work, m.taken.node) ||
         s->node[m.taken.node].due || i == s->out_count) {
         return host_fail(error, HOST_CUBE,
                          "node %u: a region was taken that nobody put",
@@ -142,7 +124,7 @@ static int take(struct host_work *work, const struct cube_message *message,
 static bool owes(const struct host_work *work, unsigned node)
 {
     const struct state *s = work->state;
-    return s->out_count > 0 && node == keeper(work);
+    return s->out_count > 0 && node == host_first_left(work, 0);
 }
 
 static void lose(struct host_work *work)
@@ -160,7 +142,7 @@ const struct host_strategy host_linda_spatial = {
     .state_bytes = sizeof(struct state),
     .meshes = true,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_each,
     .set_up = set_up,
     .first = first,
     .next = next,

@@ -15,12 +15,6 @@ static struct host_cost cost(const struct host_task *task)
     return host_regions_lists_cost(1, faces != 0 ? faces : task->nodes);
 }
 
-static unsigned regions(unsigned nodes)
-{
-    (void)nodes;
-    return 1;
-}
-
 static int check(unsigned nodes, const struct host_sharing *sharing,
                  enum incode_face_rule rule, struct host_error *error)
 {
@@ -35,11 +29,7 @@ static int check(unsigned nodes, const struct host_sharing *sharing,
 static void set_up(const struct host_work *work, unsigned node,
                    struct node_setup_message *setup)
 {
-    unsigned builders = work->sharing.builders;
-    const struct host_builders group = {
-        0, work->nodes, builders != 0 ? builders : work->nodes - 1,
-        work->nodes};
-    setup->holders = 0;
+    const struct host_builders group = host_builders_of_all(work, work->nodes);
     host_builders_set_up(work, &group, node, setup);
 }
 
@@ -53,7 +43,7 @@ const struct host_strategy host_master_slaves = {
     .sharing = HOST_SHARING_BUILDERS | HOST_SHARING_LISTS,
     .check = check,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_one,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next_alone,

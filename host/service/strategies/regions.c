@@ -37,6 +37,17 @@ struct host_cost host_regions_lists_cost(unsigned groups, unsigned faces)
     return (struct host_cost){group / groups, 2 * group};
 }
 
+unsigned host_regions_each(unsigned nodes)
+{
+    return nodes;
+}
+
+unsigned host_regions_one(unsigned nodes)
+{
+    (void)nodes;
+    return 1;
+}
+
 bool host_regions_first(struct host_work *work, unsigned node,
                         struct incode_job *job)
 {
@@ -90,31 +101,26 @@ int host_regions_commit(struct host_work *work, unsigned node, uint32_t brick)
     return host_ledger_commit(work->ledger, node, brick);
 }
 
-bool host_regions_is_first(const struct host_work *work, unsigned node)
-{
-    for (unsigned i = 0; i < node; i++) {
-        if (!work->lost[i]) {
-            return false;
-        }
-    }
-    return true;
-}
-
 bool host_regions_next_alone(struct host_work *work, unsigned node,
                              struct incode_job *job)
 {
-    return host_regions_is_first(work, node) &&
+    return node == host_first_left(work, 0) &&
            host_regions_next(work, node, job);
+}
+
+/* One node has no use for more ranges than are left. */
+void host_regions_lose_among(struct host_work *work, unsigned takers)
+{
+    uint32_t pieces = takers > 1 ? PIECES * takers : 1;
+    (void)host_ledger_abandon(work->ledger, pieces, work->order, work->tets);
 }
 
 void host_regions_lose(struct host_work *work)
 {
-    uint32_t pieces = work->living > 1 ? PIECES * work->living : 1;
-    (void)host_ledger_abandon(work->ledger, pieces, work->order, work->tets);
+    host_regions_lose_among(work, work->living);
 }
 
-/* One node has no use for more ranges than are left. */
 void host_regions_lose_alone(struct host_work *work)
 {
-    (void)host_ledger_abandon(work->ledger, 1, work->order, work->tets);
+    host_regions_lose_among(work, 1);
 }

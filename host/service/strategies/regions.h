@@ -20,6 +20,10 @@ struct host_cost host_regions_cost(const struct host_task *task, double again);
  * many at a time to the others: a list costs as much as many faces do. */
 struct host_cost host_regions_lists_cost(unsigned groups, unsigned faces);
 
+/* So many regions are wanted: one a node, or one in all. */
+unsigned host_regions_each(unsigned nodes);
+unsigned host_regions_one(unsigned nodes);
+
 /* Node i has region i, as long as nothing is done and nobody lost; otherwise
  * nobody has a first job. */
 bool host_regions_first(struct host_work *work, unsigned node,
@@ -32,11 +36,11 @@ bool host_regions_next(struct host_work *work, unsigned node,
 /* The same for the first node that is not lost, and none for others. */
 bool host_regions_next_alone(struct host_work *work, unsigned node,
                              struct incode_job *job);
-bool host_regions_is_first(const struct host_work *work, unsigned node);
 
-/* What a loss leaves is cut into ranges: some for each node, or as large as
- * can be for one. */
+/* What a loss leaves is cut into ranges: some for each node, or for each of
+ * those that take jobs, or as large as can be for one. */
 void host_regions_lose(struct host_work *work);
+void host_regions_lose_among(struct host_work *work, unsigned takers);
 void host_regions_lose_alone(struct host_work *work);
 
 /* A brick of the node's own job. */

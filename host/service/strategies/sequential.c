@@ -1,5 +1,6 @@
 /* One node computes, and the others keep pages for it: node 0, and after a loss
- * the first that is there, which then has pages from the host alone. */
+ * the first that is there, which then has pages from the host alone; see
+ * SEQUENTIAL.md. */
 #include "regions.h"
 #include "strategies.h"
 
@@ -7,12 +8,6 @@ static struct host_cost cost(const struct host_task *task)
 {
     (void)task;
     return (struct host_cost){1.0, 1.0};
-}
-
-static unsigned regions(unsigned nodes)
-{
-    (void)nodes;
-    return 1;
 }
 
 static void set_up(const struct host_work *work, unsigned node,
@@ -29,7 +24,7 @@ const struct host_strategy host_sequential = {
     .help = "one node computes, others hold pages",
     .nodes_default = 1,
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_one,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next_alone,

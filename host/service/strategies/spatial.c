@@ -1,16 +1,12 @@
 /* A region a node, all at once: the paper's spatial decomposition.  After a
- * loss what is left is given to whoever is free, in ranges of bricks. */
+ * loss what is left is given to whoever is free, in ranges of bricks; see
+ * SPATIAL.md. */
 #include "regions.h"
 #include "strategies.h"
 
 static struct host_cost cost(const struct host_task *task)
 {
     return host_regions_cost(task, 2.2);
-}
-
-static unsigned regions(unsigned nodes)
-{
-    return nodes;
 }
 
 static void set_up(const struct host_work *work, unsigned node,
@@ -26,7 +22,7 @@ const struct host_strategy host_spatial = {
     .title = "Spatial decomposition",
     .help = "a region a node",
     .cost = cost,
-    .regions = regions,
+    .regions = host_regions_each,
     .set_up = set_up,
     .first = host_regions_first,
     .next = host_regions_next,

@@ -122,6 +122,8 @@ static inline void several_deliver(struct several *all)
 {
     uint32_t i = several_draw(all, (uint32_t)all->share_count);
     struct several_share share = all->share[i];
+    if (!incode_triangulator_may_take(all->node[share.to].solo.t, 1))
+        return;
     all->share[i] = all->share[--all->share_count];
     assert_int_equal(
         incode_triangulator_take(all->node[share.to].solo.t, share.v), 0);

@@ -173,12 +173,57 @@ static void twice(void **unused)
     host_points_free(&points);
 }
 
+static bool no_room(void *context, const struct incode_face *faces,
+                    size_t count)
+{
+    (void)context, (void)faces, (void)count;
+    return false;
+}
+
+/* Where spilled faces have no room outside, what others send has to wait: it
+ * may come later, and who sends it all the same is told that memory is not what
+ * is wanting. */
+static void waits_for_room(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    static struct several all;
+    all =
+        (struct several){.seed = 5, .solo = {.index = INCODE_KD, .regions = 2}};
+    if (host_gen("uniform", 500, 5, &points, &error) != 0)
+        fail_msg("%s", error.text);
+    several_open(&all, points.xyz, points.count);
+    while (all.share_count == 0)
+        (void)solo_step(&all.node[0].solo, 1);
+    struct incode_triangulator *t = all.node[1].solo.t;
+    struct incode_front *front = &t->front;
+    const struct incode_front_outside outside = front->outside;
+    assert_true(incode_triangulator_may_take(t, INCODE_TAKEN_MAX));
+    front->outside.spill = no_room;
+    front->spill_count = INCODE_SPILL_FACES - 20; /* as if so many waited */
+    assert_true(incode_triangulator_may_take(t, 2));
+    assert_false(incode_triangulator_may_take(t, 3));
+    front->spill_count = INCODE_SPILL_FACES - 6;
+    assert_false(incode_triangulator_may_take(t, 1));
+    assert_int_equal(incode_triangulator_take(t, all.share[0].v), 0);
+    assert_non_null(strstr(incode_triangulator_fault(t), "no room"));
+    assert_null(strstr(incode_triangulator_fault(t), "more memory"));
+    front->fault = NULL;
+    front->spill_count = 0;
+    front->outside = outside;
+    several_work(&all);
+    several_gather(&all);
+    several_close(&all);
+    host_points_free(&points);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(made_sets),      cmocka_unit_test(degenerate_sets),
         cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),
-        cmocka_unit_test(twice),
+        cmocka_unit_test(twice),          cmocka_unit_test(waits_for_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

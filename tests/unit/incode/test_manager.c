@@ -187,6 +187,9 @@ static void unsound(void **unused)
         lend.manager.lists = 0;
         incode_manager_start(&lend.manager, &(struct incode_job){.last = 1});
         assert_true(incode_manager_lend(&lend.manager, 4, &list) > 0);
+        memset(lend.manager.due, 0, sizeof lend.manager.due);
+        if (wrong[i].kind <= INCODE_LIST_COUNT) /* as if it had been asked */
+            lend.manager.due[wrong[i].kind] = wrong[i].count;
         incode_manager_take(&lend.manager, &wrong[i]);
         assert_int_equal(incode_manager_step(&lend.manager, 1), INCODE_BROKEN);
     }
@@ -205,6 +208,91 @@ static void unsound(void **unused)
     lend_close(&lend);
 }
 
+enum cheat { MISSING, EMPTY, OTHER_KIND, TWICE, OTHER_VERTEX };
+
+static void cheat_with(struct incode_answers *answers, enum cheat how)
+{
+    answers->count -= how == MISSING;
+    answers->count = how == EMPTY ? 0 : answers->count;
+    if (how == OTHER_KIND)
+        answers->kind = answers->kind == INCODE_LIST_FACES ? INCODE_LIST_COUNT
+                                                           : INCODE_LIST_FACES;
+    if (how == OTHER_KIND && answers->kind == INCODE_LIST_COUNT)
+        answers->v[0][1] = 1;
+    if (how == TWICE)
+        memcpy(answers->v[0], answers->v[1], sizeof answers->v[0]);
+    answers->v[0][0] ^= how == OTHER_VERTEX;
+}
+
+/* What the manager says of a builder who has a list of some kind wrong, or all
+ * of them where another face may close the one that is left out. */
+static const char *fault_of(enum incode_list_kind kind, uint32_t least,
+                            enum cheat how)
+{
+    struct host_points set = {0};
+    struct lend lend = {.builders = 1, .faces = 8, .jobs = 1};
+    struct incode_builder *b;
+    bool cheated = false;
+    const char *fault;
+    make("uniform", 300, &set);
+    lend_open(&lend, set.xyz, set.count);
+    lend.job = (struct incode_job){.last = lend.order.bricks};
+    incode_manager_start(&lend.manager, &lend.job);
+    b = &lend.builder[0].builder;
+    for (uint32_t i = 0;; i++) {
+        assert_in_range(i, 0, 100000); /* or it waits for ever */
+        if (incode_manager_step(&lend.manager, 100) == INCODE_BROKEN)
+            break;
+        const struct incode_answers *answers = incode_builder_answers(b);
+        if (answers != NULL && incode_manager_is_free(&lend.manager)) {
+            struct incode_answers changed = *answers;
+            if ((!cheated || how == TWICE) && changed.kind == kind &&
+                changed.count >= least) {
+                cheat_with(&changed, how);
+                cheated = true;
+            }
+            incode_manager_take(&lend.manager, &changed);
+            incode_builder_drop(b);
+        }
+        (void)lend_list(&lend);
+        (void)lend_build(&lend);
+    }
+    assert_true(cheated);
+    fault = incode_manager_fault(&lend.manager);
+    lend_close(&lend);
+    host_points_free(&set);
+    return fault;
+}
+
+/* A builder that leaves something out, or answers what it was not asked, is
+ * found, and not waited for. */
+static void wrong_answers(void **unused)
+{
+    (void)unused;
+    static const char unsound_text[] =
+        "answers that are none to what was asked";
+    static const char short_text[] =
+        "all lists are back, and not all that they asked has an answer";
+    static const struct {
+        enum incode_list_kind kind;
+        uint32_t least;
+        enum cheat how;
+        const char *said;
+    } cases[] = {{INCODE_LIST_FACES, 2, MISSING, unsound_text},
+                 {INCODE_LIST_FACES, 1, EMPTY, unsound_text},
+                 {INCODE_LIST_FACES, 1, OTHER_KIND, unsound_text},
+                 {INCODE_LIST_FACES, 4, TWICE, short_text},
+                 {INCODE_LIST_FIRST, 1, EMPTY, unsound_text},
+                 {INCODE_LIST_FIRST, 1, OTHER_KIND, unsound_text},
+                 {INCODE_LIST_FIRST, 1, OTHER_VERTEX, unsound_text},
+                 {INCODE_LIST_COUNT, 2, MISSING, unsound_text},
+                 {INCODE_LIST_COUNT, 2, TWICE, short_text}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        assert_string_equal(
+            fault_of(cases[i].kind, cases[i].least, cases[i].how),
+            cases[i].said);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -215,6 +303,7 @@ int main(void)
         cmocka_unit_test(all_faces_on_the_hull),
         cmocka_unit_test(empty_list),
         cmocka_unit_test(unsound),
+        cmocka_unit_test(wrong_answers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -309,12 +309,42 @@ static void crowded(void **unused)
     close_list(memory, MANY, BRICKS);
 }
 
+/* Where a vertex has thousands of faces, as it does when all hubs are in use,
+ * lending some of them takes a look or two at each; and all are lent in the
+ * end. */
+static void held_of_a_long_list(void **unused)
+{
+    (void)unused;
+    enum { MANY = 6000, LIMIT = 96 };
+    struct incode_afl afl;
+    uint32_t pairs[LIMIT][2], left = MANY;
+    void *memory = malloc(incode_afl_bytes(MANY, BRICKS));
+    assert_non_null(memory);
+    incode_afl_init(&afl, memory, MANY, BRICKS);
+    for (uint32_t i = 0; i < MANY; i++)
+        incode_afl_toggle(&afl, 1, 2 + i, 3 + i);
+    while (left > 0) {
+        uint64_t looks = afl.looks;
+        uint32_t n = incode_afl_hold(&afl, 1, pairs, LIMIT);
+        assert_true(n > 0);
+        if (left > INCODE_AFL_CROWD)
+            assert_in_range(afl.looks - looks, 0, 2 * left);
+        for (uint32_t i = 0; i < n; i++, left--)
+            assert_true(
+                incode_afl_close_twin(&afl, 1, pairs[i][1], pairs[i][0]));
+    }
+    assert_int_equal(afl.count, 0);
+    assert_null(afl.fault);
+    free(memory);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(against_plain),
         cmocka_unit_test(full),
         cmocka_unit_test(crowded),
+        cmocka_unit_test(held_of_a_long_list),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -291,6 +291,7 @@ struct lane {
 
 struct wire {
     uint32_t baud;
+    uint32_t step_us; /* of time: a byte's, within bounds */
     double error_rate;
     uint64_t random, flips;
     struct end ends[2];
@@ -298,7 +299,7 @@ struct wire {
     int fds[4];
 };
 
-enum { STEP_US = 20, MESSAGE = 1600, TRANSFER = 65536 };
+enum { STEP_US_MIN = 20, STEP_US_MAX = 200, MESSAGE = 1600, TRANSFER = 65536 };
 
 /* Bits until the next error, about exponential: a sum of many small chances. */
 static double next_flip(struct wire *wire)
@@ -319,7 +320,7 @@ static double next_flip(struct wire *wire)
 static void carry(struct wire *wire, struct lane *lane)
 {
     uint8_t bytes[64];
-    lane->credit += STEP_US * 1e-7 * wire->baud;
+    lane->credit += wire->step_us * 1e-7 * wire->baud;
     size_t most =
         lane->credit > sizeof bytes ? sizeof bytes : (size_t)lane->credit;
     ssize_t n = most == 0 ? 0 : read(lane->from, bytes, most);
@@ -344,6 +345,10 @@ static void open_wire(struct wire *wire, uint32_t baud, double error_rate)
 {
     memset(wire, 0, sizeof *wire);
     wire->baud = baud;
+    wire->step_us = 10000000 / baud;
+    wire->step_us = wire->step_us < STEP_US_MIN   ? STEP_US_MIN
+                    : wire->step_us > STEP_US_MAX ? STEP_US_MAX
+                                                  : wire->step_us;
     wire->error_rate = error_rate;
     wire->random = baud + 17;
     for (unsigned i = 0; i < 4; i += 2) {
@@ -381,7 +386,7 @@ static double transfer(struct wire *wire, unsigned transfers)
     static uint8_t bytes[MESSAGE];
     uint64_t wanted = (uint64_t)transfers * TRANSFER, begin = 0;
     while (wire->ends[0].read < wanted || wire->ends[1].read < wanted) {
-        now += STEP_US;
+        now += wire->step_us;
         for (unsigned who = 0; who < 2; who++) {
             struct end *end = &wire->ends[who];
             struct link_message message;
@@ -429,7 +434,7 @@ static void echo(struct wire *wire, size_t size)
     bool back = false;
     assert_int_equal(link_write(wire->ends[0].link, bytes, size, NULL, 0), 0);
     while (!back) {
-        now += STEP_US;
+        now += wire->step_us;
         for (unsigned who = 0; who < 2; who++) {
             struct link *link = wire->ends[who].link;
             link_poll_receive(link, now);

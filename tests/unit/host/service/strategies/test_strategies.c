@@ -359,8 +359,8 @@ static void test_master_slaves(void **unused)
     assert_string_equal(roles(s), "mbbb");
     assert_int_equal(builders_of(s, 0), 14);
     work.sharing = (struct host_sharing){.builders = 2};
-    assert_string_equal(roles(s), "mbbw");
-    assert_int_equal(builders_of(s, 0), 6);
+    assert_string_equal(roles(s), "mhbb"); /* who does not build keeps pages */
+    assert_int_equal(builders_of(s, 0), 12);
     work.sharing =
         (struct host_sharing){.faces_per_job = 7, .jobs_per_worker = 5};
     struct node_setup_message setup = {0};
@@ -430,15 +430,27 @@ static void test_hybrid(void **unused)
     assert_false(s->first(&work, 0, &none));
     assert_false(s->next(&work, 1, &none));
     assert_true(s->next(&work, 2, &job));
-    /* After a loss all that are left work. */
+    /* After a loss clusters go on with whom they have left. */
     lose(s, 1);
-    assert_string_equal(roles(s), "wwww");
-    for (unsigned i = 0; s->next(&work, i == 1 ? 3 : i, &job);
-         i = (i + 1) % NODES) {
-        (void)give(i == 1 ? 3 : i, &job);
-        commit_all(s, i == 1 ? 3 : i, &job);
+    assert_string_equal(roles(s), "wwmb");
+    assert_int_equal(builders_of(s, 2), 8);
+    assert_false(s->next(&work, 3, &none));
+    for (unsigned i = 0; s->next(&work, i, &job); i = 2 - i) {
+        (void)give(i, &job);
+        commit_all(s, i, &job);
     }
     assert_int_equal(ledger.committed, order.bricks);
+    /* A lost manager is followed by its first builder, */
+    begin(s);
+    lose(s, 0);
+    assert_string_equal(roles(s), "wmbb");
+    assert_false(s->next(&work, 2, &none));
+    assert_true(s->next(&work, 1, &job));
+    /* and a cluster without nodes by none. */
+    work.sharing = (struct host_sharing){.cluster = 2};
+    lose(s, 1);
+    assert_string_equal(roles(s), "wwmb");
+    assert_true(s->next(&work, 2, &job));
     end();
 }
 
