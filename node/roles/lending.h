@@ -13,7 +13,7 @@
  *     to = node_lending_keeper(&lending, page);
  *     count = node_lending_room(&lending, to);   // as many may be asked for
  *     node_lending_take(&lending, &message);     // NODE_PAGE_REQUEST
- *     sent = node_lending_send(&lending);        // and so in every step
+ *     sent = node_lending_send(&lending, triangulator);   // in every step
  */
 #ifndef NODE_LENDING_H
 #define NODE_LENDING_H
