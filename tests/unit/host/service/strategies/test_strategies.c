@@ -371,6 +371,7 @@ static void test_arena(void **unused)
         for (unsigned i = 0; i <= NODES; i++) {
             struct node_setup_message setup = given;
             work.living = i < NODES ? NODES : 1; /* all others were lost */
+            setup.nodes = NODES;
             setup.setup.owner_rule = (uint8_t)s->owner_rule;
             s->set_up(&work, i % NODES, &setup);
             size_t one = node_arena_needed(&identity, 1u << 20, &setup);
