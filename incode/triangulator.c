@@ -184,6 +184,28 @@ int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
     return incode_maker_page(&t->maker, page, data, bytes);
 }
 
+int incode_triangulator_put(struct incode_triangulator *t, uint32_t page,
+                            const void *data, size_t bytes)
+{
+    return incode_maker_put(&t->maker, page, data, bytes);
+}
+
+bool incode_triangulator_has(const struct incode_triangulator *t, uint32_t page)
+{
+    return incode_pager_has(&t->maker.pager, page);
+}
+
+size_t incode_triangulator_copy(const struct incode_triangulator *t,
+                                uint32_t page, void *data)
+{
+    return incode_pager_copy(&t->maker.pager, page, data);
+}
+
+bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
+{
+    return incode_maker_fetch(&t->maker, page);
+}
+
 uint32_t incode_triangulator_awaited(const struct incode_triangulator *t)
 {
     return incode_pager_awaited(&t->maker.pager);

@@ -152,6 +152,22 @@ void incode_triangulator_start(struct incode_triangulator *t,
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes);
 
+/* The same of a page that nobody asked for: kept where it is on its way, or
+ * nothing has to make room for it.  0, or INCODE_PAGE_UNSOUND. */
+int incode_triangulator_put(struct incode_triangulator *t, uint32_t page,
+                            const void *data, size_t bytes);
+
+/* Whether a page is there, and then, if it is one of points or boxes, its bytes
+ * for another node, at most INCODE_PAGE_BYTES; 0: it is not. */
+bool incode_triangulator_has(const struct incode_triangulator *t,
+                             uint32_t page);
+size_t incode_triangulator_copy(const struct incode_triangulator *t,
+                                uint32_t page, void *data);
+
+/* Whether a page that is not there is on its way; where nothing has to make
+ * room for it, it is asked for. */
+bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page);
+
 /* A page that has been asked for and has not arrived; INCODE_NONE: there is
  * none.  A pass over the frames. */
 uint32_t incode_triangulator_awaited(const struct incode_triangulator *t);

@@ -21,9 +21,10 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 8,              /* both ends must agree */
+    NODE_PROTOCOL = 9,              /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
-    NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got */
+    NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got, */
+    NODE_PAGES_LENT_MAX = 8,        /* and of another node of an exchange */
     NODE_FAULT_TEXT_MAX = 200,      /* bytes */
     NODE_FACES_A_MESSAGE = 128, /* faces in one NODE_SPILL or NODE_UNSPILL */
     NODE_REGIONS_A_MESSAGE = 256,
@@ -34,19 +35,20 @@ enum {
 
 enum node_message_type {
     /* From the host. */
-    NODE_SETUP = 1, /* struct node_setup_message */
-    NODE_JOB,       /* struct node_job_message */
-    NODE_PAGE,      /* uint32 page, then its bytes; also from a holder */
-    NODE_CREDIT,    /* uint32: NODE_RESULT messages allowed since the setup */
-    NODE_UNSPILL,   /* struct node_spill_header, then faces */
-    NODE_REPORT,    /* nothing: asks for NODE_FINISHED, without a job */
-    NODE_STOP,      /* nothing, to all: the run is over */
-    NODE_PING,      /* struct node_ping_message: asks for NODE_PONG */
-    NODE_REGIONS,   /* struct node_regions_message, then first bricks */
-    NODE_OUT,       /* struct incode_job: to be put into the tuple space */
+    NODE_SETUP = 1,   /* struct node_setup_message */
+    NODE_JOB,         /* struct node_job_message */
+    NODE_PAGE,        /* uint32 page, then its bytes; also from a node */
+    NODE_CREDIT,      /* uint32: NODE_RESULT messages allowed since the setup */
+    NODE_UNSPILL,     /* struct node_spill_header, then faces */
+    NODE_REPORT,      /* nothing: asks for NODE_FINISHED, without a job */
+    NODE_STOP,        /* nothing, to all: the run is over */
+    NODE_PING,        /* struct node_ping_message: asks for NODE_PONG */
+    NODE_REGIONS,     /* struct node_regions_message, then first bricks */
+    NODE_OUT,         /* struct incode_job: to be put into the tuple space */
+    NODE_PAGE_TO_ALL, /* as NODE_PAGE, to all, who have not asked for it */
     /* To the host. */
     NODE_READY = 32,   /* struct node_ready_message */
-    NODE_PAGE_REQUEST, /* uint32 page numbers; also to a holder */
+    NODE_PAGE_REQUEST, /* uint32 page numbers; also to a node */
     NODE_RESULT,       /* struct node_result_header, then records: result.h */
     NODE_SPILL,        /* struct node_spill_header, then faces */
     NODE_UNSPILL_REQUEST, /* struct node_spill_header */
@@ -54,6 +56,8 @@ enum node_message_type {
     NODE_FAULT,           /* text without a final 0 */
     NODE_PONG,            /* struct node_pong_message */
     NODE_TAKEN,           /* struct node_taken_message */
+    NODE_PAGE_PASSED,     /* uint32 node, then numbers of the pages that it has
+                             asked the sender for, who has them not */
     /* From a face manager to a builder, and back: incode/list.h. */
     NODE_LIST = 64, /* struct incode_list, as much as is in use */
     NODE_ANSWERS,   /* struct incode_answers, likewise */
@@ -102,7 +106,8 @@ struct node_pong_message {
     uint32_t awaited;  /* a page that it has asked for and not got: who keeps it
                           holds the node up; or NODE_AWAITS_OTHERS: it has
                           nothing to do until they get on; or INCODE_NONE */
-    uint32_t owing;    /* a node that owes it answers, or CUBE_HOST: likewise */
+    uint32_t owing;    /* a node that owes it answers, or a page that the host
+                          does not, or CUBE_HOST: likewise */
 };
 
 /* Begins a node's role; sent once a generation to each node.  There are no
@@ -202,10 +207,13 @@ struct node_spill_header {
     uint32_t sent;  /* NODE_UNSPILL and its request */
 };
 
-/* The bricks with which regions `first`, `first` + 1 .. begin, `count` of them,
- * follow: of each node, and after the last one of a node that there is not. */
+/* To all nodes.  The bricks with which regions `first`, `first` + 1 .. begin,
+ * `count` of them, follow: of each node, and after the last one of a node that
+ * there is not.  Then all pages from `to_all` on come to all, from the last one
+ * down. */
 struct node_regions_message {
     uint32_t first, count;
+    uint32_t to_all;
 };
 
 /* A tetrahedron of positive orientation that another node has built, for an
@@ -265,8 +273,8 @@ struct node_finished_message {
     uint64_t wall_us; /* from each job's arrival to its last result */
     uint64_t busy_us; /* processor time of the node */
     uint64_t bytes_in, bytes_out; /* payload of messages, at this node */
-    uint64_t pages_held;          /* as a holder: sent from its frames, */
-    uint64_t pages_forwarded;     /* and asked for at the host */
+    uint64_t pages_held;          /* for other nodes: sent from its frames, */
+    uint64_t pages_forwarded;     /* and asked for, or left, to the host */
     uint64_t retransmitted;       /* frames on all links */
     uint64_t memory_high_water;   /* bytes ever in use, `fixed` included */
     struct incode_statistics statistics;

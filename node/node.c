@@ -239,10 +239,11 @@ static void take_ping(struct node *n, const struct cube_message *message)
 static bool is_expected(struct node *n, const struct cube_message *message)
 {
     uint8_t type = message->type;
-    bool host_only =
-        type == NODE_SETUP || type == NODE_JOB || type == NODE_CREDIT ||
-        type == NODE_UNSPILL || type == NODE_REPORT || type == NODE_STOP ||
-        type == NODE_PING || type == NODE_REGIONS || type == NODE_OUT;
+    bool host_only = type == NODE_SETUP || type == NODE_JOB ||
+                     type == NODE_CREDIT || type == NODE_UNSPILL ||
+                     type == NODE_REPORT || type == NODE_STOP ||
+                     type == NODE_PING || type == NODE_REGIONS ||
+                     type == NODE_OUT || type == NODE_PAGE_TO_ALL;
     if (host_only && message->source != CUBE_HOST) {
         node_fault_set(&n->fault,
                        "message of type # from node #, expected the host", type,

@@ -14,21 +14,28 @@ void node_pace_begin(struct node_pace *pace, uint64_t now_us)
 }
 
 /* How long a unit takes: twice as long as was thought, at most, as the clock
- * goes on while others have the processor; and less by and by, as units differ.
- */
+ * goes on while others have the processor; and less by and by, as units differ,
+ * by the time that they took: many that take next to none do not hide those
+ * that take long. */
 static void look(struct node_pace *pace, uint32_t units)
 {
     uint64_t now = pace->now_us(pace->context);
-    uint64_t unit_ns = (now - pace->looked_us) * 1000 / (units > 0 ? units : 1);
+    uint64_t passed_us = now - pace->looked_us;
+    uint64_t unit_ns = passed_us * 1000 / (units > 0 ? units : 1);
     uint64_t most_ns = 2 * pace->unit_ns + 1;
+    uint64_t weight_us = passed_us < NODE_PACE_FALL_US && pace->measured
+                             ? passed_us
+                             : NODE_PACE_FALL_US;
     pace->looked_us = now;
+    pace->measured = pace->measured || passed_us > 0;
     if (unit_ns >= pace->unit_ns) {
         pace->unit_ns = unit_ns < most_ns ? unit_ns : most_ns;
     } else {
-        pace->unit_ns -= (pace->unit_ns - unit_ns + 7) / 8;
+        pace->unit_ns -=
+            (pace->unit_ns - unit_ns) * weight_us / NODE_PACE_STEP_US;
     }
     uint64_t fit = NODE_PACE_STEP_US * UINT64_C(1000) / (pace->unit_ns + 1);
-    pace->units = fit < 1                     ? 1
+    pace->units = fit < NODE_PACE_UNITS_MIN   ? NODE_PACE_UNITS_MIN
                   : fit > NODE_PACE_UNITS_MAX ? NODE_PACE_UNITS_MAX
                                               : (uint32_t)fit;
 }

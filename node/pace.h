@@ -27,6 +27,10 @@ enum {
     NODE_PACE_STEP_US = NODE_PACE_US / 2,
     NODE_PACE_LAST_US = NODE_PACE_US * 3 / 8,
     NODE_PACE_LOOKS = 4, /* a step's time */
+    /* Where a look finds units faster, the estimate falls by an eighth of the
+     * difference, if so much time has passed, and by less in less. */
+    NODE_PACE_FALL_US = NODE_PACE_STEP_US / 8,
+    NODE_PACE_UNITS_MIN = 8, /* less, and what is begun anew is most of it */
     NODE_PACE_UNITS_MAX = 4096,
     NODE_STEPS = 32 /* of a role between looks at links, at most */
 };
@@ -37,6 +41,7 @@ struct node_pace {
     uint64_t begun_us, looked_us;
     uint32_t units;   /* that a step may work */
     uint64_t unit_ns; /* that one takes, as far as is known */
+    bool measured;    /* the clock has gone on while something was worked */
 };
 
 /* One unit at first, as nothing is known of the processor. */

@@ -14,6 +14,7 @@ struct virtual_world {
     struct host_service service;
     struct host_order order;
     struct host_tetrahedra tets;
+    uint64_t page_bytes_to_all;
 };
 
 static uint64_t used_ns(void *context, const struct node *node)
@@ -68,6 +69,7 @@ static int serve(struct virtual_world *v, struct host_machine *machine,
         v->run->result.time_triangulation_s =
             1e-6 * (double)(v->world.now_us - start_us);
         host_run_sum(s, &v->run->result);
+        v->page_bytes_to_all = s->page_bytes_to_all;
     }
     host_service_end(s);
     return status;
@@ -77,7 +79,7 @@ static void sum(struct virtual_world *v)
 {
     struct host_virtual_run *run = v->run;
     struct host_run_result *r = &run->result;
-    uint64_t bytes = 0;
+    uint64_t bytes = v->page_bytes_to_all;
     run->work_ns = 0;
     for (unsigned i = 0; i < r->nodes; i++) {
         double counts[HOST_BENCH_COUNTS];

@@ -46,12 +46,12 @@ static bool missing(struct host_service *s, const struct host_node *node,
     return true;
 }
 
-static int take_requests(struct host_service *s,
-                         const struct cube_message *message,
-                         struct host_error *error)
+/* Page numbers from byte `at` on, which `node` has asked for. */
+static int queue_pages(struct host_service *s, struct host_node *node,
+                       const struct cube_message *message, uint32_t at,
+                       struct host_error *error)
 {
-    struct host_node *node = &s->node[message->source];
-    uint32_t count = message->size / 4u;
+    uint32_t count = (message->size - at) / 4u;
     if (message->size % 4 != 0) {
         return unsound(message, error,
                        "page numbers in %u bytes, expected 4 each",
@@ -63,7 +63,7 @@ static int take_requests(struct host_service *s,
     }
     for (uint32_t i = 0; i < count; i++) {
         uint32_t page;
-        memcpy(&page, message->data + 4 * i, 4);
+        memcpy(&page, message->data + at + 4 * i, 4);
         if (page >= s->order->tree.pages) {
             return unsound(message, error, "page %u out of range 0..%u", page,
                            s->order->tree.pages - 1);
@@ -72,6 +72,24 @@ static int take_requests(struct host_service *s,
                     HOST_PAGES_QUEUED_MAX] = page;
     }
     return 0;
+}
+
+/* Pages that another has asked the node for. */
+static int take_passed(struct host_service *s,
+                       const struct cube_message *message,
+                       struct host_error *error)
+{
+    uint32_t node;
+    if (message->size < sizeof node) {
+        return wrong_size(message, "requests of another node", sizeof node,
+                          error);
+    }
+    memcpy(&node, message->data, sizeof node);
+    if (node >= s->machine->nodes) {
+        return unsound(message, error, "requests of node %u, expected 0..%u",
+                       node, s->machine->nodes - 1);
+    }
+    return queue_pages(s, &s->node[node], message, sizeof node, error);
 }
 
 static int take_results(struct host_service *s,
@@ -283,7 +301,10 @@ static int take(struct host_service *service,
     case NODE_PONG:
         return host_detector_pong(service, message, error);
     case NODE_PAGE_REQUEST:
-        return take_requests(service, message, error);
+        return queue_pages(service, &service->node[message->source], message, 0,
+                           error);
+    case NODE_PAGE_PASSED:
+        return take_passed(service, message, error);
     case NODE_RESULT:
         return take_results(service, message, error);
     case NODE_SPILL:

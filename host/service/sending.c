@@ -20,6 +20,22 @@ bool host_sending_write(void *service, unsigned node, uint8_t type,
     return send_counted(service, (uint16_t)node, type, data, size);
 }
 
+bool host_sending_write_to_all(void *service, uint8_t type, const void *data,
+                               size_t size)
+{
+    struct host_service *s = service;
+    if (cube_write(s->cube, CUBE_ALL, type, data, size) != 0) {
+        return false;
+    }
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        s->node[i].sent++;
+    }
+    if (type == NODE_PAGE_TO_ALL) {
+        s->page_bytes_to_all += size - sizeof(uint32_t);
+    }
+    return true;
+}
+
 static bool send_page(struct host_service *s, uint16_t to)
 {
     struct {
@@ -88,6 +104,13 @@ void host_sending_deal(struct host_service *service)
     struct host_service *s = service;
     struct incode_job job;
     s->dealt = true;
+    s->work.frames = UINT32_MAX;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        uint32_t frames = s->report[i].map.map.pages;
+        if (!s->work.lost[i] && frames < s->work.frames) {
+            s->work.frames = frames;
+        }
+    }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (!s->work.lost[i] && s->strategy->first(&s->work, i, &job)) {
             give_job(s, i, &job);

@@ -30,8 +30,10 @@ unsigned host_sending_serve(struct host_service *service,
 /* Whether a node has asked for pages and not got them yet. */
 bool host_sending_pages_wait(const struct host_service *service);
 
-/* `write` of struct host_work. */
+/* `write` and `write_to_all` of struct host_work. */
 bool host_sending_write(void *service, unsigned node, uint8_t type,
                         const void *data, size_t size);
+bool host_sending_write_to_all(void *service, uint8_t type, const void *data,
+                               size_t size);
 
 #endif

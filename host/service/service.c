@@ -159,6 +159,7 @@ static int prepare_work(struct host_service *s, struct host_error *error)
     work->ledger = &s->ledger;
     work->tets = s->tets;
     work->write = host_sending_write;
+    work->write_to_all = host_sending_write_to_all;
     work->context = s;
     work->state = calloc(1, s->strategy->state_bytes + 1);
     return work->state != NULL

@@ -86,7 +86,7 @@ struct host_node_report {
     bool up, ready;
     struct node_ready_message map;
     struct node_finished_message statistics;
-    uint64_t pages; /* that this node had from the host */
+    uint64_t pages; /* that this node alone had from the host */
     uint64_t page_bytes;
 };
 
@@ -107,6 +107,7 @@ struct host_service {
     /* Results. */
     struct host_node_report *report; /* [nodes], until the end */
     uint64_t pages_us;               /* time spent on serving pages */
+    uint64_t page_bytes_to_all;      /* of pages that were sent to all */
     uint64_t retransmitted;          /* frames, on the host's wire */
     unsigned restarts;               /* of nodes, by the machine */
     unsigned generations;            /* of the cube's wiring; 1: no loss */

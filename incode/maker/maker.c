@@ -132,6 +132,23 @@ int incode_maker_page(struct incode_maker *m, uint32_t page, const void *data,
                : INCODE_PAGE_UNASKED;
 }
 
+int incode_maker_put(struct incode_maker *m, uint32_t page, const void *data,
+                     size_t bytes)
+{
+    bool sound =
+        incode_page_is_sound(&m->tree, m->lo, m->hi, page, data, bytes) &&
+        incode_pager_put(&m->pager, page, data, bytes) == 0;
+    return sound ? 0 : INCODE_PAGE_UNSOUND;
+}
+
+bool incode_maker_fetch(struct incode_maker *m, uint32_t page)
+{
+    if (!incode_pager_loading(&m->pager, page) &&
+        incode_pager_has_free(&m->pager))
+        (void)incode_pager_get(&m->pager, page);
+    return incode_pager_loading(&m->pager, page);
+}
+
 uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick)
 {
     const struct incode_frame *f = incode_pager_get(&m->pager, brick);

@@ -242,6 +242,15 @@ uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots);
 int incode_maker_page(struct incode_maker *m, uint32_t page, const void *data,
                       size_t bytes);
 
+/* One that comes unasked: kept where it is on its way, or nothing has to make
+ * room for it.  0, or INCODE_PAGE_UNSOUND. */
+int incode_maker_put(struct incode_maker *m, uint32_t page, const void *data,
+                     size_t bytes);
+
+/* Whether a page that is not there is on its way; where nothing has to make
+ * room for it, it is asked for. */
+bool incode_maker_fetch(struct incode_maker *m, uint32_t page);
+
 /* Asks for the pages of a brick, of up to `more` after it, and of what lies
  * around the first; true: all that can be has been done for it. */
 bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,

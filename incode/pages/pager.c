@@ -123,11 +123,9 @@ static uint16_t take_frame(struct incode_pager *pager)
     return i;
 }
 
-static void ask(struct incode_pager *pager, uint32_t page)
+/* A frame for a page that is on its way. */
+static void reserve(struct incode_pager *pager, uint32_t page)
 {
-    if (pager->loading + pager->held >= pager->loading_max ||
-        !pager->source.request(pager->source.context, page))
-        return;
     uint16_t i = take_frame(pager);
     INCODE_ASSERT(i != INCODE_NO_FRAME);
     struct incode_slot *slot = &pager->slots[i];
@@ -138,6 +136,14 @@ static void ask(struct incode_pager *pager, uint32_t page)
     slot->chain = *head;
     *head = i;
     pager->loading++;
+}
+
+static void ask(struct incode_pager *pager, uint32_t page)
+{
+    if (pager->loading + pager->held >= pager->loading_max ||
+        !pager->source.request(pager->source.context, page))
+        return;
+    reserve(pager, page);
     pager->requests++;
 }
 
@@ -207,6 +213,42 @@ int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
               pager->shuffle != 0 ? INCODE_FRAME_HELD : INCODE_FRAME_READY);
     pager->held += pager->shuffle != 0;
     return 0;
+}
+
+int incode_pager_put(struct incode_pager *pager, uint32_t page,
+                     const void *data, size_t bytes)
+{
+    uint16_t i = find(pager, page);
+    if (i == INCODE_NO_FRAME && incode_pager_has_free(pager)) {
+        reserve(pager, page);
+        i = find(pager, page);
+    }
+    return i != INCODE_NO_FRAME && pager->slots[i].state == INCODE_FRAME_LOADING
+               ? incode_pager_deliver(pager, page, data, bytes)
+               : 0;
+}
+
+bool incode_pager_has(const struct incode_pager *pager, uint32_t page)
+{
+    uint16_t i = find(pager, page);
+    return i != INCODE_NO_FRAME && pager->slots[i].state == INCODE_FRAME_READY;
+}
+
+size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
+                         void *data)
+{
+    if (!incode_pager_has(pager, page))
+        return 0;
+    const struct incode_frame *f = &pager->frames[find(pager, page)];
+    if (page >= pager->bricks) {
+        memcpy(data, &f->page, sizeof f->page);
+        return sizeof f->page;
+    }
+    size_t axis = f->count * sizeof f->page.brick.x[0];
+    memcpy(data, f->page.brick.x, axis);
+    memcpy((uint8_t *)data + axis, f->page.brick.y, axis);
+    memcpy((uint8_t *)data + 2 * axis, f->page.brick.z, axis);
+    return 3 * axis;
 }
 
 bool incode_pager_release(struct incode_pager *pager, bool now)

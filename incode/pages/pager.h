@@ -115,6 +115,24 @@ uint32_t incode_pager_awaited(const struct incode_pager *pager);
 int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
                          const void *data, size_t bytes);
 
+/* A page that comes unasked: taken where it is on its way, or where a frame was
+ * never used.  0, or -1 where its size is wrong. */
+int incode_pager_put(struct incode_pager *pager, uint32_t page,
+                     const void *data, size_t bytes);
+
+/* Whether a frame was never used: nothing has been evicted yet. */
+static inline bool incode_pager_has_free(const struct incode_pager *pager)
+{
+    return pager->free < pager->frame_count;
+}
+
+/* Whether a page is ready, and then, if it is one of points or boxes, its bytes
+ * as they came: at most INCODE_PAGE_BYTES; 0: it is not.  No use of it that
+ * counts. */
+bool incode_pager_has(const struct incode_pager *pager, uint32_t page);
+size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
+                         void *data);
+
 /* Makes one page that the shuffle keeps back ready, by chance one call in four
  * or, if `now`, at once; false: none was. */
 bool incode_pager_release(struct incode_pager *pager, bool now);

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "lending.h"
 #include "shares.h"
 #include "triangulation.h"
 #include "waves.h"
@@ -12,6 +13,7 @@ struct exchange {
     uint16_t nodes;
     struct node_triangulation triangulation;
     struct node_shares shares;
+    struct node_lending lending;
     uint64_t received; /* of others */
     struct node_waves waves;
 };
@@ -21,7 +23,7 @@ struct exchange {
 static size_t own_bytes(const struct node_setup_message *setup)
 {
     return node_aligned(sizeof(struct exchange)) +
-           node_shares_bytes(setup->nodes);
+           node_shares_bytes(setup->nodes) + node_lending_bytes(setup->nodes);
 }
 
 static size_t exchange_arena_min(size_t memory,
@@ -58,14 +60,15 @@ static bool exchange_start(void *self, size_t bytes,
     e->fault = fault;
     e->self = counted->self;
     e->nodes = setup->nodes;
-    node_shares_init(&e->shares,
-                     (uint8_t *)self + node_aligned(sizeof(struct exchange)),
-                     setup, counted);
+    uint8_t *memory = (uint8_t *)self + node_aligned(sizeof(struct exchange));
+    node_shares_init(&e->shares, memory, setup, counted);
+    node_lending_init(&e->lending, memory + node_shares_bytes(setup->nodes),
+                      setup, &e->shares, counted, fault);
     node_waves_init(&e->waves, setup, counted, fault);
     const struct incode_front_peers peers = node_shares_peers(&e->shares);
     return node_triangulation_start(&e->triangulation, self, bytes,
-                                    own_bytes(setup), setup, &peers, counted,
-                                    fault);
+                                    own_bytes(setup), setup, &peers,
+                                    &e->lending, counted, fault);
 }
 
 /* ---- messages ---- */
@@ -88,6 +91,18 @@ static void take_shares(struct exchange *e, const struct cube_message *message)
         node_fault_set(e->fault, "tetrahedra in # bytes from node #",
                        message->size, message->source);
     }
+}
+
+static void take_regions(struct exchange *e, const struct cube_message *message)
+{
+    struct node_regions_message regions;
+    if (!node_shares_regions(&e->shares, message->data, message->size)) {
+        node_fault_set(e->fault, "regions in # bytes, after # of them",
+                       message->size, e->shares.known);
+        return;
+    }
+    memcpy(&regions, message->data, sizeof regions);
+    node_lending_to_all(&e->lending, regions.to_all);
 }
 
 /* What node 0 asks all nodes for. */
@@ -122,10 +137,15 @@ static void exchange_message(void *self, const struct cube_message *message,
         }
         break;
     case NODE_REGIONS:
-        if (!node_shares_regions(&e->shares, message->data, message->size)) {
-            node_fault_set(e->fault, "regions in # bytes, after # of them",
-                           message->size, e->shares.known);
-        }
+        take_regions(e, message);
+        break;
+    case NODE_PAGE_REQUEST:
+        node_lending_take(&e->lending, message);
+        break;
+    case NODE_PAGE_TO_ALL:
+        node_lending_take_to_all(&e->lending, e->triangulation.triangulator,
+                                 message->data, message->size);
+        e->triangulation.bytes_in += message->size;
         break;
     default:
         if (!node_triangulation_message(&e->triangulation, message, now_us)) {
@@ -158,6 +178,7 @@ static unsigned exchange_send(void *self)
     const struct node_triangulation *t = &e->triangulation;
     uint8_t command;
     unsigned sent = node_shares_send(&e->shares) +
+                    node_lending_send(&e->lending, t->triangulator) +
                     node_triangulation_send(&e->triangulation);
     const struct node_waves_state state = {
         .ready = t->jobs.epoch != 0 && node_shares_ready(&e->shares),
@@ -183,10 +204,22 @@ static uint32_t exchange_awaited(const void *self)
                                 : incode_triangulator_awaited(t->triangulator);
 }
 
+/* The node that is to send a page. */
+static uint32_t exchange_owing(const void *self)
+{
+    const struct exchange *e = self;
+    uint32_t page = incode_triangulator_awaited(e->triangulation.triangulator);
+    uint16_t keeper = page == INCODE_NONE
+                          ? (uint16_t)CUBE_HOST
+                          : node_lending_keeper(&e->lending, page);
+    return keeper == NODE_LENDING_COMES ? CUBE_HOST : keeper;
+}
+
 static uint32_t exchange_held(const void *self)
 {
     const struct exchange *e = self;
-    return node_triangulation_held(&e->triangulation) + e->shares.used;
+    return node_triangulation_held(&e->triangulation) + e->shares.used +
+           e->lending.queued;
 }
 
 static uint32_t exchange_done(const void *self)
@@ -207,22 +240,28 @@ static void exchange_totals(const void *self,
 {
     const struct exchange *e = self;
     node_triangulation_totals(&e->triangulation, totals, now_us);
-    totals->bytes_out += e->shares.bytes_out;
+    totals->bytes_out += e->shares.bytes_out + e->lending.bytes_out;
+    totals->pages_held = e->lending.sent;
+    totals->pages_forwarded = e->lending.passed;
 }
 
 static void exchange_map(const void *self, struct node_map *map)
 {
     const struct exchange *e = self;
-    size_t bytes = node_shares_bytes(e->nodes);
-    node_triangulation_map(&e->triangulation, map, 1);
-    map->tables[0].bytes = (uint32_t)bytes;
+    size_t shares = node_shares_bytes(e->nodes);
+    size_t lending = node_lending_bytes(e->nodes);
+    node_triangulation_map(&e->triangulation, map, 2);
+    map->tables[0].bytes = (uint32_t)shares;
     map->tables[0].count = NODE_SHARE_BATCHES;
-    map->tables[1].bytes -= (uint32_t)bytes;
+    map->tables[1].bytes = (uint32_t)lending;
+    map->tables[1].count = e->lending.queue_max;
+    map->tables[2].bytes -= (uint32_t)(shares + lending);
 }
 
 const struct node_role node_exchange_role = {
     .name = "exchange",
     .tables = {{"tetrahedra on their way to other nodes", "batches"},
+               {"pages that other nodes ask for", "requests"},
                NODE_TRIANGULATION_NAMES},
     .arena_min = exchange_arena_min,
     .start = exchange_start,
@@ -233,6 +272,7 @@ const struct node_role node_exchange_role = {
     .done = exchange_done,
     .end = exchange_end,
     .awaited = exchange_awaited,
+    .owing = exchange_owing,
     .held = exchange_held,
     .totals = exchange_totals,
     .map = exchange_map,

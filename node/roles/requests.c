@@ -7,43 +7,76 @@
 #include "node/keepers.h"
 
 void node_requests_init(struct node_requests *requests, uint32_t holders,
+                        struct node_lending *lending,
                         struct node_counted *counted, struct node_fault *fault)
 {
     memset(requests, 0, sizeof *requests);
     requests->counted = counted;
     requests->fault = fault;
     requests->holders = holders;
+    requests->lending = lending;
 }
 
-/* Sends for wanted pages, one message for each node that has some. */
+static uint16_t keeper_of(const struct node_requests *r, uint32_t page)
+{
+    return r->lending != NULL ? node_lending_keeper(r->lending, page)
+                              : node_keeper(page, r->holders);
+}
+
+/* How many pages may be asked of that keeper now. */
+static uint32_t room_at(const struct node_requests *r, uint16_t keeper)
+{
+    return cube_room(r->counted->cube, keeper) == 0 ? 0
+           : r->lending == NULL                     ? NODE_PAGES_A_REQUEST
+                                : node_lending_room(r->lending, keeper);
+}
+
+/* Sends for wanted pages from place i on that have the same keeper; false: he
+ * cannot be asked now. */
+static bool send_batch(struct node_requests *r, uint32_t i)
+{
+    uint32_t batch[NODE_PAGES_A_REQUEST];
+    uint32_t count = 0, left = i;
+    uint16_t to = keeper_of(r, r->wanted[i]);
+    uint32_t most = room_at(r, to);
+    if (most == 0) {
+        return false;
+    }
+    most = most < NODE_PAGES_A_REQUEST ? most : NODE_PAGES_A_REQUEST;
+    for (; i < r->wanted_count; i++) {
+        if (count < most && keeper_of(r, r->wanted[i]) == to) {
+            batch[count++] = r->wanted[i];
+        } else {
+            r->wanted[left++] = r->wanted[i];
+        }
+    }
+    r->wanted_count = left;
+    r->in_flight += count;
+    if (r->lending != NULL) {
+        node_lending_asked(r->lending, to, count);
+    }
+    node_counted_put(r->counted, to, NODE_PAGE_REQUEST, batch,
+                     count * sizeof batch[0]);
+    r->bytes_out += count * sizeof batch[0];
+    return true;
+}
+
+/* Sends for wanted pages, a message or more for each node that has some. */
 static void send_wanted(struct node_requests *r)
 {
-    while (r->wanted_count > 0) {
-        uint32_t batch[NODE_PAGES_A_REQUEST];
-        uint32_t count = 0, left = 0;
-        uint16_t to = node_keeper(r->wanted[0], r->holders);
-        if (cube_room(r->counted->cube, to) == 0) {
-            return;
-        }
-        for (uint32_t i = 0; i < r->wanted_count; i++) {
-            if (count < NODE_PAGES_A_REQUEST &&
-                node_keeper(r->wanted[i], r->holders) == to) {
-                batch[count++] = r->wanted[i];
-            } else {
-                r->wanted[left++] = r->wanted[i];
-            }
-        }
-        r->wanted_count = left;
-        r->in_flight += count;
-        node_counted_put(r->counted, to, NODE_PAGE_REQUEST, batch,
-                         count * sizeof batch[0]);
-        r->bytes_out += count * sizeof batch[0];
+    uint32_t i = 0;
+    while (i < r->wanted_count) {
+        i += !send_batch(r, i);
     }
 }
 
 static bool outside_request(void *context, uint32_t page)
 {
     struct node_requests *r = context;
+    if (r->lending != NULL &&
+        node_lending_keeper(r->lending, page) == NODE_LENDING_COMES) {
+        return true;
+    }
     if (r->wanted_count == NODE_WANTED_MAX) {
         send_wanted(r);
     }
@@ -75,6 +108,9 @@ bool node_requests_take(struct node_requests *requests, const uint8_t *data,
         return false;
     }
     requests->in_flight--;
+    if (requests->lending != NULL) {
+        node_lending_came(requests->lending, *page);
+    }
     *bytes = data + sizeof *page;
     *count = size - sizeof *page;
     return true;

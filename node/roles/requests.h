@@ -1,5 +1,6 @@
 /* The pages that a role with a maker asks for, of the host or of the nodes that
- * keep them.  It is the maker's source of pages (incode/pages/pager.h).
+ * keep them: holders, or those of an exchange.  It is the maker's source of
+ * pages (incode/pages/pager.h).
  *
  * Memory: the struct.  Work: a pass over the pages that are wanted, a call.
  *
@@ -11,6 +12,7 @@
 #define NODE_REQUESTS_H
 
 #include "incode/pages/pager.h"
+#include "lending.h"
 #include "node/counted.h"
 #include "node/fault.h"
 #include "node/message.h"
@@ -20,13 +22,16 @@ enum { NODE_WANTED_MAX = NODE_PAGES_A_REQUEST }; /* pages not yet asked for */
 struct node_requests {
     struct node_counted *counted;
     struct node_fault *fault;
-    uint32_t holders; /* as in the setup */
+    uint32_t holders;             /* as in the setup */
+    struct node_lending *lending; /* of an exchange, or NULL */
     uint32_t wanted[NODE_WANTED_MAX];
     uint32_t wanted_count, in_flight;
     uint64_t bytes_out;
 };
 
+/* lending: of an exchange, or NULL. */
 void node_requests_init(struct node_requests *requests, uint32_t holders,
+                        struct node_lending *lending,
                         struct node_counted *counted, struct node_fault *fault);
 
 /* As a maker sees them. */

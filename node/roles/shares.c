@@ -67,14 +67,14 @@ bool node_shares_ready(const struct node_shares *shares)
     return shares->known == shares->nodes + 1;
 }
 
-/* Whose region a vertex is in: the last one that begins at its brick or before,
- * as those that are empty begin where the next one does. */
-static uint16_t owner_of(const struct node_shares *s, uint32_t v)
+/* The last region that begins at the brick or before, as those that are empty
+ * begin where the next one does. */
+uint16_t node_shares_owner(const struct node_shares *shares, uint32_t brick)
 {
-    uint32_t brick = v / INCODE_BRICK_POINTS, low = 0, high = s->nodes;
+    uint32_t low = 0, high = shares->nodes;
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
-        if (s->first[middle] <= brick) {
+        if (shares->first[middle] <= brick) {
             low = middle;
         } else {
             high = middle;
@@ -119,7 +119,7 @@ static void shares_share(void *context, const uint32_t v[4])
     uint16_t to[4];
     unsigned told = 0;
     for (unsigned i = 0; i < 4 && v[i] != INCODE_NONE; i++) {
-        uint16_t owner = owner_of(s, v[i]);
+        uint16_t owner = node_shares_owner(s, v[i] / INCODE_BRICK_POINTS);
         bool again = owner == s->counted->self;
         for (unsigned k = 0; k < told; k++) {
             again = again || to[k] == owner;

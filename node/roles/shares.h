@@ -55,6 +55,9 @@ bool node_shares_regions(struct node_shares *shares, const uint8_t *data,
 /* Whether all regions are known. */
 bool node_shares_ready(const struct node_shares *shares);
 
+/* The node whose region a brick is in, when they are. */
+uint16_t node_shares_owner(const struct node_shares *shares, uint32_t brick);
+
 /* Sends what the links take; the number of messages. */
 unsigned node_shares_send(struct node_shares *shares);
 

@@ -49,7 +49,7 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
     memset(t, 0, sizeof *t);
     t->fault = fault;
     t->carrier = *carrier;
-    node_requests_init(&t->requests, setup->holders, counted, fault);
+    node_requests_init(&t->requests, setup->holders, NULL, counted, fault);
     const struct incode_page_source source = node_requests_source(&t->requests);
     incode_builder_init(&t->builder, memory, bytes, &setup->setup,
                         setup->jobs_per_worker, &source);

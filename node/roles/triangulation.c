@@ -16,6 +16,7 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
                               size_t bytes, size_t own,
                               const struct node_setup_message *setup,
                               const struct incode_front_peers *peers,
+                              struct node_lending *lending,
                               struct node_counted *counted,
                               struct node_fault *fault)
 {
@@ -35,7 +36,7 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
     t->before = before;
     t->exchanges = peers->share != NULL;
     node_jobs_init(&t->jobs, setup->setup.bricks, fault);
-    node_requests_init(&t->requests, setup->holders, counted, fault);
+    node_requests_init(&t->requests, setup->holders, lending, counted, fault);
     node_outlet_init(&t->outlet, memory + own, bytes, setup, counted, fault);
     const struct incode_outside outside = {
         .pages = node_requests_source(&t->requests),

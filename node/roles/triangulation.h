@@ -45,13 +45,14 @@ struct node_triangulation {
 size_t node_triangulation_min(size_t memory,
                               const struct node_setup_message *setup);
 
-/* Begins in the arena, of which the first `own` bytes are the role's.  peers:
- * of an exchange, or share = NULL.  counted and fault stay.  False: it does not
- * fit, which is a fault. */
+/* Begins in the arena, of which the first `own` bytes are the role's.  peers,
+ * lending: of an exchange, or share = NULL, and NULL.  What is given stays.
+ * False: it does not fit, which is a fault. */
 bool node_triangulation_start(struct node_triangulation *t, void *arena,
                               size_t bytes, size_t own,
                               const struct node_setup_message *setup,
                               const struct incode_front_peers *peers,
+                              struct node_lending *lending,
                               struct node_counted *counted,
                               struct node_fault *fault);
 

@@ -29,7 +29,7 @@ static bool worker_start(void *self, size_t bytes,
     memset(w, 0, sizeof *w);
     w->fault = fault;
     return node_triangulation_start(&w->triangulation, self, bytes,
-                                    node_aligned(sizeof *w), setup, &none,
+                                    node_aligned(sizeof *w), setup, &none, NULL,
                                     counted, fault);
 }
 

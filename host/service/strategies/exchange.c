@@ -6,14 +6,13 @@
 #include "regions.h"
 #include "strategies.h"
 
-enum {
-    PIECES = 2, /* a node, after a loss */
-    NODES_MAX = 1 << CUBE_DIMENSION_MAX
-};
+enum { PIECES = 2 /* a node, after a loss */ };
 
-/* How many first bricks each node has been sent. */
 struct exchange {
-    uint16_t told[NODES_MAX];
+    bool dealt;    /* all nodes have their role */
+    uint32_t told; /* first bricks that all nodes have been sent */
+    /* Pages [to_all, next) are still to be sent to all. */
+    uint32_t to_all, next;
 };
 
 static struct host_cost cost(const struct host_task *task)
@@ -53,34 +52,89 @@ static void set_up(const struct host_work *work, unsigned node,
     setup->setup.build = INCODE_BUILD_FACES;
 }
 
-static bool send(struct host_work *work, unsigned node)
+/* From which page on all nodes are sent all: the first one where each holds
+ * them all, or that of a level of boxes where those from there on take up no
+ * more than half of its room. */
+static uint32_t first_to_all(const struct host_work *work)
+{
+    const struct incode_tree *tree = &work->order->tree;
+    uint32_t level = 1;
+    if (tree->pages <= work->frames) {
+        return 0;
+    }
+    while (level < tree->levels &&
+           tree->pages - tree->base[level] > work->frames / 2) {
+        level++;
+    }
+    return level < tree->levels ? tree->base[level] : tree->pages;
+}
+
+static bool first(struct host_work *work, unsigned node, struct incode_job *job)
 {
     struct exchange *state = work->state;
+    if (exchanges(work) && !state->dealt) {
+        state->dealt = true;
+        state->to_all = first_to_all(work);
+        state->next = work->order->tree.pages;
+    }
+    return host_regions_first(work, node, job);
+}
+
+static bool send_regions(struct host_work *work, struct exchange *state)
+{
     struct {
         struct node_regions_message head;
         uint32_t first[NODE_REGIONS_A_MESSAGE];
     } message;
-    uint32_t count = work->nodes + 1u - state->told[node];
-    if (count == 0 || !exchanges(work)) {
-        return false;
-    }
+    uint32_t count = work->nodes + 1u - state->told;
     if (count > NODE_REGIONS_A_MESSAGE) {
         count = NODE_REGIONS_A_MESSAGE;
     }
-    message.head.first = state->told[node];
-    message.head.count = count;
+    message.head = (struct node_regions_message){
+        .first = state->told, .count = count, .to_all = state->to_all};
     for (uint32_t i = 0; i < count; i++) {
         uint32_t region = message.head.first + i;
         message.first[i] = region < work->nodes
                                ? work->order->region[region].first
                                : work->order->bricks;
     }
-    if (!work->write(work->context, node, NODE_REGIONS, &message,
-                     sizeof message.head + count * sizeof message.first[0])) {
+    if (!work->write_to_all(work->context, NODE_REGIONS, &message,
+                            sizeof message.head +
+                                count * sizeof message.first[0])) {
         return false;
     }
-    state->told[node] = (uint16_t)(state->told[node] + count);
+    state->told += count;
     return true;
+}
+
+/* From the last page down: boxes before what is in them. */
+static bool send_page(struct host_work *work, struct exchange *state)
+{
+    struct {
+        uint32_t page;
+        uint8_t data[INCODE_PAGE_BYTES];
+    } body = {.page = state->next - 1};
+    size_t size = host_page(work->order, body.page, body.data);
+    if (!work->write_to_all(work->context, NODE_PAGE_TO_ALL, &body,
+                            sizeof body.page + size)) {
+        return false;
+    }
+    state->next--;
+    return true;
+}
+
+/* What goes to all, in whosever turn. */
+static bool send(struct host_work *work, unsigned node)
+{
+    struct exchange *state = work->state;
+    (void)node;
+    if (!state->dealt) {
+        return false;
+    }
+    if (state->told <= work->nodes) {
+        return send_regions(work, state);
+    }
+    return state->next > state->to_all && send_page(work, state);
 }
 
 static void lose(struct host_work *work)
@@ -102,7 +156,7 @@ const struct host_strategy host_exchange = {
     .cost = cost,
     .regions = host_regions_each,
     .set_up = set_up,
-    .first = host_regions_first,
+    .first = first,
     .next = host_regions_next,
     .commit = host_regions_commit,
     .lose = lose,

@@ -124,6 +124,7 @@ size_t host_strategy_arena(const struct host_strategy *strategy, unsigned nodes,
     for (unsigned i = 0; i <= nodes; i++) {
         /* Last, what is left for one that has lost all others. */
         struct node_setup_message setup = *given;
+        setup.nodes = (uint16_t)nodes;
         work.living = i < nodes ? nodes : 1;
         setup.setup.owner_rule = (uint8_t)strategy->owner_rule;
         strategy->set_up(&work, i < nodes ? i : 0, &setup);

@@ -51,12 +51,16 @@ struct host_work {
     const struct host_order *order;
     struct host_ledger *ledger;
     struct host_tetrahedra *tets; /* that have come, of vertex numbers */
-    void *state;                  /* the strategy's own, state_bytes */
+    uint32_t frames; /* pages that each node has room for, from `first` on */
+    void *state;     /* the strategy's own, state_bytes */
     /* Sends a counted message, of at most CUBE_PAYLOAD_MAX bytes; false: there
      * is no room now.  For the strategy's `send`. */
     bool (*write)(void *context, unsigned node, uint8_t type, const void *data,
                   size_t size);
-    void *context; /* of write */
+    /* The same to all nodes, of which none is lost. */
+    bool (*write_to_all)(void *context, uint8_t type, const void *data,
+                         size_t size);
+    void *context; /* of both */
 };
 
 /* Whether a node is not in this generation. */

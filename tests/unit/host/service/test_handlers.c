@@ -248,6 +248,26 @@ static void test_strategy(void **unused)
     }
 }
 
+/* Pages that one node leaves to the host go to another, behind those that this
+ * one has asked for itself. */
+static void test_passed(void **unused)
+{
+    (void)unused;
+    const uint32_t own = 1, passed[3] = {2, 0, 3};
+    struct host_error error = {0};
+    begin();
+    assert_int_equal(send(2, NODE_PAGE_REQUEST, &own, sizeof own, &error), 0);
+    assert_int_equal(send(1, NODE_PAGE_PASSED, passed, sizeof passed, &error),
+                     0);
+    assert_int_equal(service.node[1].pages_count, 0);
+    assert_int_equal(service.node[1].received, 1);
+    assert_int_equal(service.node[2].pages_count, 3);
+    assert_int_equal(service.node[2].pages[0], 1);
+    assert_int_equal(service.node[2].pages[1], 0);
+    assert_int_equal(service.node[2].pages[2], 3);
+    end();
+}
+
 /* What no node of this version sends is told in figures. */
 static void test_texts(void **unused)
 {
@@ -260,14 +280,15 @@ static void test_texts(void **unused)
     } spill = {.header = {.count = NODE_FACES_A_MESSAGE + 1}};
     static struct node_spill_header beyond = {.brick = 1000000};
     uint32_t page = 1000000;
+    const uint32_t passed[2] = {2, page};
     const struct {
         uint8_t type;
         const void *data;
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 7, expected 8"},
-        {NODE_READY, &ready, 4, "protocol version 7, expected 8"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 8, expected 9"},
+        {NODE_READY, &ready, 4, "protocol version 8, expected 9"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
         {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 40"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
@@ -276,6 +297,10 @@ static void test_texts(void **unused)
         {NODE_PAGE_REQUEST, many, sizeof many,
          "more than 256 pages requested: 257"},
         {NODE_PAGE_REQUEST, many, 7, "page numbers in 7 bytes, expected 4"},
+        {NODE_PAGE_PASSED, &page, 3, "requests of another node in 3 bytes, "},
+        {NODE_PAGE_PASSED, &page, 4, "requests of node 1000000, expected 0..3"},
+        {NODE_PAGE_PASSED, passed, 8, "page 1000000 out of range 0.."},
+        {NODE_PAGE_PASSED, many, 7, "page numbers in 7 bytes, expected 4"},
         {NODE_SPILL, &spill, 19, "spilled faces in 19 bytes, expected 20"},
         {NODE_SPILL, &spill, 32,
          "129 spilled faces in 32 bytes, expected 1568"},
@@ -291,7 +316,7 @@ static void test_texts(void **unused)
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
          "same version"}};
-    assert_int_equal(NODE_PROTOCOL, 8);
+    assert_int_equal(NODE_PROTOCOL, 9);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();
@@ -312,7 +337,8 @@ int main(void)
         cmocka_unit_test(test_any_bytes), cmocka_unit_test(test_epochs),
         cmocka_unit_test(test_gaps),      cmocka_unit_test(test_answers),
         cmocka_unit_test(test_starts),    cmocka_unit_test(test_fault),
-        cmocka_unit_test(test_strategy),  cmocka_unit_test(test_texts),
+        cmocka_unit_test(test_strategy),  cmocka_unit_test(test_passed),
+        cmocka_unit_test(test_texts),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

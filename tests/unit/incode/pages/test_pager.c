@@ -211,6 +211,43 @@ static void deliver_one(struct incode_pager *pager, struct model *m,
     m->held += m->shuffled;
 }
 
+/* One that comes unasked is taken where it is on its way, or where nothing has
+ * to make room for it. */
+static void put_one(struct incode_pager *pager, struct model *m, uint32_t pages)
+{
+    uint8_t data[INCODE_PAGE_BYTES + 64];
+    uint32_t page = draw(pages);
+    size_t bytes = fill(page, data);
+    m->asked = INCODE_NONE;
+    assert_int_equal(incode_pager_has_free(pager), m->count < m->frames);
+    assert_int_equal(incode_pager_put(pager, page, data, bytes), 0);
+    assert_int_equal(m->asked, INCODE_NONE);
+    bool comes = m->place[page] == LOADING;
+    if (m->place[page] == ABSENT && m->count < m->frames) {
+        put_first(m, page);
+        comes = true;
+    } else if (comes) {
+        m->loading--;
+    }
+    if (comes) {
+        m->place[page] = m->shuffled ? HELD : READY;
+        m->held += m->shuffled;
+    }
+}
+
+/* A page that is there goes out as it came, and that is no use of it. */
+static void copy_one(const struct incode_pager *pager, const struct model *m,
+                     uint32_t pages)
+{
+    uint8_t data[INCODE_PAGE_BYTES + 64], copy[INCODE_PAGE_BYTES];
+    uint32_t page = draw(pages);
+    size_t bytes = fill(page, data), had = incode_pager_copy(pager, page, copy);
+    bool ready = m->place[page] == READY;
+    assert_int_equal(incode_pager_has(pager, page), ready);
+    assert_int_equal(had, ready ? bytes : 0);
+    assert_memory_equal(copy, data, had);
+}
+
 /* Which page comes out is the pager's choice; one does at once if told so. */
 static void release(struct incode_pager *pager, struct model *m)
 {
@@ -277,11 +314,15 @@ static void trace(uint32_t frames, uint32_t pages, bool shuffled)
     pager.shuffle = shuffled ? 99 : 0;
     assert_in_range(pager.loading_max, 1, frames);
     for (int step = 0; step < 20000; step++) {
-        uint32_t what = draw(8);
+        uint32_t what = draw(9);
         if (what < 5)
             get_one(&pager, &m, pages);
         else if (what < 7)
             deliver_one(&pager, &m, pages);
+        else if (what == 7 && draw(8) == 0)
+            put_one(&pager, &m, pages);
+        else if (what == 7)
+            copy_one(&pager, &m, pages);
         else
             release(&pager, &m);
         if (step % 64 == 0)

@@ -2,104 +2,9 @@
  * commits, and what a loss leaves; and what holds for every row of the table.
  */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include <cmocka.h>
-
-#include "host/mesh/gen.h"
-#include "host/service/strategies/strategies.h"
-
-enum { NODES = 4 };
-
-static struct host_points points;
-static struct host_order order;
-static struct host_ledger ledger;
-static struct host_tetrahedra tets;
-static bool lost[NODES];
-static struct host_work work;
-
-static int set_up(void **unused)
-{
-    (void)unused;
-    struct host_error error = {0};
-    return host_gen("uniform", 3000, 1, &points, &error);
-}
-
-static int tear_down(void **unused)
-{
-    (void)unused;
-    host_points_free(&points);
-    return 0;
-}
-
-/* A run of this strategy at its beginning: all nodes have their setup. */
-static void begin(const struct host_strategy *strategy)
-{
-    struct host_error error = {0};
-    assert_int_equal(host_order_make(&order, "test", points.xyz, points.count,
-                                     HOST_ADAPTIVE, strategy->regions(NODES),
-                                     false, &error),
-                     0);
-    assert_int_equal(host_ledger_init(&ledger, order.bricks, NODES, &error), 0);
-    memset(&tets, 0, sizeof tets);
-    memset(lost, 0, sizeof lost);
-    work = (struct host_work){.nodes = NODES,
-                              .living = NODES,
-                              .lost = lost,
-                              .order = &order,
-                              .ledger = &ledger,
-                              .tets = &tets};
-    work.state = calloc(1, strategy->state_bytes + 1);
-    assert_non_null(work.state);
-}
-
-static void end(void)
-{
-    free(work.state);
-    host_order_free(&order);
-    host_ledger_free(&ledger);
-    host_tetrahedra_free(&tets);
-}
-
-/* The roles of the nodes, one character each. */
-static const char *roles(const struct host_strategy *strategy)
-{
-    static char text[NODES + 1];
-    for (unsigned i = 0; i < NODES; i++) {
-        struct node_setup_message setup = {0};
-        strategy->set_up(&work, i, &setup);
-        text[i] = setup.role == NODE_WORKER     ? 'w'
-                  : setup.role == NODE_HOLDER   ? 'h'
-                  : setup.role == NODE_MANAGER  ? 'm'
-                  : setup.role == NODE_BUILDER  ? 'b'
-                  : setup.role == NODE_EXCHANGE ? 'e'
-                                                : '?';
-        for (unsigned k = 1; k < NODES; k++) {
-            struct node_setup_message other = {0};
-            strategy->set_up(&work, k, &other);
-            assert_int_equal(other.holders, setup.holders);
-        }
-    }
-    return text;
-}
-
-static void lose(const struct host_strategy *strategy, unsigned node)
-{
-    lost[node] = true;
-    work.living--;
-    strategy->lose(&work);
-}
-
-static uint32_t give(unsigned node, const struct incode_job *job)
-{
-    return host_ledger_open(&ledger, node, job->first, job->last);
-}
+#include "begun_strategy.h"
 
 /* The box is that of the job's points, or of their region. */
 static void check_box(const struct incode_job *job)
@@ -231,83 +136,6 @@ static void test_spatial_loss(void **unused)
                     most <= (order.bricks - 1) / (2 * living) + 1);
         end();
     }
-}
-
-/* What NODE_REGIONS have said to each node. */
-static struct {
-    uint32_t first[NODES + 1], known;
-    bool refuse;
-} told[NODES];
-
-static bool write_regions(void *context, unsigned node, uint8_t type,
-                          const void *data, size_t size)
-{
-    struct node_regions_message head;
-    (void)context;
-    if (told[node].refuse) {
-        return false;
-    }
-    assert_int_equal(type, NODE_REGIONS);
-    assert_true(size >= sizeof head);
-    memcpy(&head, data, sizeof head);
-    assert_int_equal(size, sizeof head + 4 * (size_t)head.count);
-    assert_int_equal(head.first, told[node].known);
-    assert_true(told[node].known + head.count <= NODES + 1);
-    memcpy(told[node].first + head.first, (const uint8_t *)data + sizeof head,
-           4 * (size_t)head.count);
-    told[node].known += head.count;
-    return true;
-}
-
-/* All exchange, and are told all regions, once; after a loss they work by
- * themselves, and hear nothing of them. */
-static void test_exchange(void **unused)
-{
-    (void)unused;
-    const struct host_strategy *s = &host_exchange;
-    struct incode_job job;
-    struct node_setup_message setup = {.setup.build = INCODE_BUILD_AUTO};
-    struct host_error error = {0};
-    begin(s);
-    assert_int_equal(s->check(NODES, &work.sharing, INCODE_FACE_OWN, &error),
-                     0);
-    assert_int_equal(s->check(NODES, &work.sharing, INCODE_FACE_PAPER, &error),
-                     HOST_USAGE);
-    work.write = write_regions;
-    memset(told, 0, sizeof told);
-    assert_string_equal(roles(s), "eeee");
-    s->set_up(&work, 1, &setup);
-    assert_int_equal(s->owner_rule, INCODE_OWNER_LOWEST);
-    assert_int_equal(setup.setup.build, INCODE_BUILD_FACES);
-    told[2].refuse = true;
-    assert_false(s->send(&work, 2));
-    told[2].refuse = false;
-    for (unsigned i = 0; i < NODES; i++) {
-        for (bool more = true; more;) {
-            more = s->send(&work, i);
-        }
-        assert_int_equal(told[i].known, NODES + 1);
-        for (unsigned k = 0; k < NODES; k++) {
-            assert_int_equal(told[i].first[k], order.region[k].first);
-        }
-        assert_int_equal(told[i].first[NODES], order.bricks);
-        assert_true(s->first(&work, i, &job));
-        (void)give(i, &job);
-    }
-    /* All start again, and nothing is done: once more. */
-    s->lose(&work);
-    memset(told, 0, sizeof told);
-    assert_string_equal(roles(s), "eeee");
-    assert_true(s->send(&work, 3));
-    assert_true(s->first(&work, 3, &job));
-    (void)give(3, &job);
-    assert_int_equal(s->commit(&work, 3, order.region[3].first), 0);
-    lose(s, 0);
-    assert_string_equal(roles(s), "wwww");
-    assert_false(s->send(&work, 1));
-    assert_false(s->first(&work, 1, &job));
-    assert_true(s->next(&work, 1, &job));
-    end();
 }
 
 /* Nothing is done, and nodes only start again: each has its region again. */
@@ -555,6 +383,7 @@ static void test_arena(void **unused)
         for (unsigned i = 0; i <= NODES; i++) {
             struct node_setup_message setup = given;
             work.living = i < NODES ? NODES : 1; /* all others were lost */
+            setup.nodes = NODES;
             setup.setup.owner_rule = (uint8_t)s->owner_rule;
             s->set_up(&work, i % NODES, &setup);
             size_t one = node_arena_needed(&identity, 1u << 20, &setup);
@@ -576,7 +405,6 @@ int main(void)
         cmocka_unit_test(test_master_slaves),
         cmocka_unit_test(test_hybrid),
         cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_exchange),
         cmocka_unit_test(test_lost_tetrahedra),
         cmocka_unit_test(test_arena),
     };

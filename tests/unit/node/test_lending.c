@@ -1,0 +1,377 @@
+/* Pages among the nodes of an exchange, by themselves: whom a page is asked of,
+ * what is lent, waited for or left to the host, and what comes to all. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "node/roles/requests.h"
+
+enum { SENT_MAX = 64, NODES = 4, SELF = 1, BRICKS = 40, PAGES_MAX = 64 };
+
+/* --- links, in the place of transport/cube.c ------------------------------ */
+
+struct cube {
+    unsigned room, count;
+    struct sent {
+        uint16_t dest;
+        uint8_t type;
+        uint16_t size;
+        uint32_t word[3]; /* of the message */
+    } sent[SENT_MAX];
+};
+
+int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
+               size_t size)
+{
+    if (cube->room == 0) {
+        return CUBE_AGAIN;
+    }
+    assert_true(cube->count < SENT_MAX);
+    struct sent *sent = &cube->sent[cube->count++];
+    *sent = (struct sent){.dest = dest, .type = type, .size = (uint16_t)size};
+    memcpy(sent->word, data, size < 12 ? size : 12);
+    cube->room--;
+    return 0;
+}
+
+unsigned cube_room(const struct cube *cube, uint16_t dest)
+{
+    (void)dest;
+    return cube->room;
+}
+
+/* --- pages, in the place of incode/triangulator.c ------------------------- */
+
+enum place { ABSENT, LOADING, READY };
+
+static struct {
+    enum place place[PAGES_MAX];
+    bool full;          /* pages would have to make room */
+    uint32_t fetched;   /* that the node has asked for */
+    uint32_t put, puts; /* the last that came unasked */
+    bool unsound;
+} had;
+
+bool incode_triangulator_has(const struct incode_triangulator *t, uint32_t page)
+{
+    (void)t;
+    return had.place[page] == READY;
+}
+
+size_t incode_triangulator_copy(const struct incode_triangulator *t,
+                                uint32_t page, void *data)
+{
+    (void)t;
+    assert_int_equal(had.place[page], READY);
+    memset(data, (int)page, 24);
+    return 24;
+}
+
+bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
+{
+    (void)t;
+    assert_int_not_equal(had.place[page], READY);
+    if (had.place[page] == ABSENT && !had.full) {
+        had.place[page] = LOADING;
+        had.fetched++;
+    }
+    return had.place[page] == LOADING;
+}
+
+int incode_triangulator_put(struct incode_triangulator *t, uint32_t page,
+                            const void *data, size_t bytes)
+{
+    (void)t, (void)data;
+    assert_int_equal(bytes, 24);
+    had.put = page;
+    had.puts++;
+    return had.unsound ? INCODE_PAGE_UNSOUND : 0;
+}
+
+/* --- a node of four, with ten bricks each --------------------------------- */
+
+static struct {
+    _Alignas(64) uint8_t memory[4096];
+    _Alignas(64) uint8_t shares_memory[65536];
+    struct cube cube;
+    struct node_counted counted;
+    struct node_fault fault;
+    struct node_shares shares;
+    struct node_lending lending;
+    struct node_requests requests;
+    struct incode_page_source source;
+} world;
+
+static void begin(void)
+{
+    const struct node_setup_message setup = {
+        .nodes = NODES,
+        .setup = {.bricks = BRICKS, .index = INCODE_KD, .hi = {1, 1, 1}}};
+    struct {
+        struct node_regions_message head;
+        uint32_t first[NODES + 1];
+    } regions = {.head = {.count = NODES + 1}, .first = {0, 10, 20, 30, 40}};
+    memset(&world, 0, sizeof world);
+    memset(&had, 0, sizeof had);
+    world.counted.cube = &world.cube;
+    world.counted.self = SELF;
+    assert_true(node_shares_bytes(NODES) <= sizeof world.shares_memory);
+    assert_true(node_lending_bytes(NODES) <= sizeof world.memory);
+    memset(world.memory, 0xa5, sizeof world.memory);
+    node_shares_init(&world.shares, world.shares_memory, &setup,
+                     &world.counted);
+    node_lending_init(&world.lending, world.memory, &setup, &world.shares,
+                      &world.counted, &world.fault);
+    for (size_t i = node_lending_bytes(NODES); i < sizeof world.memory; i++) {
+        assert_int_equal(world.memory[i], 0xa5);
+    }
+    node_requests_init(&world.requests, 0, &world.lending, &world.counted,
+                       &world.fault);
+    world.source = node_requests_source(&world.requests);
+    assert_true(node_shares_regions(&world.shares, (const uint8_t *)&regions,
+                                    sizeof regions));
+}
+
+static void asks(uint16_t source, uint32_t page)
+{
+    const struct cube_message message = {.source = source,
+                                         .type = NODE_PAGE_REQUEST,
+                                         .data = (const uint8_t *)&page,
+                                         .size = sizeof page};
+    node_lending_take(&world.lending, &message);
+}
+
+static unsigned sends(unsigned room)
+{
+    world.cube.room = room;
+    world.cube.count = 0;
+    unsigned sent = node_lending_send(&world.lending, NULL);
+    assert_int_equal(sent, world.cube.count);
+    return sent;
+}
+
+static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t first,
+                   uint32_t second)
+{
+    assert_true(i < world.cube.count);
+    assert_int_equal(world.cube.sent[i].dest, dest);
+    assert_int_equal(world.cube.sent[i].type, type);
+    assert_int_equal(world.cube.sent[i].word[0], first);
+    assert_int_equal(world.cube.sent[i].word[1], second);
+}
+
+/* Bricks of who has them, boxes of who has the first brick below: of 40 bricks
+ * there are two pages at 40, and the root at 42. */
+static void keepers(void **unused)
+{
+    static const uint32_t page[] = {0, 9, 10, 19, 20, 39, 40, 41, 42};
+    static const uint16_t keeper[] = {0, 0, CUBE_HOST, CUBE_HOST, 2,
+                                      3, 0, 3,         0};
+    (void)unused;
+    begin();
+    for (size_t i = 0; i < sizeof page / sizeof *page; i++) {
+        assert_int_equal(node_lending_keeper(&world.lending, page[i]),
+                         keeper[i]);
+    }
+}
+
+/* A page that is there goes to who asks, as links have room. */
+static void lent(void **unused)
+{
+    (void)unused;
+    begin();
+    had.place[12] = had.place[13] = READY;
+    asks(3, 12);
+    asks(0, 13);
+    assert_int_equal(sends(0), 0);
+    assert_int_equal(sends(1), 1);
+    expect(0, 3, NODE_PAGE, 12, 0x0c0c0c0c);
+    assert_int_equal(sends(8), 1);
+    expect(0, 0, NODE_PAGE, 13, 0x0d0d0d0d);
+    assert_int_equal(world.cube.sent[0].size, 4 + 24);
+    assert_int_equal(world.lending.queued, 0);
+    assert_int_equal(world.lending.sent, 2);
+    assert_int_equal(world.lending.bytes_out, 2 * (4 + 24));
+    assert_false(node_fault_is_set(&world.fault));
+}
+
+/* One that the node has not had yet it gets itself, and it waits. */
+static void not_there_yet(void **unused)
+{
+    (void)unused;
+    begin();
+    had.place[14] = LOADING;
+    asks(3, 14);
+    asks(3, 15);
+    assert_int_equal(sends(8), 0);
+    assert_int_equal(sends(8), 0);
+    assert_int_equal(had.fetched, 1);
+    had.full = true; /* those that are on their way still come */
+    assert_int_equal(sends(8), 0);
+    had.place[15] = READY;
+    assert_int_equal(sends(8), 1);
+    expect(0, 3, NODE_PAGE, 15, 0x0f0f0f0f);
+    had.place[14] = READY;
+    assert_int_equal(sends(8), 1);
+    assert_int_equal(world.lending.passed, 0);
+}
+
+/* One that it has given up it leaves to the host, once. */
+static void given_up(void **unused)
+{
+    (void)unused;
+    begin();
+    had.full = true;
+    asks(2, 16);
+    assert_int_equal(sends(0), 0);
+    assert_int_equal(sends(8), 1);
+    expect(0, CUBE_HOST, NODE_PAGE_PASSED, 2, 16);
+    assert_int_equal(world.cube.sent[0].size, 8);
+    assert_int_equal(world.counted.sent, 1);
+    assert_int_equal(sends(8), 0);
+    assert_int_equal(world.lending.passed, 1);
+    assert_int_equal(world.lending.sent, 0);
+    assert_int_equal(had.fetched, 0);
+}
+
+static void refused(uint16_t source, uint32_t page, const char *why)
+{
+    asks(source, page);
+    assert_int_equal(world.fault.size, strlen(why));
+    assert_memory_equal(world.fault.text, why, world.fault.size);
+    begin();
+}
+
+/* What no sound node asks for. */
+static void wrong_requests(void **unused)
+{
+    (void)unused;
+    begin();
+    refused(2, 9, "request for page 9, which node 1 has not");
+    refused(2, 40, "request for page 40, which node 1 has not");
+    refused(2, 43, "request for page 43, which node 1 has not");
+    refused(CUBE_HOST, 12, "request in 4 bytes from node 65534");
+    for (uint32_t i = 0; i < (NODES - 1) * NODE_PAGES_LENT_MAX; i++) {
+        asks(2, 12);
+        assert_false(node_fault_is_set(&world.fault));
+    }
+    refused(2, 12, "more than 24 pages requested at a time");
+}
+
+static unsigned sends_requests(unsigned room)
+{
+    world.cube.room = room;
+    world.cube.count = 0;
+    (void)node_requests_send(&world.requests);
+    return world.cube.count;
+}
+
+static void comes(uint32_t page)
+{
+    uint32_t body[7] = {page};
+    const uint8_t *bytes;
+    size_t count;
+    uint32_t number;
+    assert_true(node_requests_take(&world.requests, (const uint8_t *)body,
+                                   sizeof body, &number, &bytes, &count));
+    assert_int_equal(number, page);
+}
+
+/* A node is asked for so many at a time, and others meanwhile; whoever sends a
+ * page makes room for another. */
+static void asked_for(void **unused)
+{
+    (void)unused;
+    begin();
+    for (uint32_t page = 0; page < 10; page++) {
+        assert_true(world.source.request(world.source.context, page));
+    }
+    assert_true(world.source.request(world.source.context, 25));
+    assert_true(world.source.request(world.source.context, 11));
+    assert_int_equal(sends_requests(8), 3);
+    expect(0, 0, NODE_PAGE_REQUEST, 0, 1);
+    assert_int_equal(world.cube.sent[0].size, 4 * NODE_PAGES_LENT_MAX);
+    expect(1, 2, NODE_PAGE_REQUEST, 25, 0);
+    expect(2, CUBE_HOST, NODE_PAGE_REQUEST, 11, 0);
+    assert_int_equal(node_requests_held(&world.requests), 12);
+    assert_int_equal(sends_requests(8), 0);
+    comes(25); /* of another */
+    assert_int_equal(sends_requests(8), 0);
+    comes(3);
+    assert_int_equal(sends_requests(8), 1);
+    expect(0, 0, NODE_PAGE_REQUEST, 8, 0);
+    assert_int_equal(world.cube.sent[0].size, 4);
+    for (uint32_t page = 0; page < 9; page++) {
+        if (page != 3) {
+            comes(page);
+        }
+    }
+    assert_int_equal(sends_requests(8), 1);
+    expect(0, 0, NODE_PAGE_REQUEST, 9, 0);
+    comes(9);
+    comes(11);
+    assert_int_equal(node_requests_held(&world.requests), 0);
+    assert_false(node_fault_is_set(&world.fault));
+}
+
+static void all_get(uint32_t page)
+{
+    uint32_t body[7] = {page};
+    node_lending_take_to_all(&world.lending, NULL, (const uint8_t *)body,
+                             sizeof body);
+}
+
+/* What is to come to all is asked of nobody until it has passed. */
+static void to_all(void **unused)
+{
+    (void)unused;
+    begin();
+    node_lending_to_all(&world.lending, 38);
+    assert_int_equal(node_lending_keeper(&world.lending, 37), 3);
+    assert_int_equal(node_lending_keeper(&world.lending, 38),
+                     NODE_LENDING_COMES);
+    assert_true(world.source.request(world.source.context, 38));
+    assert_true(world.source.request(world.source.context, 42));
+    assert_int_equal(sends_requests(8), 0);
+    assert_int_equal(node_requests_held(&world.requests), 0);
+    for (uint32_t page = 42; page > 38; page--) {
+        all_get(page);
+        assert_int_equal(had.put, page);
+    }
+    assert_int_equal(had.puts, 4);
+    assert_int_equal(node_lending_keeper(&world.lending, 39), 3);
+    assert_int_equal(node_lending_keeper(&world.lending, 38),
+                     NODE_LENDING_COMES);
+    all_get(38);
+    assert_int_equal(node_lending_keeper(&world.lending, 38), 3);
+    assert_false(node_fault_is_set(&world.fault));
+    all_get(37); /* is not among them */
+    assert_true(node_fault_is_set(&world.fault));
+    begin();
+    node_lending_to_all(&world.lending, 38);
+    all_get(41); /* 42 is missing */
+    assert_true(node_fault_is_set(&world.fault));
+    begin();
+    node_lending_to_all(&world.lending, 38);
+    had.unsound = true;
+    all_get(42);
+    assert_true(node_fault_is_set(&world.fault));
+    begin();
+    node_lending_to_all(&world.lending, 44); /* past the end */
+    assert_true(node_fault_is_set(&world.fault));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(keepers),        cmocka_unit_test(lent),
+        cmocka_unit_test(not_there_yet),  cmocka_unit_test(given_up),
+        cmocka_unit_test(wrong_requests), cmocka_unit_test(asked_for),
+        cmocka_unit_test(to_all),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
