@@ -42,13 +42,16 @@ static bool fits(const void *context, const struct host_strategy *strategy)
                               run->cells) <= run->options->memory;
 }
 
-/* What `auto` is told.  Nodes of this machine share its processors. */
+/* What `auto` is told.  Nodes of this machine share its processors, with the
+ * host. */
 static struct host_task task_of(const struct run *run, uint64_t points)
 {
     const struct host_run_options *options = run->options;
     unsigned nodes = run->nodes;
     long here = sysconf(_SC_NPROCESSORS_ONLN);
     unsigned processors = options->processors + (unsigned)(here > 0 ? here : 1);
+    bool with_host = options->processors == 0;
+    unsigned at_once = nodes + with_host;
     bool by_points = options->build != INCODE_BUILD_FACES &&
                      options->index == INCODE_KD &&
                      options->face_rule == INCODE_FACE_OWN;
@@ -56,7 +59,8 @@ static struct host_task task_of(const struct run *run, uint64_t points)
                               .memory = options->memory,
                               .nodes = nodes,
                               .processors =
-                                  processors < nodes ? processors : nodes,
+                                  processors < at_once ? processors : at_once,
+                              .with_host = with_host,
                               .wire_bytes_s = options->wire_bytes_s,
                               .face_rule = options->face_rule,
                               .build = options->build,
@@ -134,22 +138,20 @@ bool host_settle_ordered(const struct host_run_options *options,
                          struct host_run_result *result)
 {
     const struct host_strategy *before = result->strategy;
-    char why[HOST_WHY_BYTES];
     if (result->why[0] == '\0') { /* it was not for `auto` to say */
         return false;
     }
-    memcpy(why, result->why, sizeof why);
     const struct run run = {options, result->nodes, order->bricks,
                             order->cells};
     struct host_task task = task_of(&run, order->points);
     task.uneven = is_uneven(order);
     choose(&task, result);
-    uint32_t regions = result->strategy->regions(result->nodes);
-    if (regions == 1) {
+    if (result->strategy->regions(result->nodes) == 1) {
         host_order_join(order);
-    } else if (regions != order->regions) {
-        result->strategy = before;
-        memcpy(result->why, why, sizeof why);
+    }
+    if (options->nodes == 0 && options->begin == NULL &&
+        result->strategy->nodes_default != 0) {
+        result->nodes = result->strategy->nodes_default;
     }
     return result->strategy != before;
 }
