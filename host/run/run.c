@@ -96,7 +96,7 @@ static int run_service(const struct host_run_options *options,
     service->tets = tets;
     service->setup.setup.index = (uint8_t)options->index;
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
-    service->setup.setup.build = (uint8_t)options->build;
+    service->setup.setup.build = (uint8_t)result->build;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
     int status = host_service_run(service, error);
     host_run_sum(service, result);

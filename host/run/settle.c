@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "host/order/open.h"
 #include "memory_needed.h"
 
 /* The largest power of two of nodes that have a processor each. */
@@ -42,6 +43,13 @@ static bool fits(const void *context, const struct host_strategy *strategy)
                               run->cells) <= run->options->memory;
 }
 
+/* Whether a node may insert points, as far as the options go. */
+static bool may_insert(const struct host_run_options *options)
+{
+    return options->build != INCODE_BUILD_FACES &&
+           options->index == INCODE_KD && options->face_rule == INCODE_FACE_OWN;
+}
+
 /* What `auto` is told.  Nodes of this machine share its processors, with the
  * host. */
 static struct host_task task_of(const struct run *run, uint64_t points)
@@ -52,9 +60,6 @@ static struct host_task task_of(const struct run *run, uint64_t points)
     unsigned processors = options->processors + (unsigned)(here > 0 ? here : 1);
     bool with_host = options->processors == 0;
     unsigned at_once = nodes + with_host;
-    bool by_points = options->build != INCODE_BUILD_FACES &&
-                     options->index == INCODE_KD &&
-                     options->face_rule == INCODE_FACE_OWN;
     return (struct host_task){.points = points,
                               .memory = options->memory,
                               .nodes = nodes,
@@ -67,7 +72,7 @@ static struct host_task task_of(const struct run *run, uint64_t points)
                               .sharing = options->sharing,
                               .fits = fits,
                               .context = run,
-                              .by_points = by_points};
+                              .by_points = may_insert(options)};
 }
 
 static void choose(const struct host_task *task, struct host_run_result *result)
@@ -82,6 +87,7 @@ void host_settle(const struct host_run_options *options, uint64_t points,
     result->strategy = options->strategy;
     result->partition = options->partition;
     result->index = options->index;
+    result->build = options->build;
     result->link = options->link;
     result->board = options->board;
     result->memory = options->memory;
@@ -133,18 +139,36 @@ static bool is_uneven(const struct host_order *order)
     return uneven > looked / FEW;
 }
 
+/* Whether points that fill no volume evenly can be inserted brick after brick
+ * where nodes have so much memory: all tetrahedra fit, or those that are open
+ * at a time do.  Each takes a cell and a fourth of a point, and there are some
+ * 6.5 a point; a part of the memory has other uses. */
+static bool is_room(const struct host_order *order, uint64_t memory)
+{
+    enum { CELL = 40, HALF_CELLS_A_POINT = 13, OTHER = 256 << 10 };
+    uint64_t cells = (memory - memory / 8 - OTHER) / CELL;
+    return order->points * (uint64_t)HALF_CELLS_A_POINT / 2 <= cells ||
+           host_order_open(order) <= cells;
+}
+
 bool host_settle_ordered(const struct host_run_options *options,
                          struct host_order *order,
                          struct host_run_result *result)
 {
     const struct host_strategy *before = result->strategy;
+    bool uneven = is_uneven(order);
+    if (options->build == INCODE_BUILD_AUTO && may_insert(options) && uneven &&
+        !is_room(order, options->memory)) {
+        result->build = INCODE_BUILD_FACES;
+    }
     if (result->why[0] == '\0') { /* it was not for `auto` to say */
         return false;
     }
     const struct run run = {options, result->nodes, order->bricks,
                             order->cells};
     struct host_task task = task_of(&run, order->points);
-    task.uneven = is_uneven(order);
+    task.uneven = uneven;
+    task.by_points = task.by_points && result->build != INCODE_BUILD_FACES;
     choose(&task, result);
     if (result->strategy->regions(result->nodes) == 1) {
         host_order_join(order);
