@@ -96,7 +96,7 @@ static int run_service(const struct host_run_options *options,
     service->tets = tets;
     service->setup.setup.index = (uint8_t)options->index;
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
-    service->setup.setup.build = (uint8_t)options->build;
+    service->setup.setup.build = (uint8_t)result->build;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
     int status = host_service_run(service, error);
     host_run_sum(service, result);
@@ -116,45 +116,51 @@ static int check_strategy(const struct host_run_options *options,
                                options->build, error);
 }
 
+/* Points in their order, by which `auto` may choose again: cut for all nodes,
+ * as one that wants them whole can join them. */
 static int order_points(const struct host_run_options *options,
                         const struct host_points *points,
                         struct host_order *order,
                         struct host_run_result *result,
                         struct host_error *error)
 {
+    uint64_t start = host_now_us();
+    unsigned regions = options->strategy == NULL
+                           ? result->nodes
+                           : result->strategy->regions(result->nodes);
+    memset(order, 0, sizeof *order);
     host_progress_phase("ordering", NULL);
-    if (host_order_make(
-            order, options->input == NULL ? "points" : options->input,
-            points->xyz, points->count,
-            host_strategy_partition(result->strategy, options->partition),
-            result->strategy->regions(result->nodes),
-            options->index == INCODE_GRID, error) != 0) {
-        return error->code;
+    int status = host_order_make(
+        order, options->input == NULL ? "points" : options->input, points->xyz,
+        points->count,
+        host_strategy_partition(result->strategy, options->partition), regions,
+        options->index == INCODE_GRID, error);
+    if (status == 0) {
+        result->rows = order->rows;
+        result->points = order->points;
+        result->duplicates = order->duplicates;
+        result->negative_zeros = order->negative_zeros;
+        result->pages = order->tree.pages;
+        (void)host_settle_ordered(options, order, result);
+        status = host_memory_check(options, result->strategy, result->nodes,
+                                   order->bricks, order->cells, error);
     }
-    result->rows = order->rows;
-    result->points = order->points;
-    result->duplicates = order->duplicates;
-    result->negative_zeros = order->negative_zeros;
-    result->pages = order->tree.pages;
-    (void)host_settle_ordered(options, order, result);
-    return host_memory_check(options, result->strategy, result->nodes,
-                             order->bricks, order->cells, error);
+    result->time_order_s = seconds_since(start);
+    return status;
 }
 
-int host_triangulate_on(const struct host_run_options *options,
-                        struct host_machine *machine,
-                        const struct host_points *points,
-                        struct host_tetrahedra *tets,
-                        struct host_run_result *result,
-                        struct host_error *error)
+/* On nodes that are there, which it ends. */
+static int on_nodes(const struct host_run_options *options,
+                    struct host_machine *machine,
+                    const struct host_order *order,
+                    struct host_tetrahedra *tets,
+                    struct host_run_result *result, struct host_error *error)
 {
     static struct host_service service;
     struct host_throttled throttled;
     struct host_machine slowed;
-    struct host_order order;
     uint64_t start = host_now_us();
     memset(&service, 0, sizeof service);
-    memset(&order, 0, sizeof order);
     service.machine = machine;
     if (options->throttle.stall_us_max != 0 ||
         options->throttle.bytes_a_second != 0) {
@@ -171,15 +177,10 @@ int host_triangulate_on(const struct host_run_options *options,
     result->time_start_up_s += seconds_since(start);
     start = host_now_us();
     if (status == 0) {
-        status = order_points(options, points, &order, result, error);
-        result->time_order_s = seconds_since(start);
-        service.strategy = result->strategy;
-    }
-    if (status == 0) {
         host_progress_phase("triangulating", "Mtet");
-        status = run_service(options, &order, &service, tets, result, error);
+        status = run_service(options, order, &service, tets, result, error);
     }
-    result->time_triangulation_s = seconds_since(start);
+    result->time_triangulation_s = result->time_order_s + seconds_since(start);
     result->tetrahedra = tets->count;
     if (status == 0) {
         status = host_service_wires(&service, error);
@@ -187,14 +188,31 @@ int host_triangulate_on(const struct host_run_options *options,
     }
     host_service_end(&service);
     if (status == 0) {
-        status =
-            host_hull_facets(tets, (uint64_t)order.bricks * INCODE_BRICK_POINTS,
-                             &result->hull_facets, error);
+        status = host_hull_facets(tets,
+                                  (uint64_t)order->bricks * INCODE_BRICK_POINTS,
+                                  &result->hull_facets, error);
     }
     if (status == 0) {
         start = host_now_us();
-        host_tetrahedra_map(tets, order.row);
+        host_tetrahedra_map(tets, order->row);
         result->time_triangulation_s += seconds_since(start);
+    }
+    return status;
+}
+
+int host_triangulate_on(const struct host_run_options *options,
+                        struct host_machine *machine,
+                        const struct host_points *points,
+                        struct host_tetrahedra *tets,
+                        struct host_run_result *result,
+                        struct host_error *error)
+{
+    struct host_order order;
+    int status = order_points(options, points, &order, result, error);
+    if (status == 0) {
+        status = on_nodes(options, machine, &order, tets, result, error);
+    } else {
+        machine->stop(machine->context);
     }
     host_order_free(&order);
     return status;
@@ -226,25 +244,42 @@ static int begin_on_board(const struct host_run_options *options,
     return 0;
 }
 
+/* Starts nodes and goes on with them. */
+static int start_nodes(const struct host_run_options *options,
+                       const struct host_order *order,
+                       struct host_tetrahedra *tets,
+                       struct host_run_result *result, struct host_error *error)
+{
+    struct host_machine machine;
+    uint64_t start = host_now_us();
+    host_progress_phase("starting nodes", NULL);
+    if ((options->begin != NULL ? options->begin : begin_on_board)(
+            options, result, &machine, error) != 0) {
+        return error->code;
+    }
+    result->time_start_up_s = seconds_since(start);
+    return on_nodes(options, &machine, order, tets, result, error);
+}
+
 int host_triangulate(const struct host_run_options *options,
                      const struct host_points *points,
                      struct host_tetrahedra *tets,
                      struct host_run_result *result, struct host_error *error)
 {
     static const uint32_t no_cells[3] = {0, 0, 0};
-    struct host_machine machine;
-    uint64_t start = host_now_us();
-    host_progress_phase("starting nodes", NULL);
+    struct host_order order;
     host_settle(options, points->count, result);
     if (check_strategy(options, result, error) != 0 ||
         host_memory_check(options, result->strategy, result->nodes, 1, no_cells,
-                          error) != 0 ||
-        (options->begin != NULL ? options->begin : begin_on_board)(
-            options, result, &machine, error) != 0) {
+                          error) != 0) {
         return error->code;
     }
-    result->time_start_up_s = seconds_since(start);
-    return host_triangulate_on(options, &machine, points, tets, result, error);
+    int status = order_points(options, points, &order, result, error);
+    if (status == 0) {
+        status = start_nodes(options, &order, tets, result, error);
+    }
+    host_order_free(&order);
+    return status;
 }
 
 /* Whether standard output takes tetrahedra or statistics. */

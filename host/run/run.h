@@ -70,6 +70,7 @@ struct host_run_result {
     char why[HOST_WHY_BYTES];             /* by `auto`: why; else empty */
     enum host_partition partition;
     enum incode_index index;
+    enum incode_build build; /* what the nodes are told */
     const struct host_link *link;
     const struct host_board *board;
     unsigned nodes;

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "host/order/open.h"
 #include "memory_needed.h"
 
 /* The largest power of two of nodes that have a processor each. */
@@ -42,28 +43,36 @@ static bool fits(const void *context, const struct host_strategy *strategy)
                               run->cells) <= run->options->memory;
 }
 
-/* What `auto` is told.  Nodes of this machine share its processors. */
+/* Whether a node may insert points, as far as the options go. */
+static bool may_insert(const struct host_run_options *options)
+{
+    return options->build != INCODE_BUILD_FACES &&
+           options->index == INCODE_KD && options->face_rule == INCODE_FACE_OWN;
+}
+
+/* What `auto` is told.  Nodes of this machine share its processors, with the
+ * host. */
 static struct host_task task_of(const struct run *run, uint64_t points)
 {
     const struct host_run_options *options = run->options;
     unsigned nodes = run->nodes;
     long here = sysconf(_SC_NPROCESSORS_ONLN);
     unsigned processors = options->processors + (unsigned)(here > 0 ? here : 1);
-    bool by_points = options->build != INCODE_BUILD_FACES &&
-                     options->index == INCODE_KD &&
-                     options->face_rule == INCODE_FACE_OWN;
+    bool with_host = options->processors == 0;
+    unsigned at_once = nodes + with_host;
     return (struct host_task){.points = points,
                               .memory = options->memory,
                               .nodes = nodes,
                               .processors =
-                                  processors < nodes ? processors : nodes,
+                                  processors < at_once ? processors : at_once,
+                              .with_host = with_host,
                               .wire_bytes_s = options->wire_bytes_s,
                               .face_rule = options->face_rule,
                               .build = options->build,
                               .sharing = options->sharing,
                               .fits = fits,
                               .context = run,
-                              .by_points = by_points};
+                              .by_points = may_insert(options)};
 }
 
 static void choose(const struct host_task *task, struct host_run_result *result)
@@ -78,6 +87,7 @@ void host_settle(const struct host_run_options *options, uint64_t points,
     result->strategy = options->strategy;
     result->partition = options->partition;
     result->index = options->index;
+    result->build = options->build;
     result->link = options->link;
     result->board = options->board;
     result->memory = options->memory;
@@ -129,27 +139,43 @@ static bool is_uneven(const struct host_order *order)
     return uneven > looked / FEW;
 }
 
+/* Whether points that fill no volume evenly can be inserted brick after brick
+ * where nodes have so much memory: all tetrahedra fit, or those that are open
+ * at a time do.  Each takes a cell and a fourth of a point, and there are some
+ * 6.5 a point; a part of the memory has other uses. */
+static bool is_room(const struct host_order *order, uint64_t memory)
+{
+    enum { CELL = 40, HALF_CELLS_A_POINT = 13, OTHER = 256 << 10 };
+    uint64_t cells = (memory - memory / 8 - OTHER) / CELL;
+    return order->points * (uint64_t)HALF_CELLS_A_POINT / 2 <= cells ||
+           host_order_open(order) <= cells;
+}
+
 bool host_settle_ordered(const struct host_run_options *options,
                          struct host_order *order,
                          struct host_run_result *result)
 {
     const struct host_strategy *before = result->strategy;
-    char why[HOST_WHY_BYTES];
+    bool uneven = is_uneven(order);
+    if (options->build == INCODE_BUILD_AUTO && may_insert(options) && uneven &&
+        !is_room(order, options->memory)) {
+        result->build = INCODE_BUILD_FACES;
+    }
     if (result->why[0] == '\0') { /* it was not for `auto` to say */
         return false;
     }
-    memcpy(why, result->why, sizeof why);
     const struct run run = {options, result->nodes, order->bricks,
                             order->cells};
     struct host_task task = task_of(&run, order->points);
-    task.uneven = is_uneven(order);
+    task.uneven = uneven;
+    task.by_points = task.by_points && result->build != INCODE_BUILD_FACES;
     choose(&task, result);
-    uint32_t regions = result->strategy->regions(result->nodes);
-    if (regions == 1) {
+    if (result->strategy->regions(result->nodes) == 1) {
         host_order_join(order);
-    } else if (regions != order->regions) {
-        result->strategy = before;
-        memcpy(result->why, why, sizeof why);
+    }
+    if (options->nodes == 0 && options->begin == NULL &&
+        result->strategy->nodes_default != 0) {
+        result->nodes = result->strategy->nodes_default;
     }
     return result->strategy != before;
 }

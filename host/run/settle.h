@@ -1,9 +1,11 @@
-/* What a run's options leave open: how many nodes, and by which strategy.
- * `auto` is settled twice: before the points are ordered, as if they filled a
- * volume evenly, for the order is cut into regions; and once more when their
- * bricks tell whether they do.
+/* What a run's options leave open: how many nodes, by which strategy, and
+ * whether they may insert points.  `auto` is settled twice: before the points
+ * are ordered, as if they filled a volume evenly, for the order is cut into
+ * regions; and once more when their bricks tell whether they do.
  *
- * Memory: none.  Work: a look at a thousand bricks.
+ * Memory: 1 MB, while it works.  Work: a look at a thousand bricks; where they
+ * do not, and the triangulation does not fit a node, 2,500 insertions
+ * (order/open.h).
  *
  *     host_settle(&options, points.count, &result);
  *     (void)host_settle_ordered(&options, &order, &result);
@@ -18,8 +20,9 @@
 void host_settle(const struct host_run_options *options, uint64_t points,
                  struct host_run_result *result);
 
-/* Settles `auto` again, by the order; true where it has another strategy now,
- * for which the order's regions have been joined if it wants one alone. */
+/* Settles the way to build, and `auto` again, by the order, which has a region for each node; true
+ * where it has another strategy now.  The regions are joined if that wants one
+ * alone; and then it gets one node alone, if nobody has said how many. */
 bool host_settle_ordered(const struct host_run_options *options,
                          struct host_order *order,
                          struct host_run_result *result);

@@ -9,13 +9,14 @@ enum { PIECES = 2 };
 
 /* Measured in runs of two nodes.  One node alone inserts points where what is
  * not final of them fits it: about 8 n^(2/3) tetrahedra of a volume, of 38
- * bytes, in half of its memory; of a surface always.  Face by face, surfaces,
- * stretched grids and lattices take three times as long and more. */
+ * bytes, in half of its memory; what of a surface is open is known to fit.
+ * Face by face, surfaces, stretched grids and lattices take three times as long
+ * and more. */
 static double regions_total(const struct host_task *task)
 {
     double open = 8 * 38 * pow((double)task->points, 2.0 / 3);
     if (!task->by_points) {
-        return 1.05;
+        return task->uneven ? 1.2 : 1.05;
     }
     if (task->uneven) {
         return 3.0;
@@ -23,10 +24,12 @@ static double regions_total(const struct host_task *task)
     return open <= (double)task->memory / 2 ? 1.5 : 1.05;
 }
 
+/* A surface has more of its tetrahedra at borders than a volume. */
 struct host_cost host_regions_cost(const struct host_task *task, double again)
 {
     double regions = (double)task->nodes / (double)(task->points + 1);
-    double total = regions_total(task) * (1 + again * cbrt(regions));
+    double border = (task->uneven ? 2 : 1) * again * cbrt(regions);
+    double total = regions_total(task) * (1 + border);
     return task->nodes == 1 ? (struct host_cost){1.01, 1.01}
                             : (struct host_cost){total / task->nodes, total};
 }

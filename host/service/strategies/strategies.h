@@ -53,8 +53,8 @@ int host_strategy_check(const struct host_strategy *strategy, unsigned nodes,
 
 /* Time that a strategy is expected to take, in that of one node alone with a
  * fast wire: that of the busiest node, of the processors that the nodes share,
- * or of the host's wire, whichever is longest; INFINITY where it cannot be run
- * so. */
+ * with the host or without, or of the host's wire, whichever is longest;
+ * INFINITY where it cannot be run so. */
 double host_strategy_time(const struct host_strategy *strategy,
                           const struct host_task *task);
 

@@ -86,7 +86,8 @@ struct host_task {
     uint64_t points;
     uint64_t memory; /* of a node, bytes */
     unsigned nodes;
-    unsigned processors;   /* of them, so many compute at once */
+    unsigned processors;   /* so many of the nodes compute at once, */
+    bool with_host;        /* on processors that are the host's, too */
     uint64_t wire_bytes_s; /* of the host's wire; 0: it holds nobody up */
     enum incode_face_rule face_rule;
     enum incode_build build;
