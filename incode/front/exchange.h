@@ -134,6 +134,10 @@ void incode_exchange_toggle(struct incode_front *front, const uint32_t f[3],
 /* A face of the vertex may be open. */
 void incode_exchange_ready(struct incode_front *front, uint32_t v);
 
+/* The vertices of an own brick whose faces can be pursued, a bit each. */
+uint64_t incode_exchange_pending(const struct incode_front *front,
+                                 uint32_t brick);
+
 /* A brick that was spilled is whole again. */
 void incode_exchange_returned(struct incode_front *front, uint32_t brick);
 

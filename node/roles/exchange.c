@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "loans.h"
 #include "shares.h"
 #include "triangulation.h"
 #include "waves.h"
@@ -14,14 +15,20 @@ struct exchange {
     struct node_shares shares;
     uint64_t received; /* of others */
     struct node_waves waves;
+    struct node_loans loans;
 };
 
 /* ---- memory ---- */
 
+/* Outboxes, and who asks for work. */
+static size_t table_bytes(uint32_t nodes)
+{
+    return node_shares_bytes(nodes) + node_loans_bytes(nodes);
+}
+
 static size_t own_bytes(const struct node_setup_message *setup)
 {
-    return node_aligned(sizeof(struct exchange)) +
-           node_shares_bytes(setup->nodes);
+    return node_aligned(sizeof(struct exchange)) + table_bytes(setup->nodes);
 }
 
 static size_t exchange_arena_min(size_t memory,
@@ -58,9 +65,10 @@ static bool exchange_start(void *self, size_t bytes,
     e->fault = fault;
     e->self = counted->self;
     e->nodes = setup->nodes;
-    node_shares_init(&e->shares,
-                     (uint8_t *)self + node_aligned(sizeof(struct exchange)),
-                     setup, counted);
+    uint8_t *tables = (uint8_t *)self + node_aligned(sizeof(struct exchange));
+    node_shares_init(&e->shares, tables, setup, counted);
+    node_loans_init(&e->loans, tables + node_shares_bytes(setup->nodes), setup,
+                    counted, fault);
     node_waves_init(&e->waves, setup, counted, fault);
     const struct incode_front_peers peers = node_shares_peers(&e->shares);
     return node_triangulation_start(&e->triangulation, self, bytes,
@@ -112,6 +120,11 @@ static void exchange_message(void *self, const struct cube_message *message,
             follow(e, e->waves.command);
         }
         break;
+    case NODE_LOAN_ASK:
+    case NODE_LOAN:
+    case NODE_LOAN_FOUND:
+        node_loans_take(&e->loans, e->triangulation.triangulator, message);
+        break;
     case NODE_REGIONS:
         if (!node_shares_regions(&e->shares, message->data, message->size)) {
             node_fault_set(e->fault, "regions in # bytes, after # of them",
@@ -128,12 +141,32 @@ static void exchange_message(void *self, const struct cube_message *message,
 
 /* ---- work ---- */
 
+/* What came back first, as it may let others go on; what is borrowed last. */
+static bool work_on(void *context, uint32_t units, uint32_t *spent)
+{
+    struct exchange *e = context;
+    struct incode_triangulator *t = e->triangulation.triangulator;
+    uint64_t before = incode_triangulator_spent(t);
+    if (node_fault_is_set(e->fault)) {
+        return false;
+    }
+    bool worked = node_loans_use(&e->loans, t, units) ||
+                  node_triangulation_step(&e->triangulation, units, spent) ||
+                  node_loans_help(&e->loans, t, units);
+    *spent = (uint32_t)(incode_triangulator_spent(t) - before);
+    return worked;
+}
+
 static unsigned exchange_work(void *self, struct node_pace *pace)
 {
     struct exchange *e = self;
     /* Not before all others can receive. */
-    return e->waves.begun ? node_triangulation_work(&e->triangulation, pace)
-                          : 0;
+    if (!e->waves.begun) {
+        return 0;
+    }
+    unsigned worked = node_pace_work(pace, work_on, e);
+    node_triangulation_close(&e->triangulation);
+    return worked;
 }
 
 static bool is_quiet(const struct exchange *e)
@@ -149,6 +182,9 @@ static unsigned exchange_send(void *self)
     uint8_t command;
     unsigned sent = node_shares_send(&e->shares) +
                     node_triangulation_send(&e->triangulation);
+    if (e->waves.begun && !node_fault_is_set(e->fault)) {
+        sent += node_loans_send(&e->loans, t->triangulator);
+    }
     const struct node_waves_state state = {
         .ready = t->jobs.epoch != 0 && node_shares_ready(&e->shares),
         .quiet = is_quiet(e),
@@ -171,6 +207,12 @@ static uint32_t exchange_awaited(const void *self)
     bool waits = t->jobs.working && (!e->waves.begun || is_quiet(e));
     return waits && !t->drained ? NODE_AWAITS_OTHERS
                                 : incode_triangulator_awaited(t->triangulator);
+}
+
+static uint32_t exchange_owing(const void *self)
+{
+    const struct exchange *e = self;
+    return node_loans_owing(&e->loans);
 }
 
 static uint32_t exchange_held(const void *self)
@@ -197,13 +239,15 @@ static void exchange_totals(const void *self,
 {
     const struct exchange *e = self;
     node_triangulation_totals(&e->triangulation, totals, now_us);
-    totals->bytes_out += e->shares.bytes_out;
+    totals->bytes_in += e->loans.bytes_in;
+    totals->bytes_out += e->shares.bytes_out + e->loans.bytes_out;
+    totals->statistics.stars_borrowed = e->loans.stars;
 }
 
 static void exchange_map(const void *self, struct node_map *map)
 {
     const struct exchange *e = self;
-    size_t bytes = node_shares_bytes(e->nodes);
+    size_t bytes = table_bytes(e->nodes);
     node_triangulation_map(&e->triangulation, map, 1);
     map->tables[0].bytes = (uint32_t)bytes;
     map->tables[0].count = NODE_SHARE_BATCHES;
@@ -222,6 +266,7 @@ const struct node_role node_exchange_role = {
     .done = exchange_done,
     .end = exchange_end,
     .awaited = exchange_awaited,
+    .owing = exchange_owing,
     .held = exchange_held,
     .totals = exchange_totals,
     .map = exchange_map,
