@@ -140,13 +140,22 @@ static bool read_loan(const struct node_loans *l,
            incode_loan_is_sound(loan, l->bricks);
 }
 
-/* A loan counts only after an ask. */
+static bool has_loan_of(const struct node_loans *l, uint16_t from)
+{
+    bool open = has(l->back, from);
+    for (unsigned i = 0; i < NODE_LOANS_IN; i++) {
+        open = open || (l->in[i].open && l->in[i].from == from);
+    }
+    return open;
+}
+
+/* A loan comes after an ask, once. */
 static bool take_loan(struct node_loans *l, struct incode_triangulator *t,
                       const struct cube_message *message)
 {
     struct incode_loan loan;
     struct node_loan_in *in = free_place(l);
-    if (!has(l->asked, message->source) || has(l->back, message->source) ||
+    if (!has(l->asked, message->source) || has_loan_of(l, message->source) ||
         !read_loan(l, message, &loan)) {
         return false;
     }
