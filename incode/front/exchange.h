@@ -39,6 +39,11 @@
  * now and then finds such bricks: it marks those that a face touches, and
  * whatever is opened meanwhile marks its own.
  *
+ * A front may lend stars to others that have nothing to do (loan.h).  What they
+ * find counts only while its face is open, so that all of this holds as before;
+ * the bricks of vertices that are lent are not committed, and the front is not
+ * quiet, until they are back.
+ *
  * Memory: struct incode_exchange, in the front, and incode_exchange_bytes:
  * three bits a brick.  Work: a sweep looks at 256 lists or 512 entries a call,
  * and at each face once for four that are built; to let faces go, it looks at

@@ -123,7 +123,7 @@ static void exchange_message(void *self, const struct cube_message *message,
     case NODE_LOAN_ASK:
     case NODE_LOAN:
     case NODE_LOAN_FOUND:
-        node_loans_take(&e->loans, e->triangulation.triangulator, message);
+        node_loans_take(&e->loans, message);
         break;
     case NODE_REGIONS:
         if (!node_shares_regions(&e->shares, message->data, message->size)) {

@@ -150,8 +150,7 @@ static bool has_loan_of(const struct node_loans *l, uint16_t from)
 }
 
 /* A loan comes after an ask, once. */
-static bool take_loan(struct node_loans *l, struct incode_triangulator *t,
-                      const struct cube_message *message)
+static bool take_loan(struct node_loans *l, const struct cube_message *message)
 {
     struct incode_loan loan;
     struct node_loan_in *in = free_place(l);
@@ -159,7 +158,7 @@ static bool take_loan(struct node_loans *l, struct incode_triangulator *t,
         !read_loan(l, message, &loan)) {
         return false;
     }
-    if (in == NULL || !incode_triangulator_is_quiet(t)) {
+    if (in == NULL) {
         add(l->back, &l->back_count, message->source);
         return true;
     }
@@ -199,7 +198,7 @@ static bool take_found(struct node_loans *l, const struct cube_message *message)
     return true;
 }
 
-void node_loans_take(struct node_loans *loans, struct incode_triangulator *t,
+void node_loans_take(struct node_loans *loans,
                      const struct cube_message *message)
 {
     struct node_loans *l = loans;
@@ -210,7 +209,7 @@ void node_loans_take(struct node_loans *loans, struct incode_triangulator *t,
         sound = message->size == 0;
         add(l->askers, &l->askers_count, message->source);
     } else if (sound && message->type == NODE_LOAN) {
-        sound = take_loan(l, t, message);
+        sound = take_loan(l, message);
     } else if (sound) {
         sound = take_found(l, message);
     }

@@ -78,7 +78,7 @@ void node_loans_init(struct node_loans *loans, void *memory,
                      struct node_counted *counted, struct node_fault *fault);
 
 /* NODE_LOAN_ASK, NODE_LOAN or NODE_LOAN_FOUND. */
-void node_loans_take(struct node_loans *loans, struct incode_triangulator *t,
+void node_loans_take(struct node_loans *loans,
                      const struct cube_message *message);
 
 /* A step with what came back, or with what is borrowed, of about so many units;

@@ -101,7 +101,7 @@ static void say(struct one *n, uint16_t source, uint8_t type, const void *data,
 {
     const struct cube_message message = {
         .source = source, .type = type, .data = data, .size = (uint16_t)size};
-    node_loans_take(&n->loans, n->t, &message);
+    node_loans_take(&n->loans, &message);
 }
 
 /* What one has sent to the other arrives; others hear nothing. */

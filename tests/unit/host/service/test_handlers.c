@@ -266,8 +266,8 @@ static void test_texts(void **unused)
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 7, expected 8"},
-        {NODE_READY, &ready, 4, "protocol version 7, expected 8"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 7, expected 9"},
+        {NODE_READY, &ready, 4, "protocol version 7, expected 9"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
         {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 40"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
@@ -291,7 +291,7 @@ static void test_texts(void **unused)
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
          "same version"}};
-    assert_int_equal(NODE_PROTOCOL, 8);
+    assert_int_equal(NODE_PROTOCOL, 9);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();
