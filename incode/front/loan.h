@@ -15,7 +15,7 @@
  * Only what is at hand is lent: nothing that is spilled, on its way back, or of
  * a hub.
  *
- * Memory: struct incode_loan, 788 bytes, and struct incode_found, 1,028, which
+ * Memory: struct incode_loan, 780 bytes, and struct incode_found, 1,028, which
  * also travel, as far as they are in use.  Work: to lend, a look at 64 bricks
  * and at the faces of 4 vertices; to use, four toggles a tetrahedron.
  *

@@ -221,6 +221,16 @@ void node_loans_take(struct node_loans *loans,
 
 /* ---- work ---- */
 
+/* Whether a step did something; one that broke is a fault. */
+static bool judge(struct node_loans *l, const struct incode_triangulator *t,
+                  enum incode_step step)
+{
+    if (step == INCODE_BROKEN) {
+        node_fault_set(l->fault, incode_triangulator_fault(t), 0, 0);
+    }
+    return step == INCODE_WORKED || step == INCODE_FINISHED;
+}
+
 bool node_loans_use(struct node_loans *loans, struct incode_triangulator *t,
                     uint32_t units)
 {
@@ -233,7 +243,7 @@ bool node_loans_use(struct node_loans *loans, struct incode_triangulator *t,
     if (step == INCODE_FINISHED) {
         out->state = NODE_LOAN_IS_FREE;
     }
-    return step == INCODE_WORKED || step == INCODE_FINISHED;
+    return judge(loans, t, step);
 }
 
 bool node_loans_help(struct node_loans *loans, struct incode_triangulator *t,
@@ -250,8 +260,7 @@ bool node_loans_help(struct node_loans *loans, struct incode_triangulator *t,
     if (loans->borrower.done) {
         return false; /* the link has no room for it yet */
     }
-    enum incode_step step = incode_borrower_step(&loans->borrower, t, units);
-    return step == INCODE_WORKED || step == INCODE_FINISHED;
+    return judge(loans, t, incode_borrower_step(&loans->borrower, t, units));
 }
 
 /* ---- what leaves ---- */

@@ -13,7 +13,7 @@
  * nothing to others, so loans are not counted for the end.  A lender waits for
  * a borrower at most, a borrower for pages alone: there is no circle.
  *
- * Memory: the struct, about 11 KB, with a place for each loan that may be out
+ * Memory: the struct, about 12 KB, with a place for each loan that may be out
  * and what comes back of it, NODE_LOANS_OUT, and for those that are borrowed,
  * NODE_LOANS_IN; and node_loans_bytes of the role's arena, a bit a node for who
  * has asked, who is asked, and whose loan goes back.  Work: a call looks at the

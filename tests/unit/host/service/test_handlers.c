@@ -266,8 +266,8 @@ static void test_texts(void **unused)
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 7, expected 9"},
-        {NODE_READY, &ready, 4, "protocol version 7, expected 9"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 8, expected 9"},
+        {NODE_READY, &ready, 4, "protocol version 8, expected 9"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
         {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 40"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
