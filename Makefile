@@ -191,7 +191,7 @@ $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 
 # The program with a fault in it, for the test that the simulation finds it.
 planted_programs := $(addprefix $(BUILD)/tests/incode-,twice lost-batch answer \
-	taken-by-two kept)
+	taken-by-two kept late)
 planted: $(planted_programs)
 $(BUILD)/tests/incode-twice: planted = incode/triangulator.c -DINCODE_PLANT_TWICE
 $(BUILD)/tests/incode-twice: incode/triangulator.c
@@ -205,6 +205,8 @@ $(BUILD)/tests/incode-taken-by-two: planted = \
 $(BUILD)/tests/incode-taken-by-two: transport/tuples/request.c
 $(BUILD)/tests/incode-answer: planted = incode/manager.c -DINCODE_PLANT_ANSWER
 $(BUILD)/tests/incode-answer: incode/manager.c
+$(BUILD)/tests/incode-late: planted = incode/front/loan.c -DINCODE_PLANT_LATE
+$(BUILD)/tests/incode-late: incode/front/loan.c
 $(planted_programs): $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@

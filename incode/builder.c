@@ -1,9 +1,12 @@
 #include "builder.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "arena.h"
 #include "incode/predicates/check.h"
+
+static_assert((int)INCODE_LISTS_MAX <= INCODE_SEARCHES, "a search for each");
 
 static const char *const UNSOUND = "a list of no faces";
 

@@ -20,7 +20,7 @@
 #include "triangulator.h"
 
 enum {
-    INCODE_LISTS_MAX = INCODE_SEARCHES, /* a search each */
+    INCODE_LISTS_MAX = 16,   /* a search each */
     INCODE_LIST_PATIENCE = 8 /* retries before a list goes on alone */
 };
 

@@ -10,7 +10,8 @@
 #include "state.h"
 
 static_assert((int)INCODE_HINT_NONE == INCODE_LOCAL_NONE, "hints are indices");
-static_assert((int)INCODE_TASKS == INCODE_SEARCHES, "a search for each task");
+static_assert((int)INCODE_TASKS < INCODE_SEARCHES,
+              "a search for each task, and one for what is borrowed");
 
 static const char *grid_fault(const uint32_t cells[3])
 {
@@ -538,6 +539,8 @@ void incode_triangulator_statistics(const struct incode_triangulator *t,
         .seeds = front->counts.seeds,
         .vertices = front->counts.vertices + insertion->vertices,
         .vertices_waited = front->counts.waited,
+        .stars_lent = front->counts.lent,
+        .tetrahedra_late = front->counts.late,
         .page_requests = pager->requests,
         .page_faults = front->counts.faults,
         .page_evictions = pager->evictions,

@@ -114,6 +114,8 @@ struct incode_statistics {
                                       built and as many calls, too */
     uint64_t candidates;           /* points whose distance was evaluated */
     uint64_t tree_searches, seeds, vertices, vertices_waited;
+    uint64_t stars_lent, stars_borrowed;
+    uint64_t tetrahedra_late; /* found on what was lent, and there already */
     uint64_t page_requests, page_faults, page_evictions;
     uint64_t afl_max, afl_spilled;
     uint64_t memory_high_water; /* bytes of the arena ever in use: with faces,

@@ -16,6 +16,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "incode/front/loan.h"
 #include "incode/list.h"
 #include "incode/triangulator.h"
 #include "transport/cube.h"
@@ -64,9 +65,12 @@ enum node_message_type {
     /* From a node to another: transport/TUPLES.md. */
     NODE_TUPLES = 72,
     /* Between nodes of an exchange. */
-    NODE_SHARE = 80, /* struct node_shared, one after another */
-    NODE_WAVE,       /* struct node_wave_message */
-    NODE_WAVE_ANSWER /* struct node_wave_answer_message */
+    NODE_SHARE = 80,  /* struct node_shared, one after another */
+    NODE_WAVE,        /* struct node_wave_message */
+    NODE_WAVE_ANSWER, /* struct node_wave_answer_message */
+    NODE_LOAN_ASK,    /* nothing: has nothing to do */
+    NODE_LOAN,        /* struct incode_loan, as much as is in use */
+    NODE_LOAN_FOUND   /* struct node_found_message, likewise */
 };
 
 /* What a node does in a generation of the wiring: a row of roles/roles.c. */
@@ -241,6 +245,18 @@ struct node_wave_answer_message {
     uint64_t left;           /* bricks that are not committed */
 };
 
+/* What was found of a loan; again: its borrower asks for another. */
+struct node_found_message {
+    uint32_t again;
+    struct incode_found found;
+};
+
+static inline size_t node_found_bytes(const struct node_found_message *message)
+{
+    return offsetof(struct node_found_message, found) +
+           incode_found_bytes(&message->found);
+}
+
 /* The memory map of a node, in bytes: all of it, what its board holds outside
  * the arena, and what fills the arena.  `tables` are the role's: their names
  * are in struct node_role. */
@@ -306,6 +322,9 @@ static_assert(sizeof(struct node_finished_message) <= CUBE_PAYLOAD_MAX,
               "statistics fit a message");
 static_assert(sizeof(struct incode_answers) <= CUBE_PAYLOAD_MAX,
               "answers fit a message");
+static_assert(sizeof(struct node_found_message) <= CUBE_PAYLOAD_MAX &&
+                  sizeof(struct incode_loan) <= CUBE_PAYLOAD_MAX,
+              "a loan fits a message");
 static_assert(4 + INCODE_PAGE_BYTES <= CUBE_PAYLOAD_MAX,
               "a page fits a message");
 static_assert(sizeof(struct node_spill_header) +

@@ -1,5 +1,7 @@
 #include "pace.h"
 
+enum { LOOK = 2 /* units that a step takes which finds nothing to do */ };
+
 void node_pace_init(struct node_pace *pace, uint64_t (*now_us)(void *context),
                     void *context)
 {
@@ -63,7 +65,8 @@ unsigned node_pace_work(struct node_pace *pace,
         uint32_t spent = 0;
         goes_on = step(context, pace->units, &spent);
         worked += goes_on;
-        units += spent;
+        /* A look that finds nothing to do tells nothing of work. */
+        units += goes_on || spent > LOOK ? spent : 0;
         if (goes_on && node_pace_is_due(pace, units)) {
             goes_on = node_pace_goes_on(pace, units);
             units = 0;

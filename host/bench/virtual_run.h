@@ -23,6 +23,7 @@ struct host_virtual_run {
     const struct host_bench_machine *machine;
     /* Strategy, nodes (1 .. HOST_NODES_MAX), memory and how to triangulate. */
     const struct host_run_options *options;
+    double slow; /* node 0 takes so many times as long; 0: as the others */
     /* What came of it, in virtual seconds: the nodes' reports and their sums;
      * time_triangulation_s from the setup to the last tetrahedron at the host;
      * time_io_s as in host_bench_io_s, of all pages that the host has sent. */

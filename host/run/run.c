@@ -74,6 +74,9 @@ void host_run_sum(const struct host_service *service,
         r->candidates += s->candidates;
         r->vertices += s->vertices;
         r->vertices_waited += s->vertices_waited;
+        r->stars_lent += s->stars_lent;
+        r->stars_borrowed += s->stars_borrowed;
+        r->tetrahedra_late += s->tetrahedra_late;
         for (unsigned k = 0; k < 24; k++) {
             r->candidates_histogram[k] += s->candidates_histogram[k];
         }

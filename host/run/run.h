@@ -88,6 +88,8 @@ struct host_run_result {
     unsigned missing_wires;         /* that were named */
     uint64_t candidates, candidates_histogram[24];
     uint64_t vertices, vertices_waited;
+    uint64_t stars_lent, stars_borrowed,
+        tetrahedra_late;                         /* incode/triangulator.h */
     int socket_send_bytes, socket_receive_bytes; /* buffers of a wire's end */
     struct host_node_report node[HOST_NODES_MAX];
     bool limited;            /* the kernel held the nodes to their memory */

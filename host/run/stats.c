@@ -71,6 +71,9 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     put_real(o, "wall_s", 1e-6 * (double)f->wall_us);
     put(o, "vertices", s->vertices);
     put(o, "vertices_waited", s->vertices_waited);
+    put(o, "stars_lent", s->stars_lent);
+    put(o, "stars_borrowed", s->stars_borrowed);
+    put(o, "tetrahedra_late", s->tetrahedra_late);
     put(o, "tree_searches", s->tree_searches);
     put(o, "seeds", s->seeds);
     put(o, "page_requests", s->page_requests);
@@ -144,6 +147,9 @@ static json_t *run_object(const struct host_run_result *r)
     put_real(o, "candidates_p99", host_candidates_p99(r));
     put(o, "vertices", r->vertices);
     put(o, "vertices_waited", r->vertices_waited);
+    put(o, "stars_lent", r->stars_lent);
+    put(o, "stars_borrowed", r->stars_borrowed);
+    put(o, "tetrahedra_late", r->tetrahedra_late);
     put(o, "faces_spilled", r->faces_spilled);
     put(o, "socket_send_bytes", (uint64_t)r->socket_send_bytes);
     put(o, "socket_receive_bytes", (uint64_t)r->socket_receive_bytes);

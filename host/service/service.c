@@ -189,6 +189,7 @@ static void ask_for_reports(struct host_service *s)
     s->reporting = true;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
+        node->reported = node->reported && !s->strategy->helps;
         node->report_due = !s->work.lost[i] && !node->reported;
     }
 }

@@ -139,7 +139,9 @@ static uint64_t spent_ns(const struct host_world_node *node)
     const struct host_world_options *o = &node->world->options;
     return o->used_ns == NULL || !node->stepping
                ? 0
-               : o->used_ns(o->used_context, node->node) - node->used_ns;
+               : o->used_ns(o->used_context,
+                            (unsigned)(node - node->world->node), node->node) -
+                     node->used_ns;
 }
 
 static uint64_t node_now_us(void *context)

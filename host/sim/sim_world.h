@@ -34,10 +34,10 @@ struct host_world_options {
     uint32_t step_us; /* a step of a node that has work, more or less */
     uint32_t host_us; /* a round of the host's loop */
     /* Instead of step_us: nanoseconds of processor time that a node has used
-     * since its start, by what it has counted.  A step is charged when it is
-     * done, and what it has sent leaves when that time is over; its clock goes
-     * on within a step.  NULL: chance decides. */
-    uint64_t (*used_ns)(void *context, const struct node *node);
+     * since its start, by what it has counted; i: its number.  A step is
+     * charged when it is done, and what it has sent leaves when that time is
+     * over; its clock goes on within a step.  NULL: chance decides. */
+    uint64_t (*used_ns)(void *context, unsigned i, const struct node *node);
     void *used_context;
     bool routers; /* and links pass on messages while a processor is busy */
     uint64_t time_us_max, steps_max; /* then it counts as hanging */

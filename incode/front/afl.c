@@ -272,6 +272,21 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
     return taken;
 }
 
+uint32_t incode_afl_tell(const struct incode_afl *afl, uint32_t v,
+                         uint32_t (*pairs)[2], uint32_t limit)
+{
+    uint32_t count = 0, i = *head_of(afl, v);
+    for (; i != INCODE_AFL_NIL && count < limit; i = afl->nodes[i].next) {
+        const struct incode_afl_node *node = &afl->nodes[i];
+        if (node->key != v || is_held(afl, i))
+            continue;
+        pairs[count][0] = node->b;
+        pairs[count][1] = node->c;
+        count++;
+    }
+    return count;
+}
+
 /* Whether a held face of v has b or c too. */
 static bool meets_held(struct incode_afl *afl, uint32_t v, uint32_t b,
                        uint32_t c)
@@ -363,18 +378,31 @@ uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
     return count;
 }
 
+/* The node of an open face, or INCODE_AFL_NIL. */
+static uint32_t find_face(const struct incode_afl *afl, uint32_t key,
+                          uint32_t b, uint32_t c)
+{
+    uint32_t i = *head_of(afl, key);
+    while (i != INCODE_AFL_NIL &&
+           (afl->nodes[i].key != key || afl->nodes[i].b != b ||
+            afl->nodes[i].c != c))
+        i = afl->nodes[i].next;
+    return i;
+}
+
 bool incode_afl_hold_face(struct incode_afl *afl, uint32_t key, uint32_t b,
                           uint32_t c)
 {
-    uint32_t i = *head_of(afl, key);
-    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
-        const struct incode_afl_node *node = &afl->nodes[i];
-        if (node->key == key && node->b == b && node->c == c) {
-            hold(afl, i);
-            return true;
-        }
-    }
-    return false;
+    uint32_t i = find_face(afl, key, b, c);
+    if (i != INCODE_AFL_NIL)
+        hold(afl, i);
+    return i != INCODE_AFL_NIL;
+}
+
+bool incode_afl_is_open(const struct incode_afl *afl, uint32_t key, uint32_t b,
+                        uint32_t c)
+{
+    return find_face(afl, key, b, c) != INCODE_AFL_NIL;
 }
 
 uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v)

@@ -104,6 +104,10 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
 uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit, bool *more);
 
+/* Tells up to `limit` faces of v that are not held; they stay as they are. */
+uint32_t incode_afl_tell(const struct incode_afl *afl, uint32_t v,
+                         uint32_t (*pairs)[2], uint32_t limit);
+
 /* Tells up to `limit` faces of v that are not held, and holds them: of those
  * that share an edge at v one at a time, as they may have the same tetrahedron.
  * Work: two looks at each face of the list, and up to INCODE_AFL_CROWD more at
@@ -116,6 +120,10 @@ uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
 /* Holds the open face (key, b, c); false: it is not open. */
 bool incode_afl_hold_face(struct incode_afl *afl, uint32_t key, uint32_t b,
                           uint32_t c);
+
+/* Whether the face (key, b, c) is open, held or not. */
+bool incode_afl_is_open(const struct incode_afl *afl, uint32_t key, uint32_t b,
+                        uint32_t c);
 
 /* Lets all faces of v go, but for those that are foreign; how many were held.
  */

@@ -386,6 +386,14 @@ static enum incode_turn finish(struct incode_front *front)
 /* What a look for a vertex comes to: MORE is left to be looked at. */
 enum found { NONE, FOUND, MORE };
 
+uint64_t incode_exchange_pending(const struct incode_front *front,
+                                 uint32_t brick)
+{
+    const struct incode_touched *entry = incode_afl_find(&front->afl, brick);
+    bool returning = front->unspill_pending && front->unspill_brick == brick;
+    return entry == NULL || returning ? 0 : entry->pending & ~entry->waiting;
+}
+
 /* The next own vertex with faces to be pursued. */
 static enum found next_own(struct incode_front *front, uint32_t *v)
 {
@@ -393,11 +401,7 @@ static enum found next_own(struct incode_front *front, uint32_t *v)
     uint32_t position, looked = 0;
     while (lowest(e, e->ready, &e->ready_from, &position)) {
         uint32_t brick = front->job.last - 1 - position;
-        const struct incode_touched *entry =
-            incode_afl_find(&front->afl, brick);
-        uint64_t ready = entry == NULL ? 0 : entry->pending & ~entry->waiting;
-        if (front->unspill_pending && front->unspill_brick == brick)
-            ready = 0; /* not before all of it is there */
+        uint64_t ready = incode_exchange_pending(front, brick);
         if (ready != 0) {
             front->current = position;
             *v = brick * INCODE_BRICK_POINTS + 63 -
@@ -522,6 +526,8 @@ static enum incode_turn next_of_all(struct incode_front *front, uint32_t *which)
     uint32_t v;
     if (next_try(front, &v))
         return incode_front_begin(front, v, true, which);
+    if (e->lent > 0)
+        return INCODE_TURN_WAIT;
     if (let_go(front))
         return INCODE_TURN_WORKED;
     enum found found = next_seed(front, &v);

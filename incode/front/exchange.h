@@ -39,6 +39,11 @@
  * now and then finds such bricks: it marks those that a face touches, and
  * whatever is opened meanwhile marks its own.
  *
+ * A front may lend stars to others that have nothing to do (loan.h).  What they
+ * find counts only while its face is open, so that all of this holds as before;
+ * the bricks of vertices that are lent are not committed, and the front is not
+ * quiet, until they are back.
+ *
  * Memory: struct incode_exchange, in the front, and incode_exchange_bytes:
  * three bits a brick.  Work: a call of incode_front_next looks at 256 lists of
  * the hash and all that is in them, or 512 entries and 64 commits of a sweep;
@@ -142,6 +147,10 @@ void incode_exchange_toggle(struct incode_front *front, const uint32_t f[3],
 
 /* A face of the vertex may be open. */
 void incode_exchange_ready(struct incode_front *front, uint32_t v);
+
+/* The vertices of an own brick whose faces can be pursued, a bit each. */
+uint64_t incode_exchange_pending(const struct incode_front *front,
+                                 uint32_t brick);
 
 /* A brick that was spilled is whole again. */
 void incode_exchange_returned(struct incode_front *front, uint32_t brick);

@@ -89,6 +89,8 @@ struct incode_front_counts {
     uint64_t faults;   /* suspensions for what was not there */
     uint64_t foreign;  /* tetrahedra found, and left to their owner */
     uint64_t taken;    /* that came of others */
+    uint64_t lent;     /* vertices, to others: loan.h */
+    uint64_t late;     /* tetrahedra found there, whose faces were closed */
 };
 
 /* What a front needs where several share one list: exchange.h.  Maps have a bit
@@ -109,6 +111,7 @@ struct incode_exchange {
     bool quiet;          /* nothing to do until something comes */
     uint32_t fetched;    /* bricks, since something came or was built */
     uint32_t left;       /* own bricks that are not committed */
+    uint32_t lent;       /* loans that are out: loan.h */
     uint32_t last_count; /* points of the last own brick; 0: not known yet */
     /* First tetrahedra: tries at the start, then brick by brick. */
     uint32_t tries;

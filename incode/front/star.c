@@ -123,7 +123,7 @@ static void build(struct incode_front *front, const uint32_t v[4],
     incode_front_reached(front, v[3]);
     bool near = false;
     if (front->exchange.on) {
-        near = incode_exchange_is_near(front, p);
+        near = p[0] != NULL && incode_exchange_is_near(front, p);
         incode_exchange_share(front, v);
     }
     /* Faces with their unknown side outward: of (v, b, c, a) these are

@@ -30,7 +30,7 @@
 #include "query.h"
 
 enum {
-    INCODE_SEARCHES = 16, /* suspended at a time */
+    INCODE_SEARCHES = 17, /* suspended at a time */
     INCODE_HULL_PLANES = 8,
     INCODE_HALF_SPACES = 8,
     INCODE_FRAMES_MIN = 48, /* a search needs no more at once */

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "lending.h"
+#include "loans.h"
 #include "shares.h"
 #include "triangulation.h"
 #include "waves.h"
@@ -16,14 +17,21 @@ struct exchange {
     struct node_lending lending;
     uint64_t received; /* of others */
     struct node_waves waves;
+    struct node_loans loans;
 };
 
 /* ---- memory ---- */
 
+/* Outboxes, requests of others, and who asks for work. */
+static size_t table_bytes(uint32_t nodes)
+{
+    return node_shares_bytes(nodes) + node_lending_bytes(nodes) +
+           node_loans_bytes(nodes);
+}
+
 static size_t own_bytes(const struct node_setup_message *setup)
 {
-    return node_aligned(sizeof(struct exchange)) +
-           node_shares_bytes(setup->nodes) + node_lending_bytes(setup->nodes);
+    return node_aligned(sizeof(struct exchange)) + table_bytes(setup->nodes);
 }
 
 static size_t exchange_arena_min(size_t memory,
@@ -62,8 +70,10 @@ static bool exchange_start(void *self, size_t bytes,
     e->nodes = setup->nodes;
     uint8_t *memory = (uint8_t *)self + node_aligned(sizeof(struct exchange));
     node_shares_init(&e->shares, memory, setup, counted);
-    node_lending_init(&e->lending, memory + node_shares_bytes(setup->nodes),
-                      setup, &e->shares, counted, fault);
+    memory += node_shares_bytes(setup->nodes);
+    node_lending_init(&e->lending, memory, setup, &e->shares, counted, fault);
+    memory += node_lending_bytes(setup->nodes);
+    node_loans_init(&e->loans, memory, setup, counted, fault);
     node_waves_init(&e->waves, setup, counted, fault);
     const struct incode_front_peers peers = node_shares_peers(&e->shares);
     return node_triangulation_start(&e->triangulation, self, bytes,
@@ -136,6 +146,11 @@ static void exchange_message(void *self, const struct cube_message *message,
             follow(e, e->waves.command);
         }
         break;
+    case NODE_LOAN_ASK:
+    case NODE_LOAN:
+    case NODE_LOAN_FOUND:
+        node_loans_take(&e->loans, message);
+        break;
     case NODE_REGIONS:
         take_regions(e, message);
         break;
@@ -157,13 +172,33 @@ static void exchange_message(void *self, const struct cube_message *message,
 
 /* ---- work ---- */
 
+/* What came back first, as it may let others go on; what is borrowed last. */
+static bool work_on(void *context, uint32_t units, uint32_t *spent)
+{
+    struct exchange *e = context;
+    struct incode_triangulator *t = e->triangulation.triangulator;
+    uint64_t before = incode_triangulator_spent(t);
+    if (node_fault_is_set(e->fault)) {
+        return false;
+    }
+    bool worked = node_loans_use(&e->loans, t, units) ||
+                  node_triangulation_step(&e->triangulation, units, spent) ||
+                  node_loans_help(&e->loans, t, units);
+    *spent = (uint32_t)(incode_triangulator_spent(t) - before);
+    return worked;
+}
+
 static unsigned exchange_work(void *self, struct node_pace *pace)
 {
     struct exchange *e = self;
     e->waves.now_us = pace->begun_us;
     /* Not before all others can receive. */
-    return e->waves.begun ? node_triangulation_work(&e->triangulation, pace)
-                          : 0;
+    if (!e->waves.begun) {
+        return 0;
+    }
+    unsigned worked = node_pace_work(pace, work_on, e);
+    node_triangulation_close(&e->triangulation);
+    return worked;
 }
 
 static bool is_quiet(const struct exchange *e)
@@ -180,6 +215,9 @@ static unsigned exchange_send(void *self)
     unsigned sent = node_shares_send(&e->shares) +
                     node_lending_send(&e->lending, t->triangulator) +
                     node_triangulation_send(&e->triangulation);
+    if (e->waves.begun && !node_fault_is_set(e->fault)) {
+        sent += node_loans_send(&e->loans, t->triangulator);
+    }
     const struct node_waves_state state = {
         .ready = t->jobs.epoch != 0 && node_shares_ready(&e->shares),
         .quiet = is_quiet(e),
@@ -204,13 +242,13 @@ static uint32_t exchange_awaited(const void *self)
                                 : incode_triangulator_awaited(t->triangulator);
 }
 
-/* The node that is to send a page. */
+/* The node that is to send a page, or what it has found at a star. */
 static uint32_t exchange_owing(const void *self)
 {
     const struct exchange *e = self;
     uint32_t page = incode_triangulator_awaited(e->triangulation.triangulator);
     uint16_t keeper = page == INCODE_NONE
-                          ? (uint16_t)CUBE_HOST
+                          ? node_loans_owing(&e->loans)
                           : node_lending_keeper(&e->lending, page);
     return keeper == NODE_LENDING_COMES ? CUBE_HOST : keeper;
 }
@@ -240,9 +278,12 @@ static void exchange_totals(const void *self,
 {
     const struct exchange *e = self;
     node_triangulation_totals(&e->triangulation, totals, now_us);
-    totals->bytes_out += e->shares.bytes_out + e->lending.bytes_out;
+    totals->bytes_in += e->loans.bytes_in;
+    totals->bytes_out +=
+        e->shares.bytes_out + e->lending.bytes_out + e->loans.bytes_out;
     totals->pages_held = e->lending.sent;
     totals->pages_forwarded = e->lending.passed;
+    totals->statistics.stars_borrowed = e->loans.stars;
 }
 
 static void exchange_map(const void *self, struct node_map *map)
@@ -250,12 +291,13 @@ static void exchange_map(const void *self, struct node_map *map)
     const struct exchange *e = self;
     size_t shares = node_shares_bytes(e->nodes);
     size_t lending = node_lending_bytes(e->nodes);
+    size_t loans = node_loans_bytes(e->nodes);
     node_triangulation_map(&e->triangulation, map, 2);
-    map->tables[0].bytes = (uint32_t)shares;
+    map->tables[0].bytes = (uint32_t)(shares + loans);
     map->tables[0].count = NODE_SHARE_BATCHES;
     map->tables[1].bytes = (uint32_t)lending;
     map->tables[1].count = e->lending.queue_max;
-    map->tables[2].bytes -= (uint32_t)(shares + lending);
+    map->tables[2].bytes -= (uint32_t)(shares + lending + loans);
 }
 
 const struct node_role node_exchange_role = {

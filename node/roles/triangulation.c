@@ -114,8 +114,7 @@ bool node_triangulation_message(struct node_triangulation *t,
     return true;
 }
 
-/* One step of at most so many units; false: there is nothing to do. */
-static bool work_on(void *context, uint32_t units, uint32_t *spent)
+bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent)
 {
     struct node_triangulation *t = context;
     if (!t->jobs.working || t->drained || node_fault_is_set(t->fault) ||
@@ -134,13 +133,18 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent)
     return step == INCODE_WORKED || step == INCODE_FINISHED;
 }
 
-unsigned node_triangulation_work(struct node_triangulation *t,
-                                 struct node_pace *pace)
+void node_triangulation_close(struct node_triangulation *t)
 {
-    unsigned worked = node_pace_work(pace, work_on, t);
     if (t->drained) {
         node_outlet_close(&t->outlet);
     }
+}
+
+unsigned node_triangulation_work(struct node_triangulation *t,
+                                 struct node_pace *pace)
+{
+    unsigned worked = node_pace_work(pace, node_triangulation_step, t);
+    node_triangulation_close(t);
     return worked;
 }
 

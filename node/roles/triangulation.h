@@ -61,6 +61,12 @@ bool node_triangulation_message(struct node_triangulation *t,
                                 const struct cube_message *message,
                                 uint64_t now_us);
 
+/* For roles that have other work too: a step of at most so many units; false:
+ * there is nothing to do.  context: the struct.  And after some of them, what
+ * the last one has left goes out. */
+bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent);
+void node_triangulation_close(struct node_triangulation *t);
+
 /* As those of a role (roles.h); map: its first free table and those after it.
  */
 unsigned node_triangulation_work(struct node_triangulation *t,

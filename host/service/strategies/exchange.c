@@ -152,6 +152,7 @@ const struct host_strategy host_exchange = {
     .owner_rule = INCODE_OWNER_LOWEST,
     .meshes = true,
     .by_faces = true,
+    .helps = true,
     .check = check,
     .cost = cost,
     .regions = host_regions_each,

@@ -114,6 +114,7 @@ struct host_strategy {
     enum incode_owner_rule owner_rule; /* of nodes and host */
     bool meshes;                       /* its nodes send to each other, too */
     bool by_faces;                     /* whatever is asked for, face by face */
+    bool helps; /* nodes work for others after their own jobs, and tell of it */
     unsigned nodes_default; /* 0: as many as this machine has processors */
     unsigned sharing;       /* what it heeds of struct host_sharing */
     /* 0, or HOST_USAGE with the error where it cannot be run so.  NULL: it

@@ -13,9 +13,15 @@
 #ifndef TESTS_UNIT_SEVERAL_H
 #define TESTS_UNIT_SEVERAL_H
 
+#include "incode/borrower.h"
+#include "incode/lender.h"
 #include "solo.h"
 
-enum { SEVERAL_NODES = 128, SEVERAL_STEPS = 100000000 };
+enum {
+    SEVERAL_NODES = 128,
+    SEVERAL_STEPS = 100000000,
+    SEVERAL_LOANS = 4 /* at a time */
+};
 
 struct several_node {
     struct solo solo;
@@ -32,12 +38,20 @@ struct several {
     struct solo solo; /* as all are; the digest and the tetrahedra of all */
     uint64_t seed;    /* of the order in which things happen */
     bool one_by_one;  /* room for little to share at a time */
+    bool lends;       /* they close stars for each other, whoever is quiet */
 
+    uint64_t lent, late, hulls_found, elsewhere_found; /* answers to loans */
     uint64_t built, kept, foreign, seeds, sent, spilled;
 
     struct several_node *node; /* [solo.regions] */
     struct several_share *share;
     size_t share_count, share_room;
+    struct several_loan {
+        bool open;
+        uint32_t lender, helper, used;
+        struct incode_loan loan;
+        struct incode_borrower borrower;
+    } loan[SEVERAL_LOANS];
 };
 
 static inline uint32_t several_draw(struct several *all, uint32_t below)
@@ -112,6 +126,7 @@ static inline void several_open(struct several *all, const double *xyz,
         const struct host_region *r = &all->solo.order.region[i];
         node->has_work = r->first < r->last;
         node->finished = !node->has_work;
+        node->solo.wanted = INCODE_NONE;
         if (node->has_work)
             solo_start(&node->solo, i);
     }
@@ -127,6 +142,64 @@ static inline void several_deliver(struct several *all)
     all->share[i] = all->share[--all->share_count];
     assert_int_equal(
         incode_triangulator_take(all->node[share.to].solo.t, share.v), 0);
+}
+
+/* What is found of a loan: some of it is of the hull, some another's. */
+static inline void several_count_found(struct several *all,
+                                       const struct several_loan *loan)
+{
+    const struct incode_found *found = &loan->borrower.found;
+    for (uint32_t i = 0; i < found->count; i++) {
+        const uint32_t *v = found->v[i];
+        uint32_t brick = v[incode_lowest(v, 4)] / INCODE_BRICK_POINTS;
+        all->hulls_found += v[3] == INCODE_NONE;
+        all->elsewhere_found +=
+            brick < loan->loan.first || brick >= loan->loan.last;
+    }
+}
+
+/* Whoever is drawn lends to another, unless that has borrowed already. */
+static inline void several_lend(struct several *all, struct several_loan *loan)
+{
+    uint32_t n = all->solo.regions;
+    loan->lender = several_draw(all, n);
+    loan->helper = several_draw(all, n);
+    for (uint32_t i = 0; i < SEVERAL_LOANS; i++)
+        if (all->loan[i].open && all->loan[i].helper == loan->helper)
+            return;
+    struct incode_triangulator *helper = all->node[loan->helper].solo.t;
+    if (loan->lender == loan->helper ||
+        !incode_triangulator_lend(all->node[loan->lender].solo.t, &loan->loan))
+        return;
+    assert_true(incode_loan_is_sound(&loan->loan, all->solo.order.bricks));
+    loan->open = true;
+    loan->used = 0;
+    incode_borrower_begin(&loan->borrower, helper, &loan->loan);
+}
+
+/* A step of what is lent, here or there. */
+static inline void several_go_on(struct several *all, struct several_loan *loan)
+{
+    struct solo *helper = &all->node[loan->helper].solo;
+    struct incode_triangulator *lender = all->node[loan->lender].solo.t;
+    struct incode_borrower *b = &loan->borrower;
+    enum incode_step r;
+    if (!b->done) {
+        r = incode_borrower_step(b, helper->t, several_draw(all, 30));
+        if (r == INCODE_WAITING)
+            (void)solo_deliver(helper);
+        assert_int_not_equal(r, INCODE_BROKEN);
+        return;
+    }
+    if (several_draw(all, 8) != 0)
+        return;
+    assert_true(incode_found_is_sound(&b->found, all->solo.order.bricks));
+    r = incode_triangulator_use(lender, &loan->loan, &b->found, &loan->used,
+                                several_draw(all, 30));
+    assert_int_not_equal(r, INCODE_BROKEN);
+    loan->open = r != INCODE_FINISHED;
+    if (!loan->open)
+        several_count_found(all, loan);
 }
 
 static inline bool several_is_quiet(const struct several *all)
@@ -163,6 +236,11 @@ static inline void several_work(struct several *all)
         assert_in_range(steps, 0, SEVERAL_STEPS);
         if (all->share_count > 0 && several_draw(all, 3) == 0)
             several_deliver(all);
+        struct several_loan *loan = &all->loan[steps % SEVERAL_LOANS];
+        if (loan->open)
+            several_go_on(all, loan);
+        else if (all->lends)
+            several_lend(all, loan);
         uint32_t i = several_draw(all, n);
         if (!all->node[i].finished && solo_step(&all->node[i].solo, 1)) {
             several_finish(all, i);
@@ -177,6 +255,8 @@ static inline void several_work(struct several *all)
         }
     }
     assert_int_equal(all->share_count, 0);
+    for (uint32_t i = 0; i < SEVERAL_LOANS; i++)
+        assert_false(all->loan[i].open);
 }
 
 static inline void several_gather(struct several *all)
@@ -194,11 +274,13 @@ static inline void several_gather(struct several *all)
         all->built += counts->built;
         all->kept += counts->kept;
         all->foreign += counts->foreign;
+        all->lent += counts->lent;
+        all->late += counts->late;
         all->seeds += counts->seeds;
         all->spilled += counts->spilled;
     }
     assert_int_equal(all->kept, all->solo.tets.count);
-    assert_int_equal(all->built, all->kept + all->foreign);
+    assert_int_equal(all->built, all->kept + all->foreign + all->late);
     host_tetrahedra_map(&all->solo.tets, all->solo.order.row);
     host_tetrahedra_sort(&all->solo.tets);
     host_digest(&all->solo.tets, &all->solo.digest);

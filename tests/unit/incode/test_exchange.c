@@ -53,6 +53,7 @@ static void expect_all(const struct host_points *points, const char *name)
         start.solo.pressure = k % 4 == 1 ? 600 : 0;
         start.seed = seed | 1;
         start.one_by_one = seed >> 58 & 1;
+        start.lends = k % 3 > 0;
         expect(&start, points, digest.text, name);
     }
 }

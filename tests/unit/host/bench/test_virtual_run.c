@@ -15,15 +15,19 @@
 enum { POINTS = 600, BUILT_US = 2000 };
 
 static const double prices[HOST_BENCH_COUNTS] = {[HOST_BENCH_BUILT] =
-                                                     BUILT_US * 1e3};
+                                                     BUILT_US * 1e3},
+                    /* As on a real machine: who finds has the most work. */
+    shared_prices[HOST_BENCH_COUNTS] = {[HOST_BENCH_BUILT] = BUILT_US * 2e2,
+                                        [HOST_BENCH_CALLS] = BUILT_US * 8e2};
 
 static struct host_virtual_run run;
+static double slow; /* of the next run */
 
 static void triangulate(const char *strategy, unsigned nodes, bool routers,
                         bool shared)
 {
     const struct host_bench_machine machine = {
-        .price = prices,
+        .price = slow > 0 ? shared_prices : prices,
         .scale = 1,
         .wire = {.bytes_per_s = 1000000, .room = 16384, .bytes = 32768},
         .host_wire = {.bytes_per_s = 1000000, .room = 16384, .bytes = 32768},
@@ -37,7 +41,8 @@ static void triangulate(const char *strategy, unsigned nodes, bool routers,
     options.strategy = host_strategy_named(strategy);
     options.build = INCODE_BUILD_FACES;
     options.nodes = nodes;
-    run = (struct host_virtual_run){.machine = &machine, .options = &options};
+    run = (struct host_virtual_run){
+        .machine = &machine, .options = &options, .slow = slow};
     assert_int_equal(host_gen("uniform", POINTS, 1, &points, &error), 0);
     assert_int_equal(host_virtual_run(&run, &points, &error), 0);
     assert_int_equal(run.result.points, POINTS);
@@ -91,10 +96,33 @@ static void test_more_nodes(void **state)
     assert_true(run.result.t_max_s > 0.25 * alone);
 }
 
+/* A node of half the speed takes twice as long alone, and holds an exchange up
+ * by little, as the others take over from it. */
+static void test_slow_node(void **state)
+{
+    (void)state;
+    slow = 1;
+    triangulate("spatial", 4, true, false);
+    double even = run.result.t_max_s;
+    slow = 2;
+    triangulate("spatial", 4, true, false);
+    assert_true(run.result.t_max_s > 1.6 * even);
+    slow = 1;
+    triangulate("exchange", 4, true, false);
+    even = run.result.t_max_s;
+    slow = 2;
+    triangulate("exchange", 4, true, false);
+    slow = 0;
+    uint64_t lent = run.result.stars_lent, borrowed = run.result.stars_borrowed;
+    assert_true(borrowed > 0 && lent >= borrowed);
+    assert_true(run.result.tetrahedra_late < run.result.tetrahedra / 10);
+    assert_true(run.result.t_max_s < 1.7 * even);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_charge),
-                                       cmocka_unit_test(test_again),
-                                       cmocka_unit_test(test_more_nodes)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_charge), cmocka_unit_test(test_again),
+        cmocka_unit_test(test_more_nodes), cmocka_unit_test(test_slow_node)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
