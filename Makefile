@@ -336,7 +336,7 @@ clean:
 help:
 	@echo 'make run [POINTS=FILE]   the main job: set up, build, triangulate'
 	@echo '                         on 8 nodes, verify, write out/, report'
-	@echo 'make test                set up, build, pass all tests (12 minutes)'
+	@echo 'make test                set up, build, pass all tests (15 minutes)'
 	@echo 'make check               build, unit tests, quick lint, half a minute of'
 	@echo '                         simulation (3 minutes)'
 	@echo 'make                     build/incode, build/incode-node, and both for'

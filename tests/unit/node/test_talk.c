@@ -17,12 +17,13 @@ static uint8_t draw(void)
     return (uint8_t)(sim_draw(&state) >> 40);
 }
 
-/* TALKS for more than a few. */
+/* TALKS for more than a few, TALK_SEED for others than these. */
 static void random_talks(void **unused)
 {
-    const char *wanted = getenv("TALKS");
+    const char *wanted = getenv("TALKS"), *seed = getenv("TALK_SEED");
     uint8_t bytes[300] = {0};
     (void)unused;
+    state = seed != NULL ? strtoull(seed, NULL, 10) : state;
     for (long talks = wanted != NULL ? atol(wanted)
                       : emulated()   ? 25
                                      : 150;
