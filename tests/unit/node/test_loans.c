@@ -229,8 +229,8 @@ static void no_place(void **unused)
     say(l, HELPER, NODE_LOAN_ASK, NULL, 0);
     lend(1);
     const struct sent loan = *last_of(l);
-    for (uint16_t from = 2; from < 2 + NODE_LOANS_IN; from++)
-        say(h, from, NODE_LOAN, loan.data, loan.size);
+    for (unsigned from = 2; from < 2 + NODE_LOANS_IN; from++)
+        say(h, (uint16_t)from, NODE_LOAN, loan.data, loan.size);
     unsigned before = h->cube.count;
     assert_int_equal(node_loans_send(&h->loans, h->t), 0);
     deliver(l, h);
@@ -256,8 +256,8 @@ static void so_many(void **unused)
     (void)unused;
     struct one *l = &one[LENDER];
     uint32_t seen = 0;
-    for (uint16_t i = 1; i < NODES; i++)
-        say(l, i, NODE_LOAN_ASK, NULL, 0);
+    for (unsigned i = 1; i < NODES; i++)
+        say(l, (uint16_t)i, NODE_LOAN_ASK, NULL, 0);
     lend(NODE_LOANS_OUT);
     for (unsigned i = 0; i < NODE_LOANS_OUT; i++)
         seen |= UINT32_C(1) << l->cube.sent[i].dest;

@@ -212,12 +212,53 @@ static void points_are_inserted_a_few_at_a_time(void **unused)
     close_worker();
 }
 
+/* A processor on which work takes ten milliseconds a unit, and a look that
+ * finds none nothing. */
+struct slow {
+    uint64_t now_us;
+    uint32_t most; /* units of a step */
+    bool has_work;
+};
+
+static uint64_t slow_now_us(void *context)
+{
+    const struct slow *slow = context;
+    return slow->now_us;
+}
+
+static bool slow_step(void *context, uint32_t units, uint32_t *spent)
+{
+    struct slow *slow = context;
+    *spent = slow->has_work ? units : 1;
+    slow->now_us += slow->has_work ? units * UINT64_C(10000) : 0;
+    if (slow->has_work && units > slow->most)
+        slow->most = units;
+    return slow->has_work;
+}
+
+/* However often a node has looked for work in vain, it does not take work for
+ * quick. */
+static void looks_in_vain_teach_nothing(void **unused)
+{
+    (void)unused;
+    struct slow slow = {.now_us = 1};
+    struct node_pace pace;
+    node_pace_init(&pace, slow_now_us, &slow);
+    for (int i = 0; i < 2000; i++) {
+        slow.has_work = i >= 1000;
+        node_pace_begin(&pace, slow.now_us);
+        (void)node_pace_work(&pace, slow_step, &slow);
+    }
+    assert_int_equal(slow.most, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_index_works_for_long),
         cmocka_unit_test(a_quick_processor_looks_seldom),
         cmocka_unit_test(points_are_inserted_a_few_at_a_time),
+        cmocka_unit_test(looks_in_vain_teach_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
