@@ -39,8 +39,8 @@ struct run {
 static bool fits(const void *context, const struct host_strategy *strategy)
 {
     const struct run *run = context;
-    return host_memory_needed(run->options, strategy, run->nodes, run->bricks,
-                              run->cells) <= run->options->memory;
+    return host_memory_fits(run->options, strategy, run->nodes, run->bricks,
+                            run->cells);
 }
 
 /* Whether a node may insert points, as far as the options go. */
