@@ -100,7 +100,8 @@ static uint32_t widest(const struct incode_complex *x, int32_t *change,
     return (uint32_t)most;
 }
 
-/* Of a sample of so many; 0: none can be made. */
+/* Of a sample of so many; as many as there is room for where they do not fit,
+ * as those of two lines askew; 0: there are none. */
 static uint32_t open_of(const struct host_order *order, uint32_t count)
 {
     struct incode_tally tally = {0};
@@ -113,8 +114,9 @@ static uint32_t open_of(const struct host_order *order, uint32_t count)
     if (memory != NULL && change != NULL) {
         incode_complex_init(&x, memory, bytes);
         add_some(&x, order, count);
-        if (begin(&x, &tally, count) && insert_all(&x, &tally, count)) {
-            open = widest(&x, change, count);
+        if (begin(&x, &tally, count)) {
+            open = insert_all(&x, &tally, count) ? widest(&x, change, count)
+                                                 : x.cells;
         }
     }
     host_unmap(memory, bytes);

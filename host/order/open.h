@@ -9,15 +9,16 @@
  *
  * Memory: 1 MB, while it works.  Work: 2,500 insertions.
  *
- *     cells = host_order_open(&order);
- *     fits = cells * 40 <= bytes;
+ *     if (host_order_open(&order) * 40 > memory)
+ *         puts("they will not fit");
  */
 #ifndef HOST_ORDER_OPEN_H
 #define HOST_ORDER_OPEN_H
 
 #include "order.h"
 
-/* About so many; 0: the sample lies in a plane, or there is no memory. */
+/* About so many, no more than 14 times the points; 0: the sample lies in a
+ * plane, or there is no memory. */
 uint64_t host_order_open(const struct host_order *order);
 
 #endif

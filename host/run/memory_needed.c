@@ -13,20 +13,27 @@ static unsigned cube_dimension(unsigned nodes)
     return dimension;
 }
 
+static bool does_with(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned dimension,
+                      const struct node_setup_message *setup, uint64_t memory)
+{
+    struct node_identity identity = {.dimension = (uint8_t)dimension,
+                                     .window = (uint8_t)options->window,
+                                     .epoch = 1};
+    return host_strategy_arena(strategy, 1u << dimension, &identity, memory,
+                               &options->sharing, setup) +
+               HOST_STACK_BYTES + HOST_STATIC_BYTES <=
+           memory;
+}
+
 /* The least memory that every node does with. */
 static uint64_t memory_needed(const struct host_run_options *options,
                               const struct host_strategy *strategy,
                               unsigned dimension,
                               const struct node_setup_message *setup)
 {
-    struct node_identity identity = {.dimension = (uint8_t)dimension,
-                                     .window = (uint8_t)options->window,
-                                     .epoch = 1};
     uint64_t memory = HOST_MEMORY_MIN;
-    while (host_strategy_arena(strategy, 1u << dimension, &identity, memory,
-                               &options->sharing, setup) +
-               HOST_STACK_BYTES + HOST_STATIC_BYTES >
-           memory) {
+    while (!does_with(options, strategy, dimension, setup, memory)) {
         memory += 16384;
     }
     return memory;
@@ -64,13 +71,13 @@ setup_of(const struct host_run_options *options, uint32_t bricks,
     return setup;
 }
 
-uint64_t host_memory_needed(const struct host_run_options *options,
-                            const struct host_strategy *strategy,
-                            unsigned nodes, uint32_t bricks,
-                            const uint32_t cells[3])
+bool host_memory_fits(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned nodes,
+                      uint32_t bricks, const uint32_t cells[3])
 {
     struct node_setup_message setup = setup_of(options, bricks, cells);
-    return memory_needed(options, strategy, cube_dimension(nodes), &setup);
+    return does_with(options, strategy, cube_dimension(nodes), &setup,
+                     options->memory);
 }
 
 int host_memory_check(const struct host_run_options *options,

@@ -3,7 +3,7 @@
  * Memory: none.  Work: some hundred times that of a strategy's set_up for all
  * nodes.
  *
- *     needed = host_memory_needed(&options, strategy, 8, 1, no_cells);
+ *     fits = host_memory_fits(&options, strategy, 8, 1, no_cells);
  *     if (host_memory_check(&options, strategy, 8, bricks, cells, &error) != 0)
  *         return error.code;
  */
@@ -12,12 +12,11 @@
 
 #include "run.h"
 
-/* The least memory that every node does with, bytes.  bricks, cells: of the
- * order, where it is known; else 1 and none. */
-uint64_t host_memory_needed(const struct host_run_options *options,
-                            const struct host_strategy *strategy,
-                            unsigned nodes, uint32_t bricks,
-                            const uint32_t cells[3]);
+/* Whether every node does with the memory of the options.  bricks, cells: of
+ * the order, where it is known; else 1 and none. */
+bool host_memory_fits(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned nodes,
+                      uint32_t bricks, const uint32_t cells[3]);
 
 /* 0, or HOST_USAGE: the options give less, and what can be done. */
 int host_memory_check(const struct host_run_options *options,

@@ -39,8 +39,8 @@ struct run {
 static bool fits(const void *context, const struct host_strategy *strategy)
 {
     const struct run *run = context;
-    return host_memory_needed(run->options, strategy, run->nodes, run->bricks,
-                              run->cells) <= run->options->memory;
+    return host_memory_fits(run->options, strategy, run->nodes, run->bricks,
+                            run->cells);
 }
 
 /* Whether a node may insert points, as far as the options go. */
@@ -146,7 +146,8 @@ static bool is_uneven(const struct host_order *order)
 static bool is_room(const struct host_order *order, uint64_t memory)
 {
     enum { CELL = 40, HALF_CELLS_A_POINT = 13, OTHER = 256 << 10 };
-    uint64_t cells = (memory - memory / 8 - OTHER) / CELL;
+    uint64_t room = memory - memory / 8;
+    uint64_t cells = room > OTHER ? (room - OTHER) / CELL : 0;
     return order->points * (uint64_t)HALF_CELLS_A_POINT / 2 <= cells ||
            host_order_open(order) <= cells;
 }

@@ -83,29 +83,34 @@ double host_strategy_time(const struct host_strategy *strategy,
     return longest > wire ? longest : wire;
 }
 
-const struct host_strategy *host_strategy_auto(const struct host_task *task)
+/* The row of the one that takes least, and what each takes. */
+static unsigned choose(const struct host_task *task, double time[ROWS])
 {
-    const struct host_strategy *best = rows[0];
-    for (unsigned i = 1; i < ROWS; i++) {
-        best =
-            host_strategy_time(rows[i], task) < host_strategy_time(best, task)
-                ? rows[i]
-                : best;
+    unsigned best = 0;
+    for (unsigned i = 0; i < ROWS; i++) {
+        time[i] = host_strategy_time(rows[i], task);
+        best = time[i] < time[best] ? i : best;
     }
     return best;
 }
 
+const struct host_strategy *host_strategy_auto(const struct host_task *task)
+{
+    double time[ROWS];
+    return rows[choose(task, time)];
+}
+
 void host_strategy_why(const struct host_task *task, char text[HOST_WHY_BYTES])
 {
-    const struct host_strategy *best = host_strategy_auto(task);
+    double time[ROWS];
+    unsigned best = choose(task, time);
     int at = snprintf(text, HOST_WHY_BYTES,
                       "%s is expected to take %.2f of one node's time",
-                      best->name, host_strategy_time(best, task));
+                      rows[best]->name, time[best]);
     for (unsigned i = 0; i < ROWS; i++) {
-        double time = host_strategy_time(rows[i], task);
-        if (rows[i] != best && time < INFINITY && at < HOST_WHY_BYTES) {
+        if (i != best && time[i] < INFINITY && at < HOST_WHY_BYTES) {
             at += snprintf(text + at, HOST_WHY_BYTES - (size_t)at, ", %s %.2f",
-                           rows[i]->name, time);
+                           rows[i]->name, time[i]);
         }
     }
 }

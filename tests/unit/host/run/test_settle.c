@@ -23,16 +23,14 @@ static bool settle(struct host_run_options *options, const char *kind,
     struct host_error error = {0};
     assert_int_equal(host_gen(kind, POINTS, 1, &points, &error), 0);
     result = (struct host_run_result){0};
-    options->nodes = NODES;
     options->processors = NODES; /* whatever this machine has */
     host_settle(options, points.count, &result);
-    assert_int_equal(result.nodes, NODES);
-    assert_int_equal(
-        host_order_make(
-            &order, kind, points.xyz, points.count,
-            host_strategy_partition(result.strategy, options->partition),
-            result.strategy->regions(NODES), false, &error),
-        0);
+    result.nodes = NODES;
+    assert_int_equal(host_order_make(&order, kind, points.xyz, points.count,
+                                     host_strategy_partition(
+                                         result.strategy, options->partition),
+                                     NODES, false, &error),
+                     0);
     bool again = host_settle_ordered(options, &order, &result);
     *regions = order.regions;
     assert_int_equal(order.region[0].first, 0);
@@ -48,6 +46,7 @@ static void volumes_and_others(void **unused)
     struct host_run_options options;
     uint32_t regions;
     host_run_defaults(&options);
+    options.nodes = NODES;
     assert_false(settle(&options, "uniform", &regions));
     assert_ptr_not_equal(result.strategy, &host_sequential);
     assert_int_equal(regions, NODES);
@@ -56,6 +55,7 @@ static void volumes_and_others(void **unused)
         assert_true(settle(&options, kinds[i], &regions));
         assert_ptr_equal(result.strategy, &host_sequential);
         assert_int_equal(regions, 1);
+        assert_int_equal(result.nodes, NODES);
         assert_true(result.why[0] != '\0');
     }
     /* Face by face, one node alone has no advantage. */
@@ -70,6 +70,7 @@ static void what_is_asked_for_stays(void **unused)
     struct host_run_options options;
     uint32_t regions;
     host_run_defaults(&options);
+    options.nodes = NODES;
     options.strategy = &host_spatial;
     assert_false(settle(&options, "sphere", &regions));
     assert_ptr_equal(result.strategy, &host_spatial);
@@ -77,11 +78,49 @@ static void what_is_asked_for_stays(void **unused)
     assert_int_equal(result.why[0], '\0');
 }
 
+/* One node does by itself, unless somebody has said how many. */
+static void one_alone(void **unused)
+{
+    (void)unused;
+    struct host_run_options options;
+    uint32_t regions;
+    host_run_defaults(&options);
+    (void)settle(&options, "sphere", &regions);
+    assert_ptr_equal(result.strategy, &host_sequential);
+    assert_int_equal(result.nodes, 1);
+    (void)settle(&options, "uniform", &regions);
+    assert_ptr_not_equal(result.strategy, &host_sequential);
+    assert_int_equal(result.nodes, NODES);
+}
+
+/* What is open of a surface has to fit, or its faces are sought; the user's
+ * word stands. */
+static void what_does_not_fit(void **unused)
+{
+    (void)unused;
+    struct host_run_options options;
+    uint32_t regions;
+    host_run_defaults(&options);
+    options.nodes = NODES;
+    (void)settle(&options, "sphere", &regions);
+    assert_int_equal(result.build, INCODE_BUILD_AUTO);
+    options.memory = 300 << 10;
+    (void)settle(&options, "sphere", &regions);
+    assert_int_equal(result.build, INCODE_BUILD_FACES);
+    (void)settle(&options, "uniform", &regions); /* the node's to say */
+    assert_int_equal(result.build, INCODE_BUILD_AUTO);
+    options.build = INCODE_BUILD_POINTS;
+    (void)settle(&options, "sphere", &regions);
+    assert_int_equal(result.build, INCODE_BUILD_POINTS);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(volumes_and_others),
         cmocka_unit_test(what_is_asked_for_stays),
+        cmocka_unit_test(one_alone),
+        cmocka_unit_test(what_does_not_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

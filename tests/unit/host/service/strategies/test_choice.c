@@ -79,6 +79,19 @@ static void test_auto(void **unused)
     assert_ptr_equal(best_of(&task), &host_sequential);
     task.nodes = task.processors = 16;
     assert_ptr_not_equal(best_of(&task), &host_sequential);
+    /* Face by face one alone has no advantage, and a surface is mostly border.
+     */
+    task.nodes = task.processors = 2;
+    task.by_points = false;
+    assert_ptr_equal(best_of(&task), &host_exchange);
+    task.uneven = false;
+    assert_ptr_equal(best_of(&task), &host_spatial);
+    /* Of points that one node inserts, two processors and their host leave
+     * little to share. */
+    task.by_points = task.with_host = true;
+    assert_ptr_equal(best_of(&task), &host_sequential);
+    task.with_host = false;
+    assert_ptr_equal(best_of(&task), &host_spatial);
 }
 
 int main(void)
