@@ -255,6 +255,7 @@ static inline int run(const struct host_strategy *strategy,
     options.quiet = true;
     options.patience_s = world.patience_s == 0 ? 8 : world.patience_s;
     options.memory = MEMORY;
+    options.strategy = strategy;
     memset(&result, 0, sizeof result);
     memset(error, 0, sizeof *error);
     result.nodes = NODES;

@@ -339,6 +339,7 @@ static void test_ends_at_once(void **unused)
         host_run_defaults(&options);
         options.quiet = true;
         options.memory = MEMORY;
+        options.strategy = &host_spatial;
         prepare();
         start_world();
         memset(&result, 0, sizeof result);
