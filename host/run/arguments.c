@@ -78,9 +78,9 @@ static const struct argp_option options_of_run[] = {
      "other strategies than sequential, spatial and linda-spatial go by faces",
      1},
     {"nodes", KEY_NODES, "N", 0,
-     "Nodes of the cube: 1, 2, 4 .. 64. Default: one a processor; of "
-     "sequential one",
-     1},
+     "Nodes of the cube: 1, 2, 4 .. 64. Default: what suits this machine", 1},
+    {"linda", KEY_LINDA, "NAME", 0,
+     "Of --strategy linda: master-slaves (the default) or spatial", 1},
     {"cluster", KEY_CLUSTER, "N", 0,
      "Nodes of a cluster in hybrid, a power of two. Default: 4", 1},
     {"builders", KEY_BUILDERS, "N", 0,

@@ -20,9 +20,10 @@
 void host_settle(const struct host_run_options *options, uint64_t points,
                  struct host_run_result *result);
 
-/* Settles the way to build, and `auto` again, by the order, which has a region for each node; true
- * where it has another strategy now.  The regions are joined if that wants one
- * alone; and then it gets one node alone, if nobody has said how many. */
+/* Settles the way to build, and `auto` again, by the order, which has a region
+ * for each node; true where it has another strategy now.  The regions are
+ * joined if that wants one alone; and then it gets one node alone, if nobody
+ * has said how many. */
 bool host_settle_ordered(const struct host_run_options *options,
                          struct host_order *order,
                          struct host_run_result *result);
