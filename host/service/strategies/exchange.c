@@ -157,6 +157,7 @@ const struct host_strategy host_exchange = {
     .owner_rule = INCODE_OWNER_LOWEST,
     .meshes = true,
     .by_faces = true,
+    .pages_in_a_row = 16, /* a region, or a part: it can begin, and lend them */
     .check = check,
     .cost = cost,
     .regions = regions,
