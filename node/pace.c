@@ -22,7 +22,7 @@ static void look(struct node_pace *pace, uint32_t units)
     uint64_t now = pace->now_us(pace->context);
     uint64_t passed_us = now - pace->looked_us;
     uint64_t unit_ns = passed_us * 1000 / (units > 0 ? units : 1);
-    uint64_t most_ns = pace->measured ? 2 * pace->unit_ns + 1 : UINT64_MAX;
+    uint64_t most_ns = pace->measured ? 2 * pace->unit_ns + 1 : UINT64_MAX / 2;
     uint64_t weight_us = passed_us < NODE_PACE_FALL_US && pace->measured
                              ? passed_us
                              : NODE_PACE_FALL_US;
