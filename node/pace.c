@@ -1,7 +1,5 @@
 #include "pace.h"
 
-enum { LOOK = 2 /* units that a step takes which finds nothing to do */ };
-
 void node_pace_init(struct node_pace *pace, uint64_t (*now_us)(void *context),
                     void *context)
 {
@@ -15,16 +13,16 @@ void node_pace_begin(struct node_pace *pace, uint64_t now_us)
     pace->begun_us = pace->looked_us = now_us;
 }
 
-/* How long a unit takes: twice as long as was thought, at most, as the clock
- * goes on while others have the processor; and less by and by, as units differ,
- * by the time that they took: many that take next to none do not hide those
- * that take long. */
+/* How long a unit takes: what was measured first; then twice as long as was
+ * thought, at most, as the clock goes on while others have the processor; and
+ * less by and by, as units differ, by the time that they took: many that take
+ * next to none do not hide those that take long. */
 static void look(struct node_pace *pace, uint32_t units)
 {
     uint64_t now = pace->now_us(pace->context);
     uint64_t passed_us = now - pace->looked_us;
     uint64_t unit_ns = passed_us * 1000 / (units > 0 ? units : 1);
-    uint64_t most_ns = 2 * pace->unit_ns + 1;
+    uint64_t most_ns = pace->measured ? 2 * pace->unit_ns + 1 : UINT64_MAX / 2;
     uint64_t weight_us = passed_us < NODE_PACE_FALL_US && pace->measured
                              ? passed_us
                              : NODE_PACE_FALL_US;
@@ -37,9 +35,11 @@ static void look(struct node_pace *pace, uint32_t units)
             (pace->unit_ns - unit_ns) * weight_us / NODE_PACE_STEP_US;
     }
     uint64_t fit = NODE_PACE_STEP_US * UINT64_C(1000) / (pace->unit_ns + 1);
-    pace->units = fit < NODE_PACE_UNITS_MIN   ? NODE_PACE_UNITS_MIN
-                  : fit > NODE_PACE_UNITS_MAX ? NODE_PACE_UNITS_MAX
-                                              : (uint32_t)fit;
+    uint32_t most =
+        pace->measured ? NODE_PACE_UNITS_MAX : NODE_PACE_UNITS_UNMEASURED_MAX;
+    pace->units = fit < NODE_PACE_UNITS_MIN ? NODE_PACE_UNITS_MIN
+                  : fit > most              ? most
+                                            : (uint32_t)fit;
 }
 
 bool node_pace_goes_on(struct node_pace *pace, uint32_t units)
@@ -65,8 +65,7 @@ unsigned node_pace_work(struct node_pace *pace,
         uint32_t spent = 0;
         goes_on = step(context, pace->units, &spent);
         worked += goes_on;
-        /* A look that finds nothing to do tells nothing of work. */
-        units += goes_on || spent > LOOK ? spent : 0;
+        units += goes_on ? spent : 0; /* who only waits tells nothing */
         if (goes_on && node_pace_is_due(pace, units)) {
             goes_on = node_pace_goes_on(pace, units);
             units = 0;

@@ -32,6 +32,7 @@ enum {
     NODE_PACE_FALL_US = NODE_PACE_STEP_US / 8,
     NODE_PACE_UNITS_MIN = 8, /* less, and what is begun anew is most of it */
     NODE_PACE_UNITS_MAX = 4096,
+    NODE_PACE_UNITS_UNMEASURED_MAX = 1024, /* before any has taken time */
     NODE_STEPS = 32 /* of a role between looks at links, at most */
 };
 

@@ -219,6 +219,16 @@ static bool serve_node(struct host_service *s, uint16_t to,
     return node->ping_due && host_detector_ping(s, to);
 }
 
+/* Whether the node whose turn it was has another: for pages, of which the
+ * strategy has some sent in a row. */
+static bool goes_on(struct host_service *s, struct host_node *node)
+{
+    bool more = node->pages_count > 0 &&
+                node->pages_in_a_row + 1 < s->strategy->pages_in_a_row;
+    node->pages_in_a_row = more ? node->pages_in_a_row + 1 : 0;
+    return more;
+}
+
 unsigned host_sending_serve(struct host_service *service,
                             struct host_error *error)
 {
@@ -228,6 +238,9 @@ unsigned host_sending_serve(struct host_service *service,
         if (serve_node(s, (uint16_t)s->turn, error)) {
             sent++;
             idle = 0;
+            if (goes_on(s, &s->node[s->turn])) {
+                continue;
+            }
         } else {
             idle++;
         }

@@ -38,6 +38,7 @@ enum {
 struct host_node {
     uint32_t pages[HOST_PAGES_QUEUED_MAX]; /* asked for, to be sent */
     uint32_t pages_first, pages_count;
+    uint32_t pages_in_a_row; /* turns that it has had for them */
     struct {
         struct node_spill_header header;
         struct host_spill_list list;

@@ -4,7 +4,7 @@
  *
  * Memory: the struct.  Work: a pass over the pages that are wanted, a call.
  *
- *     node_requests_init(&requests, setup.holders, &counted, &fault);
+ *     node_requests_init(&requests, setup.holders, NULL, &counted, &fault);
  *     struct incode_page_source source = node_requests_source(&requests);
  *     sent = node_requests_send(&requests);   // and so in every step
  */

@@ -153,6 +153,7 @@ const struct host_strategy host_exchange = {
     .meshes = true,
     .by_faces = true,
     .helps = true,
+    .pages_in_a_row = 16, /* a region, or a part: it can begin, and lend them */
     .check = check,
     .cost = cost,
     .regions = host_regions_each,

@@ -115,8 +115,10 @@ struct host_strategy {
     bool meshes;                       /* its nodes send to each other, too */
     bool by_faces;                     /* whatever is asked for, face by face */
     bool helps; /* nodes work for others after their own jobs, and tell of it */
-    unsigned nodes_default; /* 0: as many as this machine has processors */
-    unsigned sharing;       /* what it heeds of struct host_sharing */
+    unsigned nodes_default;  /* 0: as many as this machine has processors */
+    unsigned pages_in_a_row; /* to a node that has asked for them, before it is
+                                another's turn; 0: one */
+    unsigned sharing;        /* what it heeds of struct host_sharing */
     /* 0, or HOST_USAGE with the error where it cannot be run so.  NULL: it
      * always can. */
     int (*check)(unsigned nodes, const struct host_sharing *sharing,
