@@ -65,6 +65,8 @@ void incode_afl_clear(struct incode_afl *afl)
     afl->unused = afl->touched_free = 0;
     afl->count = afl->held_count = afl->touched_count = 0;
     afl->crowded = INCODE_NONE;
+    afl->wide_count = afl->wide_next = 0;
+    afl->still = false;
     afl->fault = NULL;
 }
 
@@ -126,9 +128,127 @@ void incode_afl_drop(struct incode_afl *afl, uint32_t brick)
     afl->touched_count--;
 }
 
-static uint32_t *head_of(const struct incode_afl *afl, uint32_t key)
+/* ---- lists ---- */
+
+enum { PARTS = 64 /* of a list that is spread */ };
+
+static bool is_wide(const struct incode_afl *afl, uint32_t key)
 {
-    return &afl->heads[(key * UINT32_C(2654435761) >> 7) & afl->mask];
+    for (uint32_t i = 0; i < afl->wide_count; i++)
+        if (afl->wide[i] == key)
+            return true;
+    return false;
+}
+
+/* Parts of a vertex's list: distinct heads. */
+static uint32_t parts_of(const struct incode_afl *afl, uint32_t key)
+{
+    if (afl->wide_count == 0 || !is_wide(afl, key))
+        return 1;
+    return afl->mask < PARTS ? afl->mask + 1 : (uint32_t)PARTS;
+}
+
+static uint32_t *head_of(const struct incode_afl *afl, uint32_t key,
+                         uint32_t part)
+{
+    return &afl->heads[((key * UINT32_C(2654435761) >> 7) + part) & afl->mask];
+}
+
+/* Where a face is, and its twin. */
+static uint32_t *head_of_face(const struct incode_afl *afl, uint32_t key,
+                              uint32_t b, uint32_t c)
+{
+    uint32_t part = 0;
+    if (afl->wide_count > 0)
+        part = ((b + c) * UINT32_C(2654435761) >> 16) % parts_of(afl, key);
+    return head_of(afl, key, part);
+}
+
+/* A walk through the faces of one vertex and those that share their heads. */
+struct walk {
+    uint32_t key, part, parts;
+};
+
+static uint32_t walk_from(const struct incode_afl *afl, struct walk *walk)
+{
+    uint32_t i = INCODE_AFL_NIL;
+    while (i == INCODE_AFL_NIL && walk->part < walk->parts)
+        i = *head_of(afl, walk->key, walk->part++);
+    return i;
+}
+
+static uint32_t walk_begin(const struct incode_afl *afl, uint32_t key,
+                           struct walk *walk)
+{
+    *walk = (struct walk){key, 0, parts_of(afl, key)};
+    return walk_from(afl, walk);
+}
+
+static uint32_t walk_on(const struct incode_afl *afl, struct walk *walk,
+                        uint32_t i)
+{
+    i = afl->nodes[i].next;
+    return i != INCODE_AFL_NIL ? i : walk_from(afl, walk);
+}
+
+/* Puts the faces of a vertex that are in `parts` heads where they belong now.
+ */
+static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts)
+{
+    uint32_t all = INCODE_AFL_NIL;
+    for (uint32_t part = 0; part < parts; part++) {
+        uint32_t *link = head_of(afl, key, part);
+        while (*link != INCODE_AFL_NIL) {
+            uint32_t i = *link;
+            struct incode_afl_node *node = &afl->nodes[i];
+            afl->looks++;
+            if (node->key != key) {
+                link = &node->next;
+                continue;
+            }
+            *link = node->next;
+            node->next = all;
+            all = i;
+        }
+    }
+    while (all != INCODE_AFL_NIL) {
+        struct incode_afl_node *node = &afl->nodes[all];
+        uint32_t *head = head_of_face(afl, key, node->b, node->c);
+        uint32_t next = node->next;
+        node->next = *head;
+        *head = all;
+        all = next;
+    }
+}
+
+/* Makes room for one more list to be spread, if the next one in turn is short;
+ * false: there is none. */
+static bool narrow_one(struct incode_afl *afl)
+{
+    if (afl->wide_count < INCODE_AFL_WIDE)
+        return true;
+    struct walk walk;
+    uint32_t at = afl->wide_next++ % INCODE_AFL_WIDE, v = afl->wide[at];
+    uint32_t i = walk_begin(afl, v, &walk), faces = 0;
+    for (; i != INCODE_AFL_NIL && faces < INCODE_AFL_CROWD / 2;
+         i = walk_on(afl, &walk, i)) {
+        afl->looks++;
+        faces += afl->nodes[i].key == v;
+    }
+    if (faces == INCODE_AFL_CROWD / 2)
+        return false;
+    afl->wide[at] = afl->wide[--afl->wide_count];
+    list_anew(afl, v, walk.parts);
+    return true;
+}
+
+/* Spreads a list that no hub has kept short. */
+static void widen(struct incode_afl *afl, uint32_t key)
+{
+    if (afl->still || is_wide(afl, key) || !narrow_one(afl))
+        return;
+    afl->wide[afl->wide_count++] = key;
+    list_anew(afl, key, 1);
 }
 
 static uint64_t bit_of(uint32_t v)
@@ -185,7 +305,7 @@ static void unlink_node(struct incode_afl *afl, uint32_t *link)
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                            uint32_t c)
 {
-    uint32_t *link = head_of(afl, key), passed = 0;
+    uint32_t *link = head_of_face(afl, key, b, c), passed = 0;
     afl->searches++;
     while (*link != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[*link];
@@ -209,6 +329,8 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
     }
     if (passed >= INCODE_AFL_CROWD && afl->crowded == INCODE_NONE)
         afl->crowded = key;
+    if (passed >= 2 * INCODE_AFL_CROWD)
+        widen(afl, key);
     return false;
 }
 
@@ -217,7 +339,7 @@ void incode_afl_open(struct incode_afl *afl, uint32_t key, uint32_t b,
 {
     uint32_t i = take_node(afl);
     struct incode_afl_node *node = &afl->nodes[i];
-    uint32_t *head = head_of(afl, key);
+    uint32_t *head = head_of_face(afl, key, b, c);
     *node = (struct incode_afl_node){key, b, c, *head};
     *head = i;
     struct incode_touched *entry =
@@ -244,23 +366,25 @@ void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
 uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit, bool *more)
 {
-    uint32_t taken = 0;
-    uint32_t *link = head_of(afl, v);
+    uint32_t taken = 0, parts = parts_of(afl, v);
     bool pending = false;
     *more = false;
-    while (*link != INCODE_AFL_NIL && !pending) {
-        struct incode_afl_node *node = &afl->nodes[*link];
-        bool held = is_held(afl, *link);
-        if (node->key != v || held || taken == limit) {
-            *more = *more || node->key == v;
-            pending = node->key == v && !held;
-            link = &node->next;
-            continue;
+    for (uint32_t part = 0; part < parts && !pending; part++) {
+        uint32_t *link = head_of(afl, v, part);
+        while (*link != INCODE_AFL_NIL && !pending) {
+            struct incode_afl_node *node = &afl->nodes[*link];
+            bool held = is_held(afl, *link);
+            if (node->key != v || held || taken == limit) {
+                *more = *more || node->key == v;
+                pending = node->key == v && !held;
+                link = &node->next;
+                continue;
+            }
+            pairs[taken][0] = node->b;
+            pairs[taken][1] = node->c;
+            taken++;
+            unlink_node(afl, link);
         }
-        pairs[taken][0] = node->b;
-        pairs[taken][1] = node->c;
-        taken++;
-        unlink_node(afl, link);
     }
     struct incode_touched *entry =
         incode_afl_find(afl, v / INCODE_BRICK_POINTS);
@@ -275,8 +399,9 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
 uint32_t incode_afl_tell(const struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit)
 {
-    uint32_t count = 0, i = *head_of(afl, v);
-    for (; i != INCODE_AFL_NIL && count < limit; i = afl->nodes[i].next) {
+    struct walk walk;
+    uint32_t count = 0, i = walk_begin(afl, v, &walk);
+    for (; i != INCODE_AFL_NIL && count < limit; i = walk_on(afl, &walk, i)) {
         const struct incode_afl_node *node = &afl->nodes[i];
         if (node->key != v || is_held(afl, i))
             continue;
@@ -291,8 +416,9 @@ uint32_t incode_afl_tell(const struct incode_afl *afl, uint32_t v,
 static bool meets_held(struct incode_afl *afl, uint32_t v, uint32_t b,
                        uint32_t c)
 {
-    uint32_t i = *head_of(afl, v);
-    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
+    struct walk walk;
+    uint32_t i = walk_begin(afl, v, &walk);
+    for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i)) {
         const struct incode_afl_node *node = &afl->nodes[i];
         afl->looks++;
         if (node->key == v && is_held(afl, i) &&
@@ -329,9 +455,10 @@ static bool has_vertex(const struct held_vertices *held, uint32_t v)
 static void find_held(struct incode_afl *afl, uint32_t v,
                       struct held_vertices *held)
 {
-    uint32_t i = *head_of(afl, v);
+    struct walk walk;
+    uint32_t i = walk_begin(afl, v, &walk);
     memset(held, 0, sizeof *held);
-    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
+    for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i)) {
         const struct incode_afl_node *node = &afl->nodes[i];
         afl->looks++;
         held->faces += node->key == v;
@@ -356,8 +483,9 @@ uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
 {
     struct held_vertices held;
     find_held(afl, v, &held);
-    uint32_t count = 0, i = *head_of(afl, v);
-    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next) {
+    struct walk walk;
+    uint32_t count = 0, i = walk_begin(afl, v, &walk);
+    for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i)) {
         const struct incode_afl_node *node = &afl->nodes[i];
         afl->looks++;
         if (node->key != v || is_held(afl, i) || may_meet(afl, &held, node))
@@ -382,7 +510,7 @@ uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
 static uint32_t find_face(const struct incode_afl *afl, uint32_t key,
                           uint32_t b, uint32_t c)
 {
-    uint32_t i = *head_of(afl, key);
+    uint32_t i = *head_of_face(afl, key, b, c);
     while (i != INCODE_AFL_NIL &&
            (afl->nodes[i].key != key || afl->nodes[i].b != b ||
             afl->nodes[i].c != c))
@@ -407,8 +535,9 @@ bool incode_afl_is_open(const struct incode_afl *afl, uint32_t key, uint32_t b,
 
 uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v)
 {
-    uint32_t count = 0, i = *head_of(afl, v);
-    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next)
+    struct walk walk;
+    uint32_t count = 0, i = walk_begin(afl, v, &walk);
+    for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i))
         if (afl->nodes[i].key == v && is_held(afl, i) && !is_foreign(afl, i)) {
             let_go(afl, i);
             count++;
@@ -420,8 +549,9 @@ uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v)
 
 void incode_afl_free(struct incode_afl *afl, uint32_t v)
 {
-    uint32_t i = *head_of(afl, v);
-    for (; i != INCODE_AFL_NIL; i = afl->nodes[i].next)
+    struct walk walk;
+    uint32_t i = walk_begin(afl, v, &walk);
+    for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i))
         if (afl->nodes[i].key == v)
             afl->foreign[i / 64] &= ~(UINT64_C(1) << i % 64);
     (void)incode_afl_let_go(afl, v);

@@ -4,7 +4,10 @@
  *
  * Memory: incode_afl_bytes(faces, bricks), fixed.  Work: a toggle looks at the
  * faces of one key vertex and of those that share its hash, constant as long as
- * stars stay bounded (front.h: hubs).
+ * stars stay bounded (front.h: hubs).  A list that grows nevertheless, as where
+ * all hubs are in use, is spread over neighbouring heads by its faces' other
+ * vertices, and a toggle looks at one part of it; INCODE_AFL_WIDE lists can be
+ * at a time, and one that is short again gives way.
  *
  * A face may be held, as it has been asked about elsewhere: it stays open, and
  * its twin closes it as any other, but it is taken no more until it is let go.
@@ -42,6 +45,11 @@ struct incode_afl_node {
     uint32_t key, b, c, next;
 };
 
+enum {
+    INCODE_AFL_CROWD = 224, /* faces: a long list */
+    INCODE_AFL_WIDE = 32    /* lists that are spread, at a time */
+};
+
 struct incode_afl {
     struct incode_afl_node *nodes;
     uint32_t *heads;
@@ -54,6 +62,9 @@ struct incode_afl {
     uint32_t touched_capacity, touched_mask, touched_free, touched_count;
     uint32_t touched_max; /* at a time; entries from here on were never used */
     uint32_t crowded;     /* a vertex with a long list, or INCODE_NONE */
+    uint32_t wide[INCODE_AFL_WIDE]; /* vertices whose lists are spread */
+    uint32_t wide_count, wide_next; /* the next one to be asked to give way */
+    bool still; /* set by who walks the heads: no list is spread meanwhile */
     uint64_t searches, looks; /* for twins; faces looked at, then or to hold */
     const char *fault; /* NULL, or a static string: what the faces that it
                           was given cannot be */
@@ -61,8 +72,6 @@ struct incode_afl {
 };
 
 #define INCODE_AFL_NIL UINT32_MAX
-
-enum { INCODE_AFL_CROWD = 224 }; /* faces: a long list */
 
 static inline bool incode_touched_used(const struct incode_touched *entry)
 {

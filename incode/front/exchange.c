@@ -303,12 +303,14 @@ static uint64_t all_of(const struct incode_front *front, uint32_t brick)
     return ~UINT64_C(0) >> (INCODE_BRICK_POINTS - count);
 }
 
-static void begin_sweep(struct incode_exchange *e)
+static void begin_sweep(struct incode_front *front)
 {
+    struct incode_exchange *e = &front->exchange;
     e->sweep++;
     e->sweeping = true;
     e->sweep_head = e->sweep_entry = 0;
     e->changes = 0;
+    front->afl.still = true;
 }
 
 /* Whether all that is known of an own brick is at hand.  Faces wait with their
@@ -354,8 +356,9 @@ static void sweep_entries(struct incode_front *front)
 static enum incode_turn sweep_on(struct incode_front *front)
 {
     struct incode_exchange *e = &front->exchange;
-    const struct incode_afl *afl = &front->afl;
+    struct incode_afl *afl = &front->afl;
     if (e->sweep_head > afl->mask) {
+        afl->still = false;
         sweep_entries(front);
         return INCODE_TURN_WORKED;
     }
@@ -542,7 +545,7 @@ static enum incode_turn next_of_all(struct incode_front *front, uint32_t *which)
         return INCODE_TURN_WAIT;
     }
     if (e->changes > 0) {
-        begin_sweep(e);
+        begin_sweep(front);
         return INCODE_TURN_WORKED;
     }
     if (e->left == 0)
@@ -565,7 +568,7 @@ enum incode_turn incode_exchange_next(struct incode_front *front,
     if (e->sweeping)
         return sweep_on(front);
     if (e->changes / SWEEP_SHARE > front->afl.count + SWEEP_LEAST) {
-        begin_sweep(e);
+        begin_sweep(front);
         return INCODE_TURN_WORKED;
     }
     enum found found = next_own(front, &v);

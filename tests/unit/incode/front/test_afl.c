@@ -338,6 +338,46 @@ static void held_of_a_long_list(void **unused)
     free(memory);
 }
 
+/* Where hubs do not help, one vertex after another gets thousands of faces: a
+ * search looks at few of them, as do all that close them; and take, tell and
+ * let go miss none. */
+static void searches_of_long_lists(void **unused)
+{
+    (void)unused;
+    enum { MANY = 6000, VERTICES = 3 * INCODE_AFL_WIDE, LIMIT = 96 };
+    struct incode_afl afl;
+    static uint32_t pairs[MANY][2];
+    void *memory = malloc(incode_afl_bytes(2 * MANY, BRICKS));
+    assert_non_null(memory);
+    incode_afl_init(&afl, memory, 2 * MANY, BRICKS);
+    for (uint32_t v = 0; v < VERTICES; v++) {
+        uint64_t looks = afl.looks;
+        for (uint32_t i = 0; i < MANY; i++)
+            incode_afl_toggle(&afl, v, 100 + i, 101 + i);
+        assert_int_equal(incode_afl_tell(&afl, v, pairs, MANY), MANY);
+        for (uint32_t i = 0; i < MANY; i += 2)
+            assert_true(incode_afl_hold_face(&afl, v, 100 + i, 101 + i));
+        assert_int_equal(incode_afl_tell(&afl, v, pairs, MANY), MANY / 2);
+        assert_int_equal(incode_afl_let_go(&afl, v), MANY / 2);
+        for (uint32_t i = LIMIT; i < MANY; i++)
+            incode_afl_toggle(&afl, v, 101 + i, 100 + i);
+        assert_in_range(afl.looks - looks, 0, 150 * MANY);
+        bool more;
+        /* Some stay a while. */
+        assert_int_equal(incode_afl_take(&afl, v, pairs, LIMIT - 40, &more),
+                         LIMIT - 40);
+        assert_true(more);
+    }
+    for (uint32_t v = 0; v < VERTICES; v++) {
+        bool more;
+        assert_int_equal(incode_afl_take(&afl, v, pairs, MANY, &more), 40);
+        assert_false(more);
+    }
+    assert_int_equal(afl.count, 0);
+    assert_null(afl.fault);
+    free(memory);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -345,6 +385,7 @@ int main(void)
         cmocka_unit_test(full),
         cmocka_unit_test(crowded),
         cmocka_unit_test(held_of_a_long_list),
+        cmocka_unit_test(searches_of_long_lists),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
