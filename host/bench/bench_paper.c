@@ -124,6 +124,15 @@ int host_bench_paper(const struct host_paper_options *options,
                          "--help",
                          options->strategy);
     }
+    if (options->svg != NULL &&
+        (options->tables == NULL || among(options->tables, "11")
+             ? host_paper_can_draw(options->svg, error)
+             : host_fail(
+                   error, HOST_USAGE,
+                   "--svg: goes with table 11; name it, or leave --svg out")) !=
+            0) {
+        return error->code;
+    }
     struct host_paper_bench *bench = calloc(1, sizeof *bench);
     if (bench == NULL) {
         return host_fail_memory(error, "the tables");

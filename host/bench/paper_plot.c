@@ -140,11 +140,37 @@ static int draw(struct host_paper_bench *bench, FILE *plot,
     return error->code;
 }
 
+/* gnuplot, with these as its standard input and output: as waitpid has it, or
+ * -1. */
+static int gnuplot(const char *word, int in, int out)
+{
+    int status = 0;
+    pid_t child = fork();
+    if (child == 0) {
+        (void)dup2(in, STDIN_FILENO);
+        (void)dup2(out, STDOUT_FILENO);
+        (void)execlp("gnuplot", "gnuplot", word, (char *)NULL);
+        _exit(127);
+    }
+    return child < 0 || waitpid(child, &status, 0) < 0 ? -1 : status;
+}
+
+int host_paper_can_draw(const char *path, struct host_error *error)
+{
+    int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
+    int status = nothing < 0 ? -1 : gnuplot("--version", nothing, nothing);
+    (void)close(nothing);
+    return status == 0 ? 0
+                       : host_fail(error, HOST_INPUT,
+                                   "%s: gnuplot is not installed; install "
+                                   "gnuplot-nox, or leave --svg out",
+                                   path);
+}
+
 /* With its standard input from the script and its output to the file, whose
  * name may have any letters. */
 static int run_gnuplot(FILE *script, const char *path, struct host_error *error)
 {
-    int status = 0;
     (void)fflush(script);
     rewind(script);
     int out = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -152,18 +178,12 @@ static int run_gnuplot(FILE *script, const char *path, struct host_error *error)
         return host_fail(error, HOST_INPUT, "%s: %s; choose another file", path,
                          strerror(errno));
     }
-    pid_t child = fork();
-    if (child == 0) {
-        (void)dup2(fileno(script), STDIN_FILENO);
-        (void)dup2(out, STDOUT_FILENO);
-        (void)execlp("gnuplot", "gnuplot", "-", (char *)NULL);
-        _exit(127);
-    }
+    int status = gnuplot("-", fileno(script), out);
     (void)close(out);
-    if (child < 0 || waitpid(child, &status, 0) < 0 || status != 0) {
+    if (status != 0) {
         (void)unlink(path);
         return host_fail(error, HOST_BROKEN,
-                         "%s: gnuplot does not draw it; install gnuplot-nox",
+                         "%s: gnuplot does not draw it; see what it says",
                          path);
     }
     return 0;

@@ -459,11 +459,11 @@ static int check_together(const struct parse *p)
         {KEY_CLUSTER, (heeds & HOST_SHARING_CLUSTER) == 0,
          "--cluster: goes with a strategy of clusters alone, as hybrid"},
         {KEY_BUILDERS, (heeds & HOST_SHARING_BUILDERS) == 0,
-         "--builders: goes with a strategy of face managers alone"},
+         "--builders: goes with strategies that lend lists of faces"},
         {KEY_FACES_PER_JOB, (heeds & HOST_SHARING_LISTS) == 0,
-         "--faces-per-job: goes with a strategy of face managers alone"},
+         "--faces-per-job: goes with strategies that lend lists of faces"},
         {KEY_JOBS_PER_WORKER, (heeds & HOST_SHARING_LISTS) == 0,
-         "--jobs-per-worker: goes with a strategy of face managers alone"}};
+         "--jobs-per-worker: goes with strategies that lend lists of faces"}};
     for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
         if (options[i].vain && given(p, options[i].key)) {
             return host_fail(p->error, HOST_USAGE, "%s; leave it out",

@@ -79,11 +79,15 @@ check paper/prices 'no prices fitted to runs' \
 check paper/error 'no error of the model on two nodes' \
     grep -qE '^Uniform +2000 +2 .* %.* %$' "$scratch/said"
 
+refuses paper/svg-alone 2 "goes with table 11" \
+    incode bench paper --quick --table 2 --svg "$scratch/2.svg"
 if command -v gnuplot > /dev/null; then
     succeeds paper/figure paper "$scratch/figure.csv" --table 11 \
         --svg "$scratch/figure.svg"
     check paper/svg 'no curves in the figure' \
         grep -q '<path' "$scratch/figure.svg"
 else
+    refuses paper/no-gnuplot 3 "gnuplot is not installed" \
+        incode bench paper --quick --svg "$scratch/f.svg"
     skip paper/svg 'gnuplot is not installed: make bench installs it'
 fi
