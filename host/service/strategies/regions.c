@@ -7,23 +7,25 @@
  * the next; but each has a border, which is worked on from both sides. */
 enum { PIECES = 2 };
 
-/* Measured in runs of two nodes.  One node alone inserts points where what is
- * not final of them fits it: about 8 n^(2/3) tetrahedra of a volume, of 38
- * bytes, in half of its memory; what of a surface is open is known to fit.
- * Beside that, surfaces, stretched grids and lattices take three times as long
- * and more face by face; and where one alone goes face by face, too, several
- * hold each other up for pages.
- */
+/* Measured in runs of two nodes.  One node alone inserts points faster than
+ * faces are found as long as what is not final takes little memory: about
+ * 8 n^(2/3) tetrahedra of a volume, of 38 bytes, up to a fifth of it; what of a
+ * surface is open is known to fit.  Beside that, surfaces, stretched grids and
+ * lattices take three times as long and more face by face.  Where one alone
+ * goes face by face, too, several hold each other up for pages, if a node
+ * cannot hold the points of all. */
 static double regions_total(const struct host_task *task)
 {
+    enum { POINT_BYTES = 32 };
     double open = 8 * 38 * pow((double)task->points, 2.0 / 3);
+    bool holds_all = task->points <= task->memory / POINT_BYTES;
     if (!task->by_points) {
-        return task->uneven ? 1.7 : 1.05;
+        return !task->uneven ? 1.05 : holds_all ? 1.2 : 1.7;
     }
     if (task->uneven) {
         return 3.0;
     }
-    return open <= (double)task->memory / 2 ? 1.5 : 1.05;
+    return open <= (double)task->memory / 5 ? 1.5 : 1.05;
 }
 
 /* A surface has more of its tetrahedra at borders than a volume. */
