@@ -86,6 +86,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
     s->probing = s->probe;
     s->probe = false;
     s->work.living = s->up = s->ready = 0;
+    s->work.goes_round = cube_wiring(s->cube)->dead_count > 0;
     s->began_us = s->searching ? s->began_us : now_us;
     s->news_us = s->ping_us = now_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {

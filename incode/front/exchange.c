@@ -541,7 +541,7 @@ static enum incode_turn next_of_all(struct incode_front *front, uint32_t *which)
         return INCODE_TURN_WAIT;
     /* What comes back and does not fit goes again: not for ever. */
     if (e->fetched <= front->bricks && incode_front_fetch(front)) {
-        e->fetched++;
+        e->fetched += front->unspill_pending; /* else there is no room to ask */
         return INCODE_TURN_WAIT;
     }
     if (e->changes > 0) {

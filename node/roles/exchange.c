@@ -16,6 +16,7 @@ struct exchange {
     struct node_shares shares;
     struct node_lending lending;
     uint64_t received; /* of others */
+    bool holds;        /* back what has come of them */
     struct node_waves waves;
     struct node_loans loans;
 };
@@ -128,8 +129,12 @@ static bool exchange_may_take(void *self, const struct cube_message *message)
 {
     struct exchange *e = self;
     uint32_t count = message->size / sizeof(struct node_shared);
-    return message->type != NODE_SHARE ||
-           incode_triangulator_may_take(e->triangulation.triangulator, count);
+    if (message->type != NODE_SHARE) {
+        return true;
+    }
+    e->holds =
+        !incode_triangulator_may_take(e->triangulation.triangulator, count);
+    return !e->holds;
 }
 
 static void exchange_message(void *self, const struct cube_message *message,
@@ -203,7 +208,7 @@ static unsigned exchange_work(void *self, struct node_pace *pace)
 
 static bool is_quiet(const struct exchange *e)
 {
-    return e->shares.used == 0 &&
+    return e->shares.used == 0 && !e->holds &&
            incode_triangulator_is_quiet(e->triangulation.triangulator);
 }
 

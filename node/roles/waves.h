@@ -12,7 +12,7 @@
  *
  * A tetrahedron that was sent and does not come, although no link has lost it,
  * would have waves go round for ever.  Links may be slow, but the nodes answer
- * waves meanwhile, and each looks at all of its links before it does; so where
+ * waves meanwhile, and each takes what has come before it does; so where
  * the sums have differed and not changed for NODE_WAVES_UNCHANGED waves and for
  * NODE_WAVES_UNCHANGED_US, which no living link keeps a frame for, it is a
  * fault.  One of the two is not enough: waves are quick where links are, and a

@@ -23,11 +23,12 @@ static struct host_cost cost(const struct host_task *task)
     return (struct host_cost){1.08 * cost.busiest, 1.08 * cost.total};
 }
 
-/* In this generation: nobody is lost, and nothing is done that the others would
- * have to know. */
+/* In this generation: nobody is lost, nothing is done that the others would
+ * have to know, and each message has its e-cube way, or one that is held back
+ * could hold up the way to the host. */
 static bool exchanges(const struct host_work *work)
 {
-    return work->living == work->nodes &&
+    return work->living == work->nodes && !work->goes_round &&
            (work->ledger == NULL || work->ledger->committed == 0);
 }
 

@@ -48,6 +48,7 @@ struct host_work {
     unsigned nodes;  /* of the cube */
     unsigned living; /* of them, those that are not lost */
     bool *lost;      /* [nodes]: not in this generation */
+    bool goes_round; /* links that are dead: no message has its own way */
     const struct host_order *order;
     struct host_ledger *ledger;
     struct host_tetrahedra *tets; /* that have come, of vertex numbers */

@@ -219,12 +219,51 @@ static void waits_for_room(void **unused)
     host_points_free(&points);
 }
 
+static bool not_now(void *context, uint32_t brick)
+{
+    (void)context, (void)brick;
+    return false;
+}
+
+/* A node that cannot ask for what is spilled, however long, is not quiet. */
+static void waits_to_ask(void **unused)
+{
+    (void)unused;
+    struct host_points points = {0};
+    struct host_error error = {0};
+    static struct several all;
+    all =
+        (struct several){.seed = 7, .solo = {.index = INCODE_KD, .regions = 2}};
+    if (host_gen("uniform", 900, 7, &points, &error) != 0)
+        fail_msg("%s", error.text);
+    several_open(&all, points.xyz, points.count);
+    struct solo *solo = &all.node[1].solo;
+    struct incode_front *front = &solo->t->front;
+    const struct incode_front_outside outside = front->outside;
+    while (!incode_triangulator_is_quiet(solo->t))
+        (void)solo_step(solo, 1);
+    front->outside.unspill = not_now;
+    front->spill_from = front->bricks - 1; /* as if the last were away */
+    front->exchange.quiet = false;
+    for (uint32_t i = 0; i < 2 * front->bricks + 2; i++) {
+        (void)solo_step(solo, 1);
+        assert_false(incode_triangulator_is_quiet(solo->t));
+    }
+    front->outside = outside;
+    front->spill_from = front->bricks;
+    several_work(&all);
+    several_gather(&all);
+    several_close(&all);
+    host_points_free(&points);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(made_sets),      cmocka_unit_test(degenerate_sets),
         cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),
         cmocka_unit_test(twice),          cmocka_unit_test(waits_for_room),
+        cmocka_unit_test(waits_to_ask),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

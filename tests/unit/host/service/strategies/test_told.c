@@ -83,6 +83,9 @@ static void test_exchange(void **unused)
     assert_int_equal(s->check(NODES, &work.sharing, INCODE_FACE_PAPER, &error),
                      HOST_USAGE);
     work.write_to_all = write_to_all;
+    work.goes_round = true; /* dead links */
+    assert_string_equal(roles(s), "wwww");
+    work.goes_round = false;
     assert_string_equal(roles(s), "eeee");
     s->set_up(&work, 1, &setup);
     assert_int_equal(s->owner_rule, INCODE_OWNER_LOWEST);
