@@ -77,8 +77,10 @@ bool incode_front_lend_run(struct incode_front *front, struct incode_loan *loan)
     loan->first = front->job.first;
     loan->last = front->job.last;
     loan->count = 0;
-    while (left > 0 && loan->count < INCODE_LOAN_FACES &&
-           farthest(&front->exchange, &end)) {
+    for (uint32_t i = 0;
+         i < LOOK_BRICKS && left > 0 && loan->count < INCODE_LOAN_FACES &&
+         farthest(&front->exchange, &end);
+         i++) {
         uint32_t brick = front->job.last - 1 - end;
         uint64_t vertices = incode_exchange_pending(front, brick);
         for (; vertices != 0 && left > 0 && loan->count < INCODE_LOAN_FACES;

@@ -23,7 +23,7 @@ enum {
     SHOWN = 256,    /* cells looked at as a unit of work */
     LARGE = 32,     /* a cavity of more than such a part of the cells */
     FEW = 128,      /* cells: looking at all is better than a search */
-    LEAST_SHARE = 3 /* of the cells must be final */
+    LEAST_SHARE = 8 /* of the cells must be final */
 };
 
 /* Marks of cells: INCODE_CELL_PROVED. */

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "incode/predicates/check.h"
+
 #include "node/arena.h"
 
 /* ---- sets of nodes ---- */
@@ -43,6 +45,7 @@ static uint16_t nearest(const struct node_loans *l, const uint64_t *set,
     uint32_t k = 1;
     while (has(set, self ^ k) != in) {
         k++;
+        INCODE_ASSERT(k < l->nodes);
     }
     return (uint16_t)(self ^ k);
 }

@@ -268,6 +268,7 @@ static void test_hybrid(void **unused)
         commit_all(s, i, &job);
     }
     assert_int_equal(ledger.committed, order.bricks);
+    end();
     /* A lost manager is followed by its first builder, */
     begin(s);
     lose(s, 0);
