@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-
 #include "node/arena.h"
 
 /* ---- sets of nodes ---- */
