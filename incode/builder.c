@@ -28,7 +28,8 @@ size_t incode_builder_min(uint32_t lists)
 
 void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
                          const struct incode_setup *setup, uint32_t lists,
-                         const struct incode_page_source *source)
+                         const struct incode_page_source *source,
+                         const struct incode_pause *pause)
 {
     INCODE_ASSERT(lists >= 1 && lists <= INCODE_LISTS_MAX);
     INCODE_ASSERT(bytes >= incode_builder_min(lists));
@@ -48,6 +49,7 @@ void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
         b->lent[i].born = 0;
     incode_maker_init(&b->maker, (uint8_t *)memory + places, &share, &points,
                       source);
+    b->maker.counts.tally.pause = *pause;
 }
 
 /* ---- lists ---- */
@@ -286,16 +288,17 @@ void incode_builder_statistics(const struct incode_builder *b,
     const struct incode_pager *pager = &maker->pager;
     size_t unused =
         (pager->frame_count - pager->frames_used) * sizeof(struct incode_frame);
-    *s =
-        (struct incode_statistics){.tetrahedra_built = b->built,
-                                   .make_tetra_calls = maker->counts.calls,
-                                   .candidates = maker->counts.candidates,
-                                   .tree_searches = maker->counts.tree_searches,
-                                   .page_requests = pager->requests,
-                                   .page_faults = b->faults,
-                                   .page_evictions = pager->evictions,
-                                   .memory_high_water = b->bytes - unused,
-                                   .tally = maker->counts.tally};
+    *s = (struct incode_statistics){
+        .tetrahedra_built = b->built,
+        .make_tetra_calls = maker->counts.calls,
+        .candidates = maker->counts.candidates,
+        .tree_searches = maker->counts.tree_searches,
+        .page_requests = pager->requests,
+        .page_faults = b->faults,
+        .page_evictions = pager->evictions,
+        .memory_high_water = b->bytes - unused,
+        .tally = {maker->counts.tally.exact_orient3d,
+                  maker->counts.tally.exact_in_sphere}};
     memcpy(s->candidates_histogram, maker->counts.histogram,
            sizeof s->candidates_histogram);
 }

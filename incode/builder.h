@@ -6,7 +6,7 @@
  * with their answers, and page frames.  Work: a step goes on with one list, as
  * far as a page that is missing, or the units that it is allowed.
  *
- *     incode_builder_init(&builder, memory, bytes, &setup, 2, &source);
+ *     incode_builder_init(&builder, memory, bytes, &setup, 2, &source, &pause);
  *     incode_builder_take(&builder, &list);   // while it has room
  *     while (incode_builder_answers(&builder) == NULL)
  *         if (incode_builder_step(&builder, 100) == INCODE_WAITING)
@@ -49,10 +49,12 @@ struct incode_builder {
 size_t incode_builder_min(uint32_t lists);
 
 /* memory: aligned to 64 bytes, at least incode_builder_min(lists) of it; lists:
- * at a time, 1 to INCODE_LISTS_MAX.  setup: sound. */
+ * at a time, 1 to INCODE_LISTS_MAX.  setup: sound.  pause: who is called while
+ * a step is long. */
 void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
                          const struct incode_setup *setup, uint32_t lists,
-                         const struct incode_page_source *source);
+                         const struct incode_page_source *source,
+                         const struct incode_pause *pause);
 
 /* Takes a list, of which incode_list_bytes are read; false: there is no room
  * for it.  What is no list is a fault. */

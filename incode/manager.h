@@ -10,7 +10,7 @@
  * list looks at the bricks of the window, or at all that are touched when the
  * own ones are passed.
  *
- *     incode_manager_init(&manager, memory, bytes, &setup, &outside);
+ *     incode_manager_init(&manager, memory, bytes, &setup, &outside, &pause);
  *     incode_manager_start(&manager, &job);
  *     while (incode_manager_step(&manager, 100) != INCODE_FINISHED)
  *         if (incode_manager_lend(&manager, 32, &list) > 0)
@@ -26,6 +26,7 @@
 enum { INCODE_COUNTS = 64 /* bricks whose points are known, at most */ };
 
 struct incode_manager {
+    struct incode_pause pause;
     struct incode_front front;
     size_t bytes;                        /* of the active face list */
     struct incode_answers taken;         /* at work, */
@@ -46,10 +47,12 @@ struct incode_manager {
 size_t incode_manager_min(void);
 
 /* memory: aligned to 64 bytes, at least incode_manager_min() of it.  setup:
- * sound, and of the face rule `own`, as the other one asks for points. */
+ * sound, and of the face rule `own`, as the other one asks for points.  pause:
+ * who is called while a step is long. */
 void incode_manager_init(struct incode_manager *m, void *memory, size_t bytes,
                          const struct incode_setup *setup,
-                         const struct incode_front_outside *outside);
+                         const struct incode_front_outside *outside,
+                         const struct incode_pause *pause);
 
 /* Begins a job; no list may be out. */
 void incode_manager_start(struct incode_manager *m,

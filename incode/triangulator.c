@@ -97,8 +97,11 @@ incode_triangulator_init(void *arena, size_t bytes,
     size_t maker = incode_maker_bytes(&shares.maker);
     incode_maker_init(&t->maker, t->arena, &shares.maker, &points,
                       &outside->pages);
+    t->maker.counts.tally.pause = outside->pause;
+    incode_maker_breathe(&t->maker, INCODE_PAUSE_UNITS);
     incode_front_init(&t->front, t->arena + maker, &shares.front, setup->bricks,
-                      (enum incode_face_rule)setup->face_rule, &outside->front);
+                      (enum incode_face_rule)setup->face_rule, &outside->front,
+                      &t->maker.counts.tally.pause);
     t->front.owner_rule = (enum incode_owner_rule)setup->owner_rule;
     if (outside->peers.share != NULL)
         incode_front_exchange(&t->front, &outside->peers, setup->lo,
@@ -204,7 +207,12 @@ size_t incode_triangulator_copy(const struct incode_triangulator *t,
 
 bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
 {
-    return incode_maker_fetch(&t->maker, page);
+    /* No step of this node's own lets go what the shuffle keeps back. */
+    while (t->phase == INCODE_PHASE_IDLE &&
+           incode_pager_release(&t->maker.pager, true)) {
+    }
+    return incode_pager_has(&t->maker.pager, page) ||
+           incode_maker_fetch(&t->maker, page);
 }
 
 uint32_t incode_triangulator_awaited(const struct incode_triangulator *t)
@@ -547,7 +555,8 @@ void incode_triangulator_statistics(const struct incode_triangulator *t,
         .afl_max = front->afl.count_max,
         .afl_spilled = front->counts.spilled,
         .memory_high_water = incode_arena_high_water(t),
-        .tally = maker->counts.tally};
+        .tally = {maker->counts.tally.exact_orient3d,
+                  maker->counts.tally.exact_in_sphere}};
     memcpy(s->candidates_histogram, maker->counts.histogram,
            sizeof s->candidates_histogram);
 }

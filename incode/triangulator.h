@@ -93,6 +93,8 @@ struct incode_outside {
      * owner rule is the lowest and face rule `own`; share = NULL: there are
      * none. */
     struct incode_front_peers peers;
+    /* Who is called while a step is long; look = NULL: nobody. */
+    struct incode_pause pause;
 };
 
 /* The memory map, in bytes but for the three counts.  control, frames, afl and
@@ -120,7 +122,9 @@ struct incode_statistics {
     uint64_t afl_max, afl_spilled;
     uint64_t memory_high_water; /* bytes of the arena ever in use: with faces,
                                    all but frames that never were */
-    struct incode_tally tally;
+    struct {
+        uint64_t exact_orient3d, exact_in_sphere;
+    } tally;                           /* as incode_tally counts them */
     uint64_t candidates_histogram[24]; /* calls by log2 of candidates, half
                                           octaves */
 };

@@ -9,7 +9,8 @@
  * Memory: given by its owner, 32 bytes a point and 32 a cell, of which there
  * are some 7 a point; 40 KB of stack.  Work: an insertion walks to the point
  * from a cell near by, and looks at the cells that give way and at those around
- * them; there may be as many as there are.
+ * them; there may be as many as there are.  It breathes
+ * (incode/predicates/pause.h).
  *
  *     incode_complex_init(&x, memory, bytes);
  *     v = incode_complex_add(&x, p, id);   // four of them, and others
@@ -112,7 +113,8 @@ bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
  * that is inserted later.  Vertices that have no cell left are forgotten, and
  * their places taken by points that are added; so is what is no vertex yet.
  * n[0] and the points' `cell` may have been used for lists before. */
-void incode_complex_release(struct incode_complex *x);
+void incode_complex_release(struct incode_complex *x,
+                            struct incode_pause *pause);
 
 /* Inserts a point that is no vertex yet, and is none of theirs, from the vertex
  * `near` on, best one near by.  False: there is no room, or the same point is a

@@ -10,7 +10,10 @@
  * boundary. */
 #define NEW (UINT32_C(1) << 23)
 
-enum { BATCH = 64 /* spheres at a time */ };
+enum {
+    BATCH = 32, /* spheres at a time */
+    BATCH_UNITS = BATCH / INCODE_SPHERE_BATCH * INCODE_SPHERE_UNITS
+};
 
 /* In a cell that gives way, instead of its sphere: the next of the list. */
 static uint32_t next_of(const struct incode_cell *c)
@@ -35,6 +38,7 @@ static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
     set_next(c, INCODE_NONE);
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
         c = incode_complex_cell(x, at);
+        incode_breathe(&tally->pause, 4);
         for (unsigned i = 0; i < 4; i++) {
             uint32_t next = c->n[i].cell;
             struct incode_cell *n = incode_complex_cell(x, next);
@@ -54,13 +58,15 @@ static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
 }
 
 /* Takes the marks away and brings the spheres back. */
-static void forget(struct incode_complex *x, uint32_t first)
+static void forget(struct incode_complex *x, struct incode_pause *pause,
+                   uint32_t first)
 {
     uint32_t next;
     for (uint32_t at = first; at != INCODE_NONE; at = next) {
         struct incode_cell *c = incode_complex_cell(x, at);
         unsigned proved = incode_cell_proved(c);
         next = next_of(c);
+        incode_breathe(pause, INCODE_SPHERE_UNITS);
         incode_complex_set_spheres(x, c->v[3], &at, 1);
         incode_cell_set_proved(c, proved);
         for (unsigned i = 0; i < 4; i++)
@@ -69,12 +75,14 @@ static void forget(struct incode_complex *x, uint32_t first)
 }
 
 /* Puts a cell between each facet of the boundary and the new point. */
-static void fill(struct incode_complex *x, uint32_t first, uint32_t v)
+static void fill(struct incode_complex *x, struct incode_pause *pause,
+                 uint32_t first, uint32_t v)
 {
     struct incode_cell *c;
     uint32_t some[BATCH], count = 0;
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
         c = incode_complex_cell(x, at);
+        incode_breathe(pause, 1);
         for (unsigned i = 0; i < 4; i++) {
             struct incode_cell *n = incode_complex_cell(x, c->n[i].cell);
             if (incode_cell_mark(n) != INCODE_CELL_STAYS)
@@ -93,11 +101,13 @@ static void fill(struct incode_complex *x, uint32_t first, uint32_t v)
             x->point[v].cell = new;
             some[count++] = new;
             if (count == BATCH) {
+                incode_breathe(pause, BATCH_UNITS);
                 incode_complex_set_spheres(x, v, some, count);
                 count = 0;
             }
         }
     }
+    incode_breathe(pause, BATCH_UNITS);
     incode_complex_set_spheres(x, v, some, count);
 }
 
@@ -105,8 +115,9 @@ static void fill(struct incode_complex *x, uint32_t first, uint32_t v)
  * gives way, at facet j, without its vertices i and j: around the edge, through
  * the cells that give way.  `pivot`, beside the edge, is what the next cell is
  * left opposite to. */
-static uint32_t around_edge(const struct incode_complex *x, uint32_t at,
-                            unsigned i, unsigned j)
+static uint32_t around_edge(const struct incode_complex *x,
+                            struct incode_pause *pause, uint32_t at, unsigned i,
+                            unsigned j)
 {
     const struct incode_cell *c = incode_complex_cell(x, at);
     uint32_t next = c->n[i].cell;
@@ -114,6 +125,7 @@ static uint32_t around_edge(const struct incode_complex *x, uint32_t at,
     while ((next & NEW) == 0) {
         const struct incode_cell *d = incode_complex_cell(x, next);
         unsigned back = 0;
+        incode_breathe(pause, 1);
         while (d->n[back].cell != at)
             back++;
         at = next;
@@ -124,7 +136,8 @@ static uint32_t around_edge(const struct incode_complex *x, uint32_t at,
 }
 
 /* Joins the new cells to each other. */
-static void join(struct incode_complex *x, uint32_t first)
+static void join(struct incode_complex *x, struct incode_pause *pause,
+                 uint32_t first)
 {
     const struct incode_cell *c;
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
@@ -134,9 +147,11 @@ static void join(struct incode_complex *x, uint32_t first)
                 continue;
             struct incode_cell *d = incode_complex_cell(x, c->n[j].cell & ~NEW);
             incode_cell_unmark(incode_complex_cell(x, d->n[3].cell));
+            incode_breathe(pause, 1);
             for (unsigned k = 0; k < 3; k++)
-                incode_cell_join(
-                    d, k, around_edge(x, at, incode_cell_index(c, d->v[k]), j));
+                incode_cell_join(d, k,
+                                 around_edge(x, pause, at,
+                                             incode_cell_index(c, d->v[k]), j));
         }
     }
 }
@@ -146,17 +161,19 @@ incode_complex_insert_large(struct incode_complex *x,
                             struct incode_tally *tally, uint32_t v,
                             uint32_t first)
 {
+    struct incode_pause *pause = &tally->pause;
     uint32_t facets = find(x, tally, x->point[v].p, first);
     if (!incode_complex_has_room(x, 0, facets)) {
-        forget(x, first);
+        forget(x, pause, first);
         return INCODE_CAVITY_FULL;
     }
-    fill(x, first, v);
-    join(x, first);
+    fill(x, pause, first, v);
+    join(x, pause, first);
     /* What gave way is free. */
     uint32_t next;
     for (uint32_t at = first; at != INCODE_NONE; at = next) {
         next = next_of(incode_complex_cell(x, at));
+        incode_breathe(pause, 1);
         incode_complex_free_cell(x, at);
     }
     return INCODE_CAVITY_FILLED;
@@ -191,6 +208,7 @@ static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
     *were += disprove(incode_complex_cell(x, first));
     while (i < 4 || at != first) {
         const struct incode_cell *c = incode_complex_cell(x, at);
+        incode_breathe(&tally->pause, 1);
         if (i == 4) {
             uint32_t before = c->n[c->n[3].low].cell;
             i = side_of(incode_complex_cell(x, before), at) + 1;

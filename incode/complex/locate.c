@@ -64,7 +64,8 @@ bool incode_complex_gives_way(const struct incode_complex *x,
 /* From a finite cell downhill: to the neighbour of which p has the least power,
  * as computed, as long as that decreases.  The facet between two spheres is in
  * the plane where their powers are equal, so downhill is towards p. */
-static uint32_t descend(const struct incode_complex *x, uint32_t at,
+static uint32_t descend(const struct incode_complex *x,
+                        struct incode_tally *tally, uint32_t at,
                         const double p[3], bool *found)
 {
     double bound, least;
@@ -73,6 +74,7 @@ static uint32_t descend(const struct incode_complex *x, uint32_t at,
     *found = least < -bound;
     while (!*found) {
         uint32_t next = INCODE_NONE;
+        incode_breathe(&tally->pause, 3);
         for (unsigned i = 0; i < 4; i++) {
             const struct incode_cell *n = incode_complex_cell(x, c->n[i].cell);
             double t = incode_sphere_power(x->point, n, p, &bound);
@@ -105,6 +107,7 @@ static uint32_t walk(const struct incode_complex *x, struct incode_tally *tally,
         const struct incode_cell *c = incode_complex_cell(x, at);
         if (incode_cell_is_infinite(c))
             return at;
+        incode_breathe(&tally->pause, 4);
         bool barred = false;
         for (unsigned i = 0; i < 4 && next == INCODE_NONE; i++) {
             if (c->n[i].cell == before || orient_with(x, tally, c, i, p) >= 0)
@@ -129,6 +132,7 @@ static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
     x->scans++;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
+        incode_breathe(&tally->pause, 1);
         if (!incode_cell_is_free(c) &&
             incode_cell_proved(c) != INCODE_CELL_FINAL &&
             incode_complex_gives_way(x, tally, c, p))
@@ -138,13 +142,16 @@ static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
 }
 
 /* The vertex nearest to p, up to rounding; INFINITE: squares overflow. */
-static uint32_t nearest(const struct incode_complex *x, const double p[3])
+static uint32_t nearest(const struct incode_complex *x,
+                        struct incode_tally *tally, const double p[3])
 {
     uint32_t best = INFINITE;
     double least = __builtin_inf();
     for (uint32_t v = 1; v < x->points; v++) {
         const struct incode_complex_point *q = &x->point[v];
         double square = 0;
+        if (v % 8 == 0)
+            incode_breathe(&tally->pause, 2);
         for (int d = 0; d < 3; d++)
             square += (q->p[d] - p[d]) * (q->p[d] - p[d]);
         if (square < least && q->cell != INCODE_NONE) {
@@ -165,7 +172,7 @@ static uint32_t go(const struct incode_complex *x, struct incode_tally *tally,
     from = i < 4 ? c->n[i].cell : from;
     if (from < INCODE_COMPLEX_CELLS_FIRST)
         return INCODE_NONE;
-    from = descend(x, from, p, &found);
+    from = descend(x, tally, from, p, &found);
     return found ? from : walk(x, tally, from, p);
 }
 
@@ -177,7 +184,7 @@ uint32_t incode_complex_locate(struct incode_complex *x,
 {
     from = go(x, tally, from, p);
     if (from == INCODE_NONE) {
-        uint32_t near = nearest(x, p);
+        uint32_t near = nearest(x, tally, p);
         x->searches++;
         if (near != INFINITE)
             from = go(x, tally, x->point[near].cell, p);

@@ -9,7 +9,10 @@ enum {
     FACETS_MAX = 220,
     POINTS_MAX = FACETS_MAX / 2 + 2,
     SLOTS_MAX = FACETS_MAX + INCODE_SPHERE_BATCH,
-    LOOKED_AT_MAX = INCODE_COMPLEX_CAVITY /* cells */
+    LOOKED_AT_MAX = INCODE_COMPLEX_CAVITY, /* cells */
+    AT_ONCE = 64,                          /* of them in a breath */
+    WRITTEN = 40,                          /* new ones, likewise */
+    WRITTEN_UNITS = WRITTEN / INCODE_SPHERE_BATCH * INCODE_SPHERE_UNITS
 };
 
 struct cavity {
@@ -45,14 +48,49 @@ static void look_around(struct incode_complex *x, struct cavity *cavity,
     cavity->looked_at = count;
 }
 
+/* Tells those of [from, end) that give way. */
+static inline void tell(struct incode_complex *x, struct incode_tally *tally,
+                        const double p[3], uint32_t from, uint32_t end,
+                        struct cavity *cavity)
+{
+    const struct incode_complex_point *point = x->point;
+    struct incode_cell *cell = x->cell;
+    uint32_t gone = cavity->gone;
+    for (uint32_t j = from; j < end; j++) {
+        double bound;
+        struct incode_cell *c = cell - cavity->other[j];
+        double t = incode_sphere_power(point, c, p, &bound);
+        uint32_t goes = t < 0;
+        if (__builtin_expect(!(__builtin_fabs(t) > bound), 0))
+            goes = incode_complex_holds(x, tally, c, p);
+        cavity->cell[gone] = cavity->other[j];
+        gone += goes;
+        c->flags |= (uint8_t)(2 * goes);
+    }
+    cavity->gone = gone;
+}
+
+/* The same of many. */
+static __attribute__((noinline)) void
+tell_many(struct incode_complex *x, struct incode_tally *tally,
+          const double p[3], uint32_t from, struct cavity *cavity)
+{
+    while (from < cavity->looked_at) {
+        uint32_t left = cavity->looked_at - from;
+        uint32_t end = from + (left < AT_ONCE ? left : AT_ONCE);
+        incode_breathe(&tally->pause, AT_ONCE);
+        tell(x, tally, p, from, end, cavity);
+        from = end;
+    }
+}
+
 /* False: too many cells. */
 static bool find(struct incode_complex *x, struct incode_tally *tally,
                  const double at[3], uint32_t first, struct cavity *cavity)
 {
     const double p[3] = {at[0], at[1], at[2]};
-    const struct incode_complex_point *point = x->point;
-    struct incode_cell *cell = x->cell;
-    uint32_t from = 0;
+    uint32_t from = 0, breath = AT_ONCE;
+    incode_breathe(&tally->pause, AT_ONCE);
     cavity->cell[0] = cavity->other[0] = first;
     cavity->gone = cavity->looked_at = 1;
     incode_complex_cell(x, first)->flags |= INCODE_CELL_GOES;
@@ -62,18 +100,12 @@ static bool find(struct incode_complex *x, struct incode_tally *tally,
             return false;
         look_around(x, cavity, from);
         from = gone;
-        for (; j < cavity->looked_at; j++) {
-            double bound;
-            struct incode_cell *c = cell - cavity->other[j];
-            double t = incode_sphere_power(point, c, p, &bound);
-            uint32_t goes = t < 0;
-            if (__builtin_expect(!(__builtin_fabs(t) > bound), 0))
-                goes = incode_complex_holds(x, tally, c, p);
-            cavity->cell[gone] = cavity->other[j];
-            gone += goes;
-            c->flags |= (uint8_t)(2 * goes);
+        if (__builtin_expect(cavity->looked_at <= breath, 1)) {
+            tell(x, tally, p, j, cavity->looked_at, cavity);
+        } else {
+            tell_many(x, tally, p, j, cavity);
+            breath = cavity->looked_at;
         }
-        cavity->gone = gone;
     }
     return true;
 }
@@ -90,9 +122,11 @@ uint32_t incode_complex_find_small(struct incode_complex *x,
     return all ? cavity.gone : INCODE_NONE;
 }
 
-static bool list_facets(const struct incode_complex *x, struct cavity *cavity)
+static bool list_facets(const struct incode_complex *x,
+                        struct incode_pause *pause, struct cavity *cavity)
 {
     uint32_t facets = 0;
+    incode_breathe(pause, cavity->gone / 4);
     for (uint32_t j = 0; j < cavity->gone && facets <= FACETS_MAX; j++) {
         uint32_t at = cavity->cell[j];
         const struct incode_cell *c = incode_complex_cell(x, at);
@@ -206,8 +240,8 @@ static inline void write_one(struct incode_complex *x,
     incode_cell_join(x->cell - fill->outer[f], fill->back[f], fill->cell[f]);
 }
 
-static void write(struct incode_complex *x, struct filling *fill,
-                  uint32_t facets)
+static void write(struct incode_complex *x, struct incode_pause *pause,
+                  struct filling *fill, uint32_t facets)
 {
     enum { BATCH = INCODE_SPHERE_BATCH };
     struct incode_sphere_batch b;
@@ -228,6 +262,8 @@ static void write(struct incode_complex *x, struct filling *fill,
             write_one(x, fill, first + j);
             incode_sphere_keep(x->cell - fill->cell[first + j], &b, j);
         }
+        if (first % WRITTEN == 0)
+            incode_breathe(pause, WRITTEN_UNITS);
     }
 }
 
@@ -239,7 +275,7 @@ incode_complex_insert_small(struct incode_complex *x,
     struct cavity cavity;
     struct filling fill;
     if (!find(x, tally, x->point[v].p, first, &cavity) ||
-        !list_facets(x, &cavity)) {
+        !list_facets(x, &tally->pause, &cavity)) {
         forget(x, &cavity);
         return INCODE_CAVITY_LARGE;
     }
@@ -250,10 +286,11 @@ incode_complex_insert_small(struct incode_complex *x,
         forget(x, &cavity);
         return INCODE_CAVITY_FULL;
     }
+    incode_breathe(&tally->pause, cavity.facets / 4);
     take_cells(x, &cavity, fill.cell);
     see_from(x, &fill, number(x, &cavity, &fill, v), v);
     free_cells(x, &cavity);
-    write(x, &fill, cavity.facets);
+    write(x, &tally->pause, &fill, cavity.facets);
     /* The analyser does not see that a cavity has facets.
      * NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
     x->point[v].cell = fill.cell[0];

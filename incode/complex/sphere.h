@@ -75,7 +75,11 @@ static inline double incode_sphere_power(const struct incode_complex_point *v,
     return square - linear * s;
 }
 
-enum { INCODE_SPHERE_BATCH = 8 };
+enum {
+    INCODE_SPHERE_BATCH = 8,
+    INCODE_SPHERE_UNITS =
+        12 /* of work (incode/predicates/pause.h), that a batch takes */
+};
 
 /* Three vertices of each of some cells, as seen from the fourth, coordinate by
  * coordinate; 1 where a vertex is infinite, with coordinates of 0, else 0; what

@@ -32,10 +32,11 @@ size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks)
 }
 
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
-                     uint32_t bricks)
+                     uint32_t bricks, struct incode_pause *pause)
 {
     INCODE_ASSERT(capacity > 0 && bricks > 0);
     memset(afl, 0, sizeof *afl);
+    afl->pause = pause;
     afl->touched = memory;
     afl->held = (uint64_t *)(void *)(afl->touched + bricks);
     afl->foreign = afl->held + held_words(capacity);
@@ -50,17 +51,38 @@ void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
     incode_afl_clear(afl);
 }
 
+enum { AT_ONCE = 512 /* entries emptied in a breath */ };
+
+static void empty_heads(const struct incode_afl *afl, uint32_t *heads,
+                        uint32_t mask)
+{
+    for (uint32_t from = 0; from <= mask; from += AT_ONCE) {
+        uint32_t left = mask + 1 - from;
+        uint32_t end = from + (left < AT_ONCE ? left : AT_ONCE);
+        incode_afl_breathe(afl, AT_ONCE / INCODE_AFL_BREATH);
+        for (uint32_t i = from; i < end; i++)
+            heads[i] = INCODE_AFL_NIL;
+    }
+}
+
+static void empty_entries(struct incode_afl *afl)
+{
+    uint32_t all = afl->touched_capacity;
+    for (uint32_t from = 0; from < all; from += AT_ONCE) {
+        uint32_t end = from + (all - from < AT_ONCE ? all - from : AT_ONCE);
+        incode_afl_breathe(afl, AT_ONCE / INCODE_AFL_BREATH);
+        for (uint32_t i = from; i < end; i++) {
+            afl->touched[i].brick = INCODE_NONE;
+            afl->touched[i].next = i + 1 < all ? i + 1 : INCODE_AFL_NIL;
+        }
+    }
+}
+
 void incode_afl_clear(struct incode_afl *afl)
 {
-    for (uint32_t i = 0; i <= afl->mask; i++)
-        afl->heads[i] = INCODE_AFL_NIL;
-    for (uint32_t i = 0; i <= afl->touched_mask; i++)
-        afl->touched_heads[i] = INCODE_AFL_NIL;
-    for (uint32_t i = 0; i < afl->touched_capacity; i++) {
-        afl->touched[i].brick = INCODE_NONE;
-        afl->touched[i].next =
-            i + 1 < afl->touched_capacity ? i + 1 : INCODE_AFL_NIL;
-    }
+    empty_heads(afl, afl->heads, afl->mask);
+    empty_heads(afl, afl->touched_heads, afl->touched_mask);
+    empty_entries(afl);
     afl->free = INCODE_AFL_NIL;
     afl->unused = afl->touched_free = 0;
     afl->count = afl->held_count = afl->touched_count = 0;
@@ -166,7 +188,7 @@ static uint32_t *head_of_face(const struct incode_afl *afl, uint32_t key,
 
 /* A walk through the faces of one vertex and those that share their heads. */
 struct walk {
-    uint32_t key, part, parts;
+    uint32_t key, part, parts, looks;
 };
 
 static uint32_t walk_from(const struct incode_afl *afl, struct walk *walk)
@@ -180,13 +202,14 @@ static uint32_t walk_from(const struct incode_afl *afl, struct walk *walk)
 static uint32_t walk_begin(const struct incode_afl *afl, uint32_t key,
                            struct walk *walk)
 {
-    *walk = (struct walk){key, 0, parts_of(afl, key)};
+    *walk = (struct walk){key, 0, parts_of(afl, key), 0};
     return walk_from(afl, walk);
 }
 
 static uint32_t walk_on(const struct incode_afl *afl, struct walk *walk,
                         uint32_t i)
 {
+    incode_afl_breathe_at(afl, ++walk->looks);
     i = afl->nodes[i].next;
     return i != INCODE_AFL_NIL ? i : walk_from(afl, walk);
 }
@@ -201,7 +224,7 @@ static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts)
         while (*link != INCODE_AFL_NIL) {
             uint32_t i = *link;
             struct incode_afl_node *node = &afl->nodes[i];
-            afl->looks++;
+            incode_afl_breathe_at(afl, (uint32_t)afl->looks++);
             if (node->key != key) {
                 link = &node->next;
                 continue;
@@ -213,6 +236,7 @@ static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts)
     }
     while (all != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[all];
+        incode_afl_breathe_at(afl, all);
         uint32_t *head = head_of_face(afl, key, node->b, node->c);
         uint32_t next = node->next;
         node->next = *head;
@@ -302,6 +326,14 @@ static void unlink_node(struct incode_afl *afl, uint32_t *link)
     afl->count--;
 }
 
+/* So many faces of a list have been passed. */
+static __attribute__((noinline)) void breathe_over(const struct incode_afl *afl,
+                                                   uint32_t passed)
+{
+    for (; passed > INCODE_AFL_BREATH; passed -= INCODE_AFL_BREATH)
+        incode_afl_breathe(afl, 1);
+}
+
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                            uint32_t c)
 {
@@ -318,6 +350,8 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                 entry->pending |= is_held(afl, *link) ? bit_of(key) : 0;
             }
             unlink_node(afl, link);
+            if (passed > INCODE_AFL_BREATH)
+                breathe_over(afl, passed);
             return true;
         }
         if (node->key == key && node->b == b && node->c == c) {
@@ -329,6 +363,8 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
     }
     if (passed >= INCODE_AFL_CROWD && afl->crowded == INCODE_NONE)
         afl->crowded = key;
+    if (passed > INCODE_AFL_BREATH)
+        breathe_over(afl, passed);
     if (passed >= 2 * INCODE_AFL_CROWD)
         widen(afl, key);
     return false;
@@ -366,7 +402,7 @@ void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
 uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit, bool *more)
 {
-    uint32_t taken = 0, parts = parts_of(afl, v);
+    uint32_t taken = 0, looks = 0, parts = parts_of(afl, v);
     bool pending = false;
     *more = false;
     for (uint32_t part = 0; part < parts && !pending; part++) {
@@ -374,6 +410,7 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
         while (*link != INCODE_AFL_NIL && !pending) {
             struct incode_afl_node *node = &afl->nodes[*link];
             bool held = is_held(afl, *link);
+            incode_afl_breathe_at(afl, ++looks);
             if (node->key != v || held || taken == limit) {
                 *more = *more || node->key == v;
                 pending = node->key == v && !held;

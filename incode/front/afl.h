@@ -24,6 +24,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "incode/predicates/pause.h"
+
 enum incode_face_state {
     INCODE_FACE_OPEN,
     INCODE_FACE_HELD,
@@ -47,10 +49,12 @@ struct incode_afl_node {
 
 enum {
     INCODE_AFL_CROWD = 224, /* faces: a long list */
-    INCODE_AFL_WIDE = 32    /* lists that are spread, at a time */
+    INCODE_AFL_WIDE = 32,   /* lists that are spread, at a time */
+    INCODE_AFL_BREATH = 16  /* looks at faces or bricks, a unit of work */
 };
 
 struct incode_afl {
+    struct incode_pause *pause; /* or NULL */
     struct incode_afl_node *nodes;
     uint32_t *heads;
     uint64_t *held, *foreign; /* a bit a node; what is foreign is held, too */
@@ -78,10 +82,25 @@ static inline bool incode_touched_used(const struct incode_touched *entry)
     return entry->brick != UINT32_MAX;
 }
 
+static inline void incode_afl_breathe(const struct incode_afl *afl,
+                                      uint32_t units)
+{
+    if (afl->pause != NULL)
+        incode_breathe(afl->pause, units);
+}
+
+/* In a loop over many, at number i: now and then. */
+static inline void incode_afl_breathe_at(const struct incode_afl *afl,
+                                         uint32_t i)
+{
+    if (i % INCODE_AFL_BREATH == 0)
+        incode_afl_breathe(afl, 1);
+}
+
 /* Bytes for so many faces and touched bricks. */
 size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks);
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
-                     uint32_t bricks);
+                     uint32_t bricks, struct incode_pause *pause);
 void incode_afl_clear(struct incode_afl *afl);
 
 /* The entry of a brick, made where there is none.  The caller keeps enough free

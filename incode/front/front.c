@@ -26,10 +26,12 @@ size_t incode_front_bytes(const struct incode_front_share *share)
 void incode_front_init(struct incode_front *front, void *memory,
                        const struct incode_front_share *share, uint32_t bricks,
                        enum incode_face_rule rule,
-                       const struct incode_front_outside *outside)
+                       const struct incode_front_outside *outside,
+                       struct incode_pause *pause)
 {
     INCODE_ASSERT(bricks > 0);
     memset(front, 0, sizeof *front);
+    front->afl.pause = pause;
     front->bricks = bricks;
     front->face_rule = rule;
     front->outside = *outside;
@@ -53,7 +55,8 @@ void incode_front_move(struct incode_front *front, void *memory,
     uint32_t most = front->afl.count_max;
     INCODE_ASSERT(front->finished && share->faces >= INCODE_FACES_MIN &&
                   share->entries >= INCODE_ENTRIES_MIN);
-    incode_afl_init(&front->afl, memory, share->faces, share->entries);
+    incode_afl_init(&front->afl, memory, share->faces, share->entries,
+                    front->afl.pause);
     front->afl.count_max = most;
     front->room_entries = share->entries / 4;
 }
@@ -263,6 +266,7 @@ bool incode_front_drain(struct incode_front *front)
     uint32_t n = incode_afl_take(&front->afl, v, pairs, FACES, &more);
     for (uint32_t i = 0; i < n; i++) {
         const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
+        incode_afl_breathe(&front->afl, 2);
         if (key_of(front, f) == 0)
             memcpy(pairs[stay++], f + 1, sizeof pairs[0]);
         else
@@ -286,6 +290,7 @@ static uint32_t spill_position(const struct incode_front *front)
     uint32_t nearest = front->current, farthest = 0;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
         const struct incode_touched *entry = &front->afl.touched[i];
+        incode_afl_breathe_at(&front->afl, i);
         if (!incode_touched_used(entry))
             continue;
         uint32_t position = incode_position(front, entry->brick);
@@ -308,6 +313,7 @@ static bool evict_brick(struct incode_front *front,
     for (uint32_t slot = 0; slot < INCODE_BRICK_POINTS; slot++) {
         uint32_t v = brick * INCODE_BRICK_POINTS + slot, pairs[8][2];
         bool more = true;
+        incode_afl_breathe(&front->afl, 1);
         incode_afl_free(&front->afl, v);
         while (more) {
             if (front->spill_count > 0 && !incode_front_flush(front))
@@ -339,6 +345,7 @@ static void evict_next(struct incode_front *front)
     while (front->spill_cursor < front->afl.touched_max) {
         const struct incode_touched *entry =
             &front->afl.touched[front->spill_cursor];
+        incode_afl_breathe_at(&front->afl, front->spill_cursor);
         if (incode_touched_used(entry) && is_spilled(front, entry->brick)) {
             (void)evict_brick(front, entry);
             return;
@@ -398,6 +405,7 @@ int incode_front_unspill(struct incode_front *front, uint32_t brick,
     struct incode_touched *entry = NULL;
     for (size_t i = 0; i < count; i++) {
         const uint32_t *f = faces[i].v;
+        incode_afl_breathe(&front->afl, 1);
         if (!may_return(front, brick, f))
             return -1;
         if (front->afl.count + 1 >= front->afl.capacity ||

@@ -17,7 +17,7 @@
  * has INCODE_STAR_FACES faces and builds INCODE_STAR_BUILT tetrahedra at most.
  * All else is constant, but for a look at the tasks or hubs, 16 and 32.
  *
- *     incode_front_init(&front, memory, &share, bricks, rule, &outside);
+ *     incode_front_init(&front, memory, &share, bricks, rule, &out, &pause);
  *     incode_front_start(&front, &job);
  *     while ((turn = incode_front_turn(&front, 0, &task)) != INCODE_TURN_END)
  *         if (turn == INCODE_TURN_NEXT)
@@ -175,11 +175,12 @@ struct incode_front_share {
 size_t incode_front_bytes(const struct incode_front_share *share);
 
 /* memory: aligned to 64 bytes, incode_front_bytes of the share.  bricks: of the
- * whole set, 1 at least. */
+ * whole set, 1 at least.  pause: told of what takes long, or NULL; it stays. */
 void incode_front_init(struct incode_front *front, void *memory,
                        const struct incode_front_share *share, uint32_t bricks,
                        enum incode_face_rule rule,
-                       const struct incode_front_outside *outside);
+                       const struct incode_front_outside *outside,
+                       struct incode_pause *pause);
 
 /* Abandons the job at work, its fault and what it waits for, if there is one.
  */

@@ -204,6 +204,7 @@ static struct incode_touched *next_foreign(struct incode_front *front)
     uint32_t least = 0;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
         struct incode_touched *entry = &front->afl.touched[i];
+        incode_afl_breathe_at(&front->afl, i);
         if (!incode_touched_used(entry) || is_returning(front, entry->brick))
             continue;
         if (entry->faces == 0 && entry->waiting == 0)
@@ -236,9 +237,11 @@ static enum incode_turn finish(struct incode_front *front)
             !incode_front_has_hub(front, brick))
             front->outside.commit(front->outside.context, brick);
     }
-    for (uint32_t i = 0; i < front->afl.touched_max; i++)
+    for (uint32_t i = 0; i < front->afl.touched_max; i++) {
+        incode_afl_breathe_at(&front->afl, i);
         if (incode_touched_used(&front->afl.touched[i]))
             incode_afl_drop(&front->afl, front->afl.touched[i].brick);
+    }
     front->finished = front->afl.fault == NULL;
     return INCODE_TURN_END;
 }

@@ -9,6 +9,9 @@
  * keeps all that lie in the ball of the first so far, and the predicates
  * compare only what is still in the last ball. */
 
+/* Units of work, as incode/predicates/pause.h counts them. */
+enum { BOXES_A_UNIT = 5, HITS_A_UNIT = 5, BRICK_UNITS = 10 };
+
 /* ---- what is left to be looked at ---- */
 
 /* One look over the horizon: what a cap reaches and was not looked at yet. */
@@ -26,9 +29,11 @@ static void set_done(struct look *look, uint32_t index)
 
 /* Bricks go first, those beside the vertex's own before others: they are near
  * and draw the cap in. */
-static void reach(const struct incode_horizon *h, struct look *look)
+static void reach(struct incode_maker *m, struct look *look)
 {
+    const struct incode_horizon *h = &m->horizon;
     uint32_t pages[INCODE_HORIZON_MAX];
+    incode_maker_breathe(m, h->count / BOXES_A_UNIT);
     uint32_t count =
         incode_horizon_reached(h, &look->cap, look->done, look->index);
     look->bricks = look->pages = 0;
@@ -46,7 +51,7 @@ enum { CROWD = 32 /* boxes: so many are many */ };
 
 /* Where a cap reaches many boxes, points may lie on one sphere up to rounding:
  * empty spheres met before rule out others. */
-static void bound(const struct incode_maker *m, const struct incode_query *q,
+static void bound(struct incode_maker *m, const struct incode_query *q,
                   struct look *look)
 {
     struct incode_radical_bound radical;
@@ -54,11 +59,12 @@ static void bound(const struct incode_maker *m, const struct incode_query *q,
         look->cap.bounded)
         return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
+    incode_maker_breathe(m, INCODE_RADICAL_UNITS);
     incode_radical_bound_set(&radical, &m->empty, p, q->scale, q->sphere.n);
     if (!radical.set)
         return;
     incode_horizon_bound(&m->horizon, &look->cap, q->scale, &radical);
-    reach(&m->horizon, look);
+    reach(m, look);
 }
 
 /* Splits the pages that the cap reaches; false: one is missing, or there is no
@@ -142,10 +148,12 @@ static void set_middle(const struct incode_make *n, float c0[3])
 
 /* Puts what is first in the pencil first; where it is a page, that alone is
  * left. */
-static void choose_first(const struct incode_horizon *h, struct look *look,
+static void choose_first(struct incode_maker *m, struct look *look,
                          const float c0[3])
 {
+    const struct incode_horizon *h = &m->horizon;
     uint32_t count = look->bricks + look->pages, first = 0;
+    incode_maker_breathe(m, count / BOXES_A_UNIT);
     float least = __builtin_inff();
     for (uint32_t i = 0; i < count; i++) {
         float t = middle(h, look, c0, look->index[i]);
@@ -174,6 +182,7 @@ static bool points_of(struct incode_maker *m, struct look *look, uint32_t index,
     uint32_t brick = h->page[index];
     const struct incode_frame *f = NULL;
     *missing = brick;
+    incode_maker_breathe(m, BRICK_UNITS);
     m->counts.candidates += INCODE_BRICK_POINTS;
     if (h->copy[index] == INCODE_NO_COPY) {
         f = incode_pager_get(&m->pager, brick);
@@ -245,7 +254,7 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
         if (!(best == INCODE_NONE ? plane_cap(h, q, &look.cap)
                                   : sphere_cap(h, q, &look.cap)))
             return false;
-        reach(h, &look);
+        reach(m, &look);
         bound(m, q, &look);
         if (look.bricks + look.pages == 0 && !strictly)
             return true;
@@ -255,7 +264,7 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
             continue;
         }
         if (best == INCODE_NONE && strictly)
-            choose_first(h, &look, c0);
+            choose_first(m, &look, c0);
         if (!visit_bricks(m, q, &look))
             return false;
         if (best == q->best || best != INCODE_NONE) {
@@ -267,6 +276,7 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
         if (q->best != best && strictly) {
             strictly = false;
             memset(look.done, 0, sizeof look.done);
+            incode_maker_breathe(m, INCODE_LESSEN_UNITS);
             incode_search_last(s);
         }
     }
@@ -323,10 +333,12 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
         uint64_t in;
         if (!points_of(n->maker, look, index[i], &in, &f, &q->missing))
             return false;
+        incode_maker_breathe(n->maker, (uint32_t)__builtin_popcountll(in) / 2);
         if (in != 0 &&
             !incode_hits_add(&n->pencil, q, f, in & others(q, f), hits))
             return false;
     }
+    incode_maker_breathe(n->maker, (hits->count - hits->placed) / HITS_A_UNIT);
     incode_hits_place(q, &n->pencil, hits);
     return true;
 }
@@ -382,7 +394,7 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
         return false;
     for (;;) {
         bool none = q->best == INCODE_NONE && !(q->t < __builtin_inf());
-        reach(&m->horizon, &look);
+        reach(m, &look);
         bound(m, q, &look);
         if (look.bricks + look.pages == 0)
             return true;
@@ -390,7 +402,7 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
         if (none && n->doubtful && look.bricks > CROWD)
             return false;
         if (none)
-            choose_first(&m->horizon, &look, c0);
+            choose_first(m, &look, c0);
         if (!look_at_bricks(n, q, &look, hits, &much) ||
             (!much && !split(m, &look, &q->missing)))
             return false;
@@ -410,6 +422,7 @@ static void settle(struct incode_make *n, struct incode_query *q, double t,
     for (uint32_t i = 0; i < hits->count; i++) {
         const double p[3] = {hits->p[0][i], hits->p[1][i], hits->p[2][i]};
         bool beyond = hits->t[i] < __builtin_inf();
+        incode_breathe(&tally->pause, 2);
         if (!incode_hits_contends(q, hits, i, last) ||
             (!beyond && incode_orient3d(tally, n->pv, n->pb, n->pc, p) <= 0) ||
             (any &&

@@ -13,8 +13,11 @@ INCODE_INLINE incode_vd both_ways(const double a[3], int first)
 #elif INCODE_VECTOR == 32
     incode_vd up = {a[0], a[1], a[2], 0};
     return first == 0 ? up : -up;
-#else
+#elif INCODE_VECTOR == 16
     incode_vd up = {a[first % 4], first % 4 == 0 ? a[1] : 0};
+    return first < 4 ? up : -up;
+#else
+    incode_vd up = {first % 4 == 3 ? 0 : a[first % 4]};
     return first < 4 ? up : -up;
 #endif
 }

@@ -72,7 +72,11 @@ static bool more_beyond(const struct incode_cell_search *c,
 
 /* ---- points ---- */
 
-enum { LANES = 8, ASK_AHEAD = 16 };
+enum {
+    LANES = 8,
+    ASK_AHEAD = 16,
+    BATCH_UNITS = 8 /* of incode/predicates/pause.h */
+};
 
 struct batch {
     alignas(64) double p[3][LANES];
@@ -172,6 +176,7 @@ static enum incode_walk finish_piece(struct incode_cell_search *c,
 {
     while (c->list < c->end) {
         struct batch batch;
+        incode_walker_breathe(walker, BATCH_UNITS);
         bool all = fill_batch(c, g, &batch, &q->missing);
         if (batch.count > 0)
             look_at(c, walker, q, &batch);
@@ -211,6 +216,7 @@ static bool is_within(struct range range, uint32_t i)
  * concerns it; INCODE_WALK_STOP: none is left. */
 static enum incode_walk next_piece(struct incode_cell_search *c,
                                    const struct incode_grid *g,
+                                   const struct incode_walker *walker,
                                    struct incode_query *q, struct shell *s)
 {
     bool crosses = c->any_done && is_within(s->inner[1], c->y) &&
@@ -229,6 +235,7 @@ static enum incode_walk next_piece(struct incode_cell_search *c,
         for (;; whole = false) {
             set_range(&s->box, g, 0, (struct range){c->x, last});
             s->work++;
+            incode_walker_breathe(walker, BATCH_UNITS);
             if (!whole && passing(q, &s->box, 1) == 0)
                 break;
             uint32_t from, to;
@@ -252,8 +259,10 @@ static enum incode_walk next_piece(struct incode_cell_search *c,
 
 /* Whether the question concerns layer or row i (d: 2 or 1) of the shell; eight
  * are tested at once, and what is found later can only leave fewer. */
-static bool passes(const struct incode_grid *g, const struct incode_query *q,
-                   struct shell *s, struct tested *tested, int d, uint32_t i)
+static bool passes(const struct incode_grid *g,
+                   const struct incode_walker *walker,
+                   const struct incode_query *q, struct shell *s,
+                   struct tested *tested, int d, uint32_t i)
 {
     if (i >= tested->first && i < tested->end)
         return (tested->mask >> (i - tested->first) & 1) != 0;
@@ -271,6 +280,7 @@ static bool passes(const struct incode_grid *g, const struct incode_query *q,
     }
     tested->first = i;
     tested->end = i + count;
+    incode_walker_breathe(walker, BATCH_UNITS);
     tested->mask = passing(q, &boxes, count);
     s->work++;
     return (tested->mask & 1) != 0;
@@ -281,11 +291,12 @@ static enum incode_walk run_row(struct incode_cell_search *c,
                                 struct incode_walker *walker,
                                 struct incode_query *q, struct shell *s)
 {
-    if (c->x == s->outer[0].first && !passes(g, q, s, &s->rows, 1, c->y))
+    if (c->x == s->outer[0].first &&
+        !passes(g, walker, q, s, &s->rows, 1, c->y))
         return INCODE_WALK_DONE;
     set_range(&s->box, g, 1, (struct range){c->y, c->y});
     for (;;) {
-        enum incode_walk r = next_piece(c, g, q, s);
+        enum incode_walk r = next_piece(c, g, walker, q, s);
         if (r == INCODE_WALK_STOP)
             return INCODE_WALK_DONE;
         if (r == INCODE_WALK_DONE)
@@ -302,11 +313,12 @@ static enum incode_walk run_layer(struct incode_cell_search *c,
                                   struct incode_query *q, struct shell *s)
 {
     if (c->y == s->outer[1].first && c->x == s->outer[0].first &&
-        !passes(g, q, s, &s->layers, 2, c->z))
+        !passes(g, walker, q, s, &s->layers, 2, c->z))
         return INCODE_WALK_DONE;
     set_range(&s->box, g, 2, (struct range){c->z, c->z});
     s->rows.end = 0;
     for (; c->y <= s->outer[1].last; c->y++) {
+        incode_walker_breathe(walker, 1);
         enum incode_walk r = run_row(c, g, walker, q, s);
         if (r == INCODE_WALK_DONE && s->work >= work_of(walker))
             r = INCODE_WALK_STOP;
@@ -332,6 +344,7 @@ static enum incode_walk run_shell(struct incode_cell_search *c,
     }
     enum incode_walk r = finish_piece(c, g, walker, q, &s.work);
     for (; r == INCODE_WALK_DONE && c->z <= s.outer[2].last; c->z++) {
+        incode_walker_breathe(walker, 1);
         r = run_layer(c, g, walker, q, &s);
         if (r != INCODE_WALK_DONE)
             break;

@@ -5,7 +5,12 @@
 /* The points around a vertex, brought to hand, and the bricks around its own.
  */
 
-enum { NEAR_WANTED = 96, COPY_TRIES = 64 };
+enum {
+    HORIZON_UNITS =
+        16, /* of incode/predicates/pause.h: a look over its boxes */
+    NEAR_WANTED = 96,
+    COPY_TRIES = 64
+};
 
 static double longest_side(const double lo[3], const double hi[3])
 {
@@ -58,6 +63,7 @@ static enum incode_outcome copy_around_leaf(struct incode_maker *m,
     }
     double radius = first_radius(m, lo, hi);
     for (int tries = 0;; tries++) {
+        incode_maker_breathe(m, HORIZON_UNITS);
         enum incode_local_outcome r =
             incode_local_around(local, &m->walker, &m->horizon,
                                 v / INCODE_LEAF_POINTS, lo, hi, radius);

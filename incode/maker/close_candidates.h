@@ -18,7 +18,11 @@
 
 #include "incode/predicates/predicates.h"
 
-enum { INCODE_CLOSE_MAX = 16, INCODE_CLOSE_NONE = 0xffff };
+enum {
+    INCODE_CLOSE_MAX = 16,
+    INCODE_CLOSE_NONE = 0xffff,
+    INCODE_CLOSE_UNITS = 72 /* of work (incode/predicates/pause.h) */
+};
 
 struct incode_close_candidates {
     alignas(64) double p[3][INCODE_CLOSE_MAX]; /* absolute coordinates */

@@ -21,7 +21,10 @@
 
 #include "sphere.h"
 
-enum { INCODE_EMPTY_SPHERES = 8 };
+enum {
+    INCODE_EMPTY_SPHERES = 8,
+    INCODE_RADICAL_UNITS = 150 /* of work (incode/predicates/pause.h) */
+};
 
 /* The sphere of four points. */
 struct incode_circum {

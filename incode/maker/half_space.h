@@ -46,6 +46,8 @@ struct incode_near_degenerate {
 bool incode_half_space_faces(const struct incode_half_space *half_space,
                              const double n[3]);
 
+enum { INCODE_LESSEN_UNITS = 64 }; /* of work (incode/predicates/pause.h) */
+
 /* Lessens degenerate->ball: no point outside it comes before p[3] in Delaunay
  * distance from the face (p[0], p[1], p[2]).  Nothing changes where neither the
  * face's circle nor a half-space tells, and what holds for one point holds for

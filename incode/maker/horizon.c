@@ -10,7 +10,9 @@
 
 enum {
     NUMBERS = 24, /* floats a box */
-    BOX_BYTES = NUMBERS * 4 + 2 * 4 + 2
+    BOX_BYTES = NUMBERS * 4 + 2 * 4 + 2,
+    PAGE_UNITS = 24, /* of incode/predicates/pause.h */
+    BOX_UNITS = 2
 };
 
 size_t incode_horizon_bytes(uint32_t boxes, uint32_t copies)
@@ -263,6 +265,7 @@ static enum incode_horizon_made add_page(struct making *m, uint32_t level,
     m->missing = page;
     if (f == NULL)
         return INCODE_HORIZON_WAIT;
+    incode_walker_breathe(m->walker, PAGE_UNITS);
     set_view(&view, m->h, f);
     uint32_t all = children_of(tree, level, index);
     uint32_t near = all & near_children(m, &view);
@@ -271,6 +274,7 @@ static enum incode_horizon_made add_page(struct making *m, uint32_t level,
     for (; near != 0; near &= near - 1) {
         unsigned child = (unsigned)__builtin_ctz(near);
         enum incode_horizon_made r = INCODE_HORIZON_MADE;
+        incode_walker_breathe(m->walker, BOX_UNITS);
         if (level > 1)
             r = add_page(m, level - 1, first + child);
         else if (!add_brick(m->h, &view, child, first + child))
@@ -522,6 +526,7 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
     *missing = page;
     if (f == NULL)
         return INCODE_HORIZON_WAIT;
+    incode_walker_breathe(walker, PAGE_UNITS);
     set_view(&view, h, f);
     uint32_t first = (page - tree->base[level]) * INCODE_FANOUT;
     uint32_t in = h->left[index] & reached_children(&view, cap);
@@ -530,6 +535,7 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
         if (h->count == h->boxes)
             return INCODE_HORIZON_FULL;
         uint32_t at = tree->base[level - 1] + first + child;
+        incode_walker_breathe(walker, BOX_UNITS);
         uint32_t i = add_box(h, &view, child, at, level - 1);
         set_lifted(h, i, &view, child);
         /* It is likely to be looked at again, which costs less here. */

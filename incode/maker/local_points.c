@@ -8,6 +8,20 @@
 
 #define INFINITE __builtin_inff()
 
+/* Of work, as incode/predicates/pause.h counts it. */
+enum {
+    LEAF_UNITS = 5,
+    POINTS_A_UNIT = 2,
+    AT_ONCE = 128 /* points, in a breath */
+};
+
+/* So many points are about to be worked on. */
+static void breathe_over(const struct incode_local_points *local, uint32_t n)
+{
+    if (local->pause != NULL)
+        incode_breathe(local->pause, n / POINTS_A_UNIT);
+}
+
 void incode_local_reset(struct incode_local_points *local)
 {
     local->leaf = INCODE_NONE;
@@ -42,7 +56,6 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
                         uint32_t leaves, void *context)
 {
     struct incode_local_points *local = context;
-    (void)walker;
     const struct incode_brick *b = &frame->page.brick;
     const double *const axis[3] = {b->x, b->y, b->z};
     struct sides box;
@@ -51,6 +64,7 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
         box.hi[d] = incode_vd_all(q->hi[d]);
     }
     for (; leaves != 0; leaves &= leaves - 1) {
+        incode_walker_breathe(walker, LEAF_UNITS);
         uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
         uint32_t in = inside(&box, axis, slot), n = frame->count - slot;
         if (n < INCODE_LEAF_POINTS)
@@ -137,6 +151,7 @@ static void set_units(struct incode_local_points *local, const double origin[3],
     local->per_unit =
         incode_scale_for(half > 0x1p-900 ? half : 0x1p-900) * UNITS_HALF;
     memcpy(local->origin, origin, sizeof local->origin);
+    breathe_over(local, local->around);
     for (uint32_t i = 0; i < local->around; i += INCODE_VD_LANES)
         for (int d = 0; d < 3; d++)
             incode_vd_cut(local->unit[d] + i,
@@ -175,6 +190,7 @@ static void choose_units(struct incode_local_points *local, const double p[3],
  * no scan mistakes for a point: up to two vectors, with e infinite. */
 static void set_near(struct incode_local_points *local, uint32_t n)
 {
+    breathe_over(local, n);
     incode_vi lane = incode_vi_count();
     incode_vf zero = incode_vf_all(0), infinite = incode_vf_all(INFINITE);
     double share = local->scale / local->per_unit;
@@ -225,24 +241,29 @@ static bool select_near(struct incode_local_points *local)
         whole = whole && b >= a;
     }
     uint32_t n = 0;
-    for (uint32_t i = 0; i < local->around && whole; i += INCODE_VF_LANES) {
-        incode_vi x = incode_vi_load(local->unit[0] + i),
-                  y = incode_vi_load(local->unit[1] + i),
-                  z = incode_vi_load(local->unit[2] + i);
-        uint32_t in = incode_vm_bits(incode_vi_within(x, lo[0], span[0]) &
-                                     incode_vi_within(y, lo[1], span[1]) &
-                                     incode_vi_within(z, lo[2], span[2]));
-        if (local->around - i < INCODE_VF_LANES)
-            in &= (UINT32_C(1) << (local->around - i)) - 1;
-        incode_vi_pack(local->x + n, in, x);
-        incode_vi_pack(local->y + n, in, y);
-        incode_vi_pack(local->z + n, in, z);
-        incode_vi_pack(local->at + n, in, at);
-        incode_vi_pack(local->near_id + n, in, incode_vi_load(local->id + i));
-        at += incode_vi_all(INCODE_VF_LANES);
-        n += (uint32_t)__builtin_popcount(in);
-        if (n > INCODE_NEAR_POINTS)
-            return false;
+    for (uint32_t i = 0, end = 0; i < local->around && whole;) {
+        breathe_over(local, AT_ONCE);
+        end = end + AT_ONCE < local->around ? end + AT_ONCE : local->around;
+        for (; i < end; i += INCODE_VF_LANES) {
+            incode_vi x = incode_vi_load(local->unit[0] + i),
+                      y = incode_vi_load(local->unit[1] + i),
+                      z = incode_vi_load(local->unit[2] + i);
+            uint32_t in = incode_vm_bits(incode_vi_within(x, lo[0], span[0]) &
+                                         incode_vi_within(y, lo[1], span[1]) &
+                                         incode_vi_within(z, lo[2], span[2]));
+            if (local->around - i < INCODE_VF_LANES)
+                in &= (UINT32_C(1) << (local->around - i)) - 1;
+            incode_vi_pack(local->x + n, in, x);
+            incode_vi_pack(local->y + n, in, y);
+            incode_vi_pack(local->z + n, in, z);
+            incode_vi_pack(local->at + n, in, at);
+            incode_vi_pack(local->near_id + n, in,
+                           incode_vi_load(local->id + i));
+            at += incode_vi_all(INCODE_VF_LANES);
+            n += (uint32_t)__builtin_popcount(in);
+            if (n > INCODE_NEAR_POINTS)
+                return false;
+        }
     }
     local->near = n;
     return true;

@@ -31,6 +31,7 @@ enum {
 };
 
 struct incode_local_points {
+    struct incode_pause *pause; /* or NULL */
     /* Around the vertex: relative to p0 and scaled; w = |p|^2; e: of this the
      * error of n . p is at most max|n|; at: the point's index below. */
     alignas(64) float x[INCODE_NEAR_ALL];

@@ -76,6 +76,7 @@ void incode_maker_init(struct incode_maker *m, void *memory,
     m->pager.shuffle = points->shuffle_seed;
     m->walker = (struct incode_walker){&m->pager, &m->tree, &m->counts.tally,
                                        &m->counts.candidates, UINT32_MAX};
+    m->local.pause = &m->counts.tally.pause;
     m->spread = 1.6;
     m->reach = 2;
 }

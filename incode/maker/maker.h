@@ -130,6 +130,12 @@ struct incode_maker {
     struct incode_local_points local;
 };
 
+/* So many units of incode/predicates/pause.h are about to be worked. */
+static inline void incode_maker_breathe(struct incode_maker *m, uint32_t units)
+{
+    incode_breathe(&m->counts.tally.pause, units);
+}
+
 /* ---- memory ---- */
 
 /* What a maker is given beside its struct. */

@@ -138,11 +138,15 @@ void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
         set_radical_bound(q);
 }
 
-enum { CONTESTS = 8 }; /* by the predicates, before twice the precision */
+enum {
+    CONTESTS = 8,      /* by the predicates, before twice the precision */
+    CONSIDER_UNITS = 4 /* of work, as incode/predicates/pause.h counts it */
+};
 
 /* Whether a point is certainly outside the best's sphere, looked at more
  * closely where many points are in doubt. */
-static bool is_outside(struct incode_query *q, const double p[3])
+static bool is_outside(struct incode_query *q, struct incode_tally *tally,
+                       const double p[3])
 {
     if (q->contests < CONTESTS) {
         q->contests++;
@@ -151,6 +155,7 @@ static bool is_outside(struct incode_query *q, const double p[3])
     }
     if (q->degenerate.spread == 0) {
         const double *const f[4] = {q->pv, q->pb, q->pc, q->best_p};
+        incode_breathe(&tally->pause, INCODE_FINE_UNITS);
         incode_near_degenerate_sphere(&q->degenerate, f, q->scale);
     }
     return incode_near_degenerate_outside(&q->degenerate, q->pv, p, q->scale);
@@ -159,7 +164,8 @@ static bool is_outside(struct incode_query *q, const double p[3])
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
                            uint32_t id, const double p[3])
 {
-    if (q->best != INCODE_NONE && is_outside(q, p))
+    incode_breathe(&tally->pause, CONSIDER_UNITS);
+    if (q->best != INCODE_NONE && is_outside(q, tally, p))
         return;
     if (incode_orient3d(tally, q->pv, q->pb, q->pc, p) <= 0)
         return;
@@ -169,8 +175,14 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     double r[3];
     incode_query_relative(r, q, p);
     incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
-    if (incode_sphere_is_ill_conditioned(&q->sphere))
+    if (incode_sphere_is_ill_conditioned(&q->sphere)) {
+        incode_breathe(&tally->pause, INCODE_FINE_UNITS);
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, p, q->scale);
+    }
+    if (q->degenerate.known)
+        incode_breathe(&tally->pause, INCODE_LESSEN_UNITS);
+    if (q->looked >= INCODE_QUERY_CROWD)
+        incode_breathe(&tally->pause, INCODE_RADICAL_UNITS);
     incode_query_start(q, id, p);
 }
 
@@ -363,7 +375,14 @@ struct walk {
     bool visited; /* a brick, in this call */
 };
 
-enum { ASK_AHEAD = 8 };
+enum {
+    ASK_AHEAD = 8,
+    /* Of work, as incode/predicates/pause.h counts it: the leaves of a brick, a
+     * page of boxes, a lifted one. */
+    VISIT_UNITS = 6,
+    PAGE_UNITS = 20,
+    LIFTED_UNITS = 2
+};
 
 /* A page is missing: its next siblings will be, too, so ask for some now. */
 static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
@@ -398,6 +417,7 @@ static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
 {
     uint32_t leaves = passing_leaves(w->q, frame);
     incode_walker_spend(w->walker, 1);
+    incode_walker_breathe(w->walker, VISIT_UNITS);
     w->visited = true;
     if (leaves != 0 &&
         !w->visit(w->walker, w->q, frame, brick, leaves, w->context))
@@ -473,12 +493,14 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
     uint32_t count = tree->count[level - 1] - first;
     if (count > INCODE_FANOUT)
         count = INCODE_FANOUT;
+    incode_walker_breathe(w->walker, PAGE_UNITS);
     uint32_t mask = passing_children(w->q, &frame->page.boxes, count);
     for (uint32_t left = mask; left != 0; left &= left - 1) {
         unsigned child = (unsigned)__builtin_ctz(left);
         uint64_t end = brick_end(level - 1, (uint64_t)first + child);
         if (end <= w->q->cursor)
             continue;
+        incode_walker_breathe(w->walker, LIFTED_UNITS);
         if (!may_reach(w->q, &frame->page.boxes, child)) {
             w->q->cursor = end > UINT32_MAX ? UINT32_MAX : (uint32_t)end;
             continue;

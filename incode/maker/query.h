@@ -99,6 +99,13 @@ static inline void incode_walker_spend(struct incode_walker *walker,
     walker->left = walker->left > units ? walker->left - units : 0;
 }
 
+/* So many units of incode/predicates/pause.h are about to be worked. */
+static inline void incode_walker_breathe(const struct incode_walker *walker,
+                                         uint32_t units)
+{
+    incode_breathe(&walker->tally->pause, units);
+}
+
 /* Called with a brick and its leaves that pass, one bit each; false stops the
  * walk. */
 typedef bool incode_visit(struct incode_walker *walker, struct incode_query *q,

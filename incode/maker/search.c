@@ -30,6 +30,7 @@ bool incode_hull_known(struct incode_maker *m, const double pv[3],
     for (uint32_t i = 0; i < m->plane_count; i++) {
         const struct incode_hull_plane *h = &m->planes[i];
         const double *a = h->p[0], *b = h->p[1], *c = h->p[2];
+        incode_breathe(&tally->pause, 2);
         if (incode_orient3d(tally, a, b, c, pv) == 0 &&
             incode_orient3d(tally, a, b, c, pb) == 0 &&
             incode_orient3d(tally, a, b, c, pc) == 0)
@@ -56,6 +57,7 @@ void incode_hull_learn(struct incode_maker *m, const struct incode_query *q)
     const struct incode_local_points *local = &m->local;
     for (uint32_t i = 0; i < local->count; i++) {
         double p[3] = {local->p[0][i], local->p[1][i], local->p[2][i]};
+        incode_maker_breathe(m, 1);
         if (incode_orient3d(&m->counts.tally, q->pv, q->pb, q->pc, p) < 0) {
             incode_hull_remember(m, q, p);
             return;
@@ -165,6 +167,7 @@ enum incode_outcome incode_search_run(struct incode_maker *m,
             return INCODE_OK;
         }
         if (q->best != INCODE_NONE || !q->boxed) {
+            incode_maker_breathe(m, INCODE_LESSEN_UNITS);
             incode_search_last(s);
             continue;
         }

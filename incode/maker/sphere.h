@@ -135,6 +135,8 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
                         const double b[3], const double c[3], const double *a,
                         double scale);
 
+enum { INCODE_FINE_UNITS = 32 }; /* of incode/predicates/pause.h, at the most */
+
 /* Sharpens the bounds of an ill-conditioned plane or sphere; where that is not
  * enough, computes it again from absolute coordinates in twice the precision,
  * so that only the evaluation's own rounding is left in the bounds.  a: NULL

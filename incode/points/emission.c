@@ -6,7 +6,8 @@
 #include "stages.h"
 
 enum {
-    EMIT_A_UNIT = 8 /* tetrahedra */
+    EMIT_A_UNIT = 8, /* tetrahedra */
+    AT_ONCE = 16     /* points or cells, in a breath */
 };
 
 /* Which of a cell's vertices is the smallest, whose brick owns it. */
@@ -24,6 +25,17 @@ static bool is_own(const struct incode_insertion *n, uint32_t id)
     return brick >= n->own_first && brick < n->own_last;
 }
 
+/* No point has a cell. */
+static void forget_cells(struct incode_insertion *n)
+{
+    struct incode_complex *x = &n->complex;
+    for (uint32_t v = 0; v < x->points; v++) {
+        if (v % AT_ONCE == 0)
+            incode_maker_breathe(n->maker, 1);
+        x->point[v].cell = INCODE_NONE;
+    }
+}
+
 /* Leaves a cell at each vertex of an own brick that has not been taken in, so
  * that it is known as one when it is. */
 static void keep_pending(struct incode_insertion *n)
@@ -31,12 +43,13 @@ static void keep_pending(struct incode_insertion *n)
     struct incode_complex *x = &n->complex;
     uint32_t from = n->from * INCODE_BRICK_POINTS;
     uint32_t pending = n->own_last * INCODE_BRICK_POINTS - from;
-    for (uint32_t v = 0; v < x->points; v++)
-        x->point[v].cell = INCODE_NONE;
+    forget_cells(n);
     for (unsigned pass = 0; pass < 2; pass++)
         for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
             struct incode_cell *c = incode_complex_cell(x, i);
             bool kept = incode_cell_proved(c) == 0;
+            if (i % AT_ONCE == 0)
+                incode_maker_breathe(n->maker, AT_ONCE / 4);
             if (incode_cell_is_free(c) || kept != (pass == 0))
                 continue;
             for (unsigned k = 0; k < 4 && pass == 1; k++)
@@ -52,11 +65,9 @@ static void keep_pending(struct incode_insertion *n)
 /* From now on points' `cell` is the first of what they own. */
 void incode_insertion_begin_list(struct incode_insertion *n)
 {
-    struct incode_complex *x = &n->complex;
     if (n->shown)
         keep_pending(n);
-    for (uint32_t v = 0; v < x->points; v++)
-        x->point[v].cell = INCODE_NONE;
+    forget_cells(n);
     n->cell = INCODE_COMPLEX_CELLS_FIRST;
     n->emitted = true;
     n->stage = INCODE_INSERTION_LIST;
@@ -70,6 +81,7 @@ enum incode_insertion_step incode_insertion_list(struct incode_insertion *n)
     uint32_t end = x->cells - n->cell < INCODE_INSERTION_CELLS
                        ? x->cells
                        : n->cell + INCODE_INSERTION_CELLS;
+    incode_maker_breathe(n->maker, INCODE_INSERTION_CELLS / 4);
     for (; n->cell < end; n->cell++) {
         struct incode_cell *c = incode_complex_cell(x, n->cell);
         if (incode_cell_is_free(c) || incode_cell_proved(c) == 0 ||
@@ -147,12 +159,14 @@ enum incode_insertion_step incode_insertion_release(struct incode_insertion *n)
     struct incode_complex *x = &n->complex;
     uint32_t words = (n->maker->tree.bricks + 63) / 64, latest = 0;
     uint32_t free = x->free_count;
-    incode_complex_release(x);
+    incode_complex_release(x, &n->maker->counts.tally.pause);
     if (free == x->free_count && !n->closed)
         return INCODE_INSERTION_FULL; /* all of it is kept for bricks to come */
     memset(n->touched, 0, words * sizeof *n->touched);
     for (uint32_t v = 1; v < x->points; v++) {
         uint32_t id = x->point[v].id;
+        if (v % AT_ONCE == 0)
+            incode_maker_breathe(n->maker, 1);
         if (!incode_complex_is_vertex(x, v))
             continue;
         incode_insertion_set_bit(n->touched, id / INCODE_BRICK_POINTS);
@@ -176,11 +190,14 @@ static bool is_half_full(const struct incode_insertion *n)
 enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n)
 {
     for (; n->brick < n->from; n->brick++) {
+        if (n->brick % AT_ONCE == 0)
+            incode_maker_breathe(n->maker, 1);
         if ((n->touched[n->brick / 64] >> n->brick % 64 & 1) != 0 ||
             incode_insertion_has_committed(n, n->brick))
             continue;
         if (n->outside.emit_room(n->outside.context) == 0)
             return INCODE_INSERTION_WAITING;
+        incode_maker_breathe(n->maker, 1);
         incode_insertion_set_bit(n->committed, n->brick);
         n->outside.commit(n->outside.context, n->brick);
     }

@@ -20,6 +20,7 @@
 
 enum {
     JUDGED = 1024,  /* cells a step */
+    AT_ONCE = 16,   /* cells, in a breath */
     SHOWN = 256,    /* cells looked at as a unit of work */
     LARGE = 32,     /* a cavity of more than such a part of the cells */
     FEW = 128,      /* cells: looking at all is better than a search */
@@ -71,19 +72,30 @@ enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n)
     return INCODE_INSERTION_WORKED;
 }
 
+/* Now and then in a loop over cells. */
+static inline void breathe_at(const struct incode_insertion *n, uint32_t cell)
+{
+    if (cell % AT_ONCE == 0)
+        incode_maker_breathe(n->maker, AT_ONCE / 4);
+}
+
 /* Where to stop after some cells. */
 static uint32_t some_cells(const struct incode_insertion *n)
 {
     uint32_t cells = n->complex.cells;
     incode_walker_spend(&n->maker->walker, JUDGED / INCODE_INSERTION_CELLS);
+    incode_maker_breathe(n->maker, JUDGED / AT_ONCE);
     return cells - n->cell < JUDGED ? cells : n->cell + JUDGED;
 }
 
 enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n)
 {
     const struct incode_complex *x = &n->complex;
+    uint32_t units = 2 + n->work->rest.count / 2; /* of 4 cells */
     for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
         struct incode_cell *c = incode_complex_cell(x, n->cell);
+        if (n->cell % 4 == 0)
+            incode_maker_breathe(n->maker, units);
         if (incode_cell_is_free(c))
             continue;
         bool final = !incode_rest_reaches(&n->work->rest, x, c);
@@ -141,9 +153,11 @@ enum incode_insertion_step incode_insertion_look(struct incode_insertion *n)
     const struct incode_complex *x = &n->complex;
     struct incode_look *look = &n->work->look;
     uint32_t end = look->at == 0 ? some_cells(n) : n->cell;
-    for (; n->cell < end && !incode_look_is_full(look); n->cell++)
+    for (; n->cell < end && !incode_look_is_full(look); n->cell++) {
+        breathe_at(n, n->cell);
         if (is_wanted(n, incode_complex_cell(x, n->cell)))
             incode_look_add(look, x, n->cell);
+    }
     if (n->cell < x->cells && !incode_look_is_full(look))
         return INCODE_INSERTION_WORKED;
     incode_walker_spend(&n->maker->walker, look->count);
@@ -181,6 +195,7 @@ static uint32_t next_wanted(const struct incode_insertion *n, uint32_t brick)
 static bool show(struct incode_insertion *n, struct incode_cell *c,
                  const double p[3])
 {
+    incode_maker_breathe(n->maker, 1);
     if (!incode_complex_gives_way(&n->complex, &n->maker->counts.tally, c, p))
         return true;
     incode_cell_set_proved(c, UNKNOWN);
@@ -195,6 +210,7 @@ static void show_all(struct incode_insertion *n, const double p[3])
     uint32_t left = 0;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         struct incode_cell *c = incode_complex_cell(x, i);
+        breathe_at(n, i);
         if (incode_cell_is_free(c) || incode_cell_proved(c) != REACHED ||
             !show(n, c, p))
             continue;

@@ -2,10 +2,19 @@
 
 #include <string.h>
 
-enum { CELLS = 256 /* a step */ };
+enum {
+    CELLS = 256, /* a step */
+    AT_ONCE = 16 /* points or cells, in a breath */
+};
 
 /* A vertex's `cell`, which is not needed any more. */
 enum { NOT_REACHED = 0, REACHED = 1 };
+
+static void breathe_at(const struct incode_handover *h, uint32_t i)
+{
+    if (i % AT_ONCE == 0)
+        incode_maker_breathe(h->n->maker, AT_ONCE / 4);
+}
 
 void incode_handover_begin(struct incode_handover *h,
                            struct incode_insertion *n)
@@ -16,9 +25,11 @@ void incode_handover_begin(struct incode_handover *h,
     h->cell = INCODE_COMPLEX_CELLS_FIRST;
     h->vertex = 1;
     h->brick = n->own_first;
-    for (uint32_t v = 0; v < x->points; v++)
+    for (uint32_t v = 0; v < x->points; v++) {
+        breathe_at(h, v);
         if (incode_complex_is_vertex(x, v))
             x->point[v].cell = NOT_REACHED;
+    }
 }
 
 /* Sends what waits; false: there is no room for it. */
@@ -60,6 +71,7 @@ static enum incode_insertion_step send_faces(struct incode_handover *h,
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->cell < x->cells; i++, h->cell++) {
         const struct incode_cell *c = incode_complex_cell(x, h->cell);
+        breathe_at(h, h->cell);
         if (incode_cell_is_free(c))
             continue;
         if (h->count + 4 > INCODE_BRICK_POINTS && !send(h))
@@ -100,10 +112,12 @@ static enum incode_insertion_step send_reached(struct incode_handover *h)
     if (!send(h))
         return INCODE_INSERTION_WAITING;
     uint64_t reached = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - points);
-    for (uint32_t v = 1; v < x->points; v++)
+    for (uint32_t v = 1; v < x->points; v++) {
+        breathe_at(h, v);
         if (x->point[v].cell == NOT_REACHED &&
             x->point[v].id / INCODE_BRICK_POINTS == brick)
             reached &= ~(UINT64_C(1) << x->point[v].id % INCODE_BRICK_POINTS);
+    }
     for (; reached != 0; reached &= reached - 1)
         h->faces[h->count++] = (struct incode_face){
             {brick * INCODE_BRICK_POINTS + (uint32_t)__builtin_ctzll(reached),

@@ -15,7 +15,9 @@ enum {
     FILL_PART = 12,          /* the same where points of others' come in */
     SAMPLE_SHARE = 16,       /* of the room for points */
     RESERVE = 4096,          /* bytes */
-    ALIGNED = 64             /* the same */
+    ALIGNED = 64,            /* the same */
+    AT_ONCE = 16,            /* points, in a breath */
+    A_STEP = 8               /* units, of what is the same for all points */
 };
 
 static_assert(sizeof(struct incode_insertion_work) + RESERVE <=
@@ -126,12 +128,20 @@ static bool is_short(const struct incode_insertion *n)
 
 /* ---- the points ---- */
 
+/* Now and then in a loop over all points. */
+static inline void breathe_at(const struct incode_insertion *n, uint32_t v)
+{
+    if (v % AT_ONCE == 0)
+        incode_maker_breathe(n->maker, 2);
+}
+
 /* The points of the bricks at work that are vertices. */
 static void mark_there(struct incode_insertion *n)
 {
     const struct incode_complex *x = &n->complex;
     memset(n->there, 0, sizeof n->there);
     for (uint32_t v = 1; v < x->points; v++) {
+        breathe_at(n, v);
         uint32_t id = x->point[v].id, brick = id / INCODE_BRICK_POINTS;
         if (incode_complex_is_vertex(x, v) && brick >= n->from && brick < n->to)
             n->there[brick - n->from] |= UINT64_C(1)
@@ -185,8 +195,10 @@ static uint32_t staged(const struct incode_insertion *n, uint32_t i)
 static uint32_t vertices(const struct incode_insertion *n)
 {
     uint32_t count = 0;
-    for (uint32_t v = 1; v < n->complex.points; v++)
+    for (uint32_t v = 1; v < n->complex.points; v++) {
+        breathe_at(n, v);
         count += incode_complex_is_vertex(&n->complex, v);
+    }
     return count;
 }
 
@@ -307,6 +319,7 @@ static uint32_t find_off(struct incode_insertion *n, uint32_t from,
     uint32_t all = n->complex.points - 1;
     for (uint32_t i = 0; i < all; i++) {
         uint32_t at = 1 + (from + i) % all;
+        incode_maker_breathe(n->maker, 1);
         if (count == 2 ? !incode_collinear(p[v[0]].p, p[v[1]].p, p[at].p)
                        : incode_orient3d(&n->maker->counts.tally, p[v[0]].p,
                                          p[v[1]].p, p[v[2]].p, p[at].p) != 0)
@@ -411,6 +424,7 @@ static enum incode_insertion_step insert(struct incode_insertion *n)
     unsigned done = 0;
     for (; n->next < n->staged_count; n->next++) {
         uint32_t v = staged(n, n->next);
+        breathe_at(n, n->next);
         if (!incode_complex_is_vertex(x, v)) {
             if (round_of(x->point[v].id) < n->level)
                 continue;
@@ -493,6 +507,7 @@ enum incode_insertion_step incode_insertion_step(struct incode_insertion *n)
     enum incode_insertion_step r = INCODE_INSERTION_WORKED;
     for (unsigned i = 0;
          i < INCODE_INSERTION_STEPS && r == INCODE_INSERTION_WORKED; i++) {
+        incode_maker_breathe(n->maker, A_STEP);
         r = step(n);
         note_used(n);
         incode_walker_spend(&n->maker->walker, 1);

@@ -5,7 +5,10 @@
 
 #include "incode/predicates/check.h"
 
-enum { PAGES = INCODE_LEVELS_MAX + 16 /* a call */ };
+enum {
+    PAGES = INCODE_LEVELS_MAX + 16, /* a call */
+    ADD_UNITS = 16                  /* of work: twice the precision, perhaps */
+};
 
 void incode_look_init(struct incode_look *look, struct incode_maker *maker,
                       const uint64_t *passed, uint64_t *wanted)
@@ -38,6 +41,7 @@ void incode_look_add(struct incode_look *look, const struct incode_complex *x,
     struct incode_region r;
     const struct incode_cell *c = incode_complex_cell(x, cell);
     INCODE_ASSERT(!incode_look_is_full(look));
+    incode_maker_breathe(look->maker, ADD_UNITS);
     if (!incode_region_set_sharp(&r, x, c, look->scale) &&
         !incode_region_set(&r, x, c))
         incode_region_set_all(&r);
@@ -50,15 +54,22 @@ static bool is_set(const uint64_t *bits, uint32_t i)
     return (bits[i / 64] >> i % 64 & 1) != 0;
 }
 
+static uint32_t count_of(uint64_t cells)
+{
+    return (uint32_t)__builtin_popcountll(cells);
+}
+
 /* Those of some cells that may reach a child. */
 static uint64_t meeting(const struct incode_look *look,
                         const struct incode_boxes *boxes, unsigned child,
                         const double lo[3], const double hi[3], uint64_t cells)
 {
     struct incode_lifted l;
+    incode_maker_breathe(look->maker, 2 + count_of(cells) / 2);
     uint64_t met = incode_regions_meeting(&look->regions, cells, lo, hi);
     if (met == 0 || !incode_boxes_lifted(boxes, child, &l))
         return met;
+    incode_maker_breathe(look->maker, count_of(met));
     return incode_regions_meeting_lifted(&look->regions, met, boxes, &l);
 }
 
@@ -91,6 +102,7 @@ static enum incode_look_result look_below(struct incode_look *look,
     uint32_t first = index * INCODE_FANOUT;
     uint32_t count = tree->count[level - 1] - first;
     count = count < INCODE_FANOUT ? count : INCODE_FANOUT;
+    incode_maker_breathe(look->maker, 4);
     incode_boxes_axes(&boxes, lo, hi);
     for (uint32_t i = 0; i < count; i++) {
         uint64_t end = (first + i + 1) * span;

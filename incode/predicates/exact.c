@@ -8,12 +8,14 @@
 
 enum {
     POINTS_MAX = 5,
-    FACTORS_MAX = 5,
+    FACTORS_MAX = 3, /* of a monomial that is added as it is */
+    LIFTED_MAX = 5,  /* of one that is a square, too */
     /* A double is an integer below 2^53 times 2^e, -1074 <= e <= 971. */
     EXPONENT_LEAST = -1074,
     EXPONENT_SPAN = 971 + 1074 + 53,
-    /* 5 factors, and fewer than 2^10 monomials; one limb for the sign. */
+    /* Fewer than 2^10 monomials; one limb for the sign. */
     LIMBS_MAX = (FACTORS_MAX * EXPONENT_SPAN + 10) / 32 + 2,
+    LIFTED_LIMBS_MAX = (LIFTED_MAX * EXPONENT_SPAN + 10) / 32 + 2,
     TERM_LIMBS = 2 * FACTORS_MAX + 1
 };
 
@@ -28,6 +30,7 @@ struct term {
 
 struct problem {
     struct term p[POINTS_MAX][3];
+    int32_t span;            /* of the coordinates' bits, from the least on */
     int32_t limbs;           /* in use */
     int64_t limb[LIMBS_MAX]; /* of 32 bits, with carries not yet passed on */
 };
@@ -82,6 +85,19 @@ static bool translate(double q[POINTS_MAX][3], const double *const p[],
     return true;
 }
 
+/* Limbs that hold a sum of products of `degree` coordinates. */
+static int32_t limbs_of(const struct problem *s, int32_t degree)
+{
+    return (degree * s->span + 10) / 32 + 2;
+}
+
+static void problem_clear(struct problem *s, int32_t degree)
+{
+    s->limbs = limbs_of(s, degree);
+    INCODE_ASSERT(s->limbs <= LIMBS_MAX);
+    memset(s->limb, 0, (size_t)s->limbs * sizeof s->limb[0]);
+}
+
 /* Reads the points and clears an accumulator for sums of products of `degree`
  * coordinates. */
 static void problem_init(struct problem *s, const double *const p[],
@@ -101,11 +117,8 @@ static void problem_init(struct problem *s, const double *const p[],
             most = end > most ? end : most;
         }
     }
-    s->limbs = 2;
-    if (most > least)
-        s->limbs = (degree * (most - least) + 10) / 32 + 2;
-    INCODE_ASSERT(s->limbs <= LIMBS_MAX);
-    memset(s->limb, 0, (size_t)s->limbs * sizeof s->limb[0]);
+    s->span = most > least ? most - least : 0;
+    problem_clear(s, degree);
     for (int32_t i = 0; i < points; i++) {
         for (int32_t k = 0; k < 3; k++)
             s->p[i][k].e -= s->p[i][k].sign != 0 ? least : 0;
@@ -161,87 +174,217 @@ static int problem_sign(const struct problem *s)
     return carry < 0 ? -1 : any != 0 || carry > 0;
 }
 
-/* The monomials of det(p_i, p_j, p_k) that are not zero, with their signs;
- * returns their number. */
-static int32_t minor3(struct term t[6], const struct problem *s, int32_t i,
-                      int32_t j, int32_t k)
+/* s += sign * x * (z - w), x being a product of two coordinates. */
+static void add_triples(struct problem *s, const struct term *x,
+                        const struct term *z, const struct term *w,
+                        int32_t sign)
 {
-    static const uint8_t order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
-                                        {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
-    int32_t n = 0;
-    for (int32_t o = 0; o < 6; o++) {
-        const struct term *x = &s->p[i][order[o][0]];
-        const struct term *y = &s->p[j][order[o][1]];
-        const struct term *z = &s->p[k][order[o][2]];
-        if (x->sign == 0 || y->sign == 0 || z->sign == 0)
-            continue;
-        struct term xy;
-        term_product(&xy, x, y);
-        term_product(&t[n], &xy, z);
-        t[n].sign = o < 3 ? t[n].sign : -t[n].sign;
-        n++;
+    struct term t;
+    if (z->sign != 0) {
+        term_product(&t, x, z);
+        problem_add(s, &t, sign);
     }
-    return n;
+    if (w->sign != 0) {
+        term_product(&t, x, w);
+        problem_add(s, &t, -sign);
+    }
+}
+
+/* s = the determinant with rows p_i - p_h of four points h, i, j, k, which is
+ * that with rows (1, p): by pairs of rows, x_a y_b - x_b y_a times z_c - z_d.
+ */
+static void set_orient3d(struct problem *s, const uint8_t row[4])
+{
+    /* Each pair, then the other two, all in their order, and the sign. */
+    static const int8_t PAIR[6][5] = {{0, 1, 2, 3, -1}, {0, 2, 1, 3, 1},
+                                      {0, 3, 1, 2, -1}, {1, 2, 0, 3, -1},
+                                      {1, 3, 0, 2, 1},  {2, 3, 0, 1, -1}};
+    problem_clear(s, 3);
+    for (int32_t n = 0; n < 6; n++) {
+        const int8_t *pair = PAIR[n];
+        const struct term *a = s->p[row[pair[0]]], *b = s->p[row[pair[1]]];
+        const struct term *z = &s->p[row[pair[2]]][2];
+        const struct term *w = &s->p[row[pair[3]]][2];
+        struct term xy;
+        if (a[0].sign != 0 && b[1].sign != 0) {
+            term_product(&xy, &a[0], &b[1]);
+            add_triples(s, &xy, z, w, pair[4]);
+        }
+        if (b[0].sign != 0 && a[1].sign != 0) {
+            term_product(&xy, &b[0], &a[1]);
+            add_triples(s, &xy, z, w, -pair[4]);
+        }
+    }
 }
 
 int incode_exact_orient3d(const double *const p[4])
 {
     struct problem s;
-    struct term t[6];
+    static const uint8_t ALL[4] = {0, 1, 2, 3};
     problem_init(&s, p, 4, 3);
-    /* Determinant with rows (p_i, 1), by its column of ones. */
-    static const uint8_t rows[4][3] = {
-        {1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
-    for (int32_t r = 0; r < 4; r++) {
-        int32_t n = minor3(t, &s, rows[r][0], rows[r][1], rows[r][2]);
-        for (int32_t m = 0; m < n; m++)
-            problem_add(&s, &t[m], r % 2 == 0 ? 1 : -1);
-    }
+    set_orient3d(&s, ALL);
     return problem_sign(&s);
 }
 
-/* s += sign * t * |p_i|^2, squares being those of the coordinates of p_i. */
-static void add_lifted(struct problem *s, const struct term *t,
-                       const struct term squares[3], int32_t sign)
+/* A sum without its sign, in limbs of 32 bits, of which [first, last) are not
+ * all zero. */
+struct settled {
+    uint32_t limb[LIMBS_MAX];
+    int32_t first, last;
+    int sign;
+};
+
+/* Passes on all carries. */
+static void settle(struct settled *to, const struct problem *s)
 {
-    struct term product;
-    for (int32_t k = 0; k < 3; k++) {
-        if (squares[k].sign == 0)
-            continue;
-        term_product(&product, t, &squares[k]);
-        problem_add(s, &product, sign);
+    int64_t carry = 0;
+    int32_t last = s->limbs, first = 0;
+    for (int32_t i = 0; i < last; i++) {
+        carry += s->limb[i];
+        to->limb[i] = (uint32_t)carry;
+        carry >>= 32; /* rounds down: a negative sum ends in -1 */
+    }
+    while (first < last && to->limb[first] == 0)
+        first++;
+    if (carry < 0) { /* the complement, and 1 more */
+        for (int32_t i = first; i < last; i++)
+            to->limb[i] = ~to->limb[i] + (i == first);
+    }
+    while (last > first && to->limb[last - 1] == 0)
+        last--;
+    to->first = first;
+    to->last = last;
+    to->sign = carry < 0 ? -1 : last > first;
+}
+
+enum {
+    TOP = 8,   /* limbs of an orient3d: the others seldom matter */
+    UNITS = 40 /* of pause.h, an orient3d or its product with a square */
+};
+
+/* Sums of positive terms and of negative ones. */
+struct sums {
+    uint32_t limb[2][LIFTED_LIMBS_MAX];
+    int32_t limbs; /* in use */
+    int32_t doubt; /* what has been left out is below 2^doubt; 0: nothing */
+};
+
+/* sum += factor * limb[0..count). */
+static void add_times(uint32_t *sum, const uint32_t *limb, int32_t count,
+                      uint32_t factor)
+{
+    uint64_t carry = 0;
+    for (; count >= 4; count -= 4, sum += 4, limb += 4) {
+        for (int32_t i = 0; i < 4; i++) {
+            carry += (uint64_t)limb[i] * factor;
+            carry += sum[i];
+            sum[i] = (uint32_t)carry;
+            carry >>= 32;
+        }
+    }
+    for (; count > 0; count--) {
+        carry += (uint64_t)*limb++ * factor;
+        carry += *sum;
+        *sum++ = (uint32_t)carry;
+        carry >>= 32;
+    }
+    for (; carry != 0; sum++) {
+        carry += *sum;
+        *sum = (uint32_t)carry;
+        carry >>= 32;
     }
 }
 
-int incode_exact_in_sphere(const double *const p[5])
+/* sums += sign * |p|^2 * (limbs [first, last) of d), square by square. */
+static void add_lifted(struct sums *sums, struct incode_pause *pause,
+                       const struct settled *d, const struct term p[3],
+                       int32_t first, int32_t last, int sign)
+{
+    uint32_t *sum = sums->limb[sign < 0];
+    for (int32_t k = 0; k < 3; k++) {
+        struct term square;
+        uint64_t carry = 0;
+        if (p[k].sign == 0)
+            continue;
+        incode_breathe(pause, UNITS);
+        term_product(&square, &p[k], &p[k]);
+        int32_t at = first + square.e / 32, shift = square.e % 32;
+        for (int32_t i = 0; i <= square.limbs; i++) {
+            carry |= i < square.limbs ? (uint64_t)square.m[i] << shift : 0;
+            if ((uint32_t)carry != 0) {
+                INCODE_ASSERT(at + i + last - first <= sums->limbs);
+                add_times(sum + at + i, d->limb + first, last - first,
+                          (uint32_t)carry);
+            }
+            carry >>= 32;
+        }
+        int32_t end = 32 * first + square.e + bits_of(&square) + 4;
+        if (first > d->first && end > sums->doubt)
+            sums->doubt = end;
+    }
+}
+
+/* The sign of the difference, or 0 if it is below 2^bits. */
+static int compare(const struct sums *sums, int32_t bits)
+{
+    int32_t i = sums->limbs - 1;
+    while (i >= 0 && sums->limb[0][i] == sums->limb[1][i])
+        i--;
+    if (i < 0)
+        return 0;
+    int sign = sums->limb[0][i] > sums->limb[1][i] ? 1 : -1;
+    const uint32_t *more = sums->limb[sign < 0], *less = sums->limb[sign > 0];
+    /* The difference is at least 2^(32 i) less what is borrowed from there. */
+    uint64_t rest = more[i] - less[i];
+    while (rest < 2 && --i >= 0)
+        rest = (rest << 32) + more[i] - less[i];
+    return i < 0 ? (bits <= 0 ? sign : 0) : 32 * i >= bits ? sign : 0;
+}
+
+/* The sums of the top limbs of each orient3d, or of the others. */
+static void add_all(struct sums *sums, struct problem *s,
+                    struct incode_pause *pause, bool top)
+{
+    /* -det with rows (x, y, z, |p|^2, 1), by its fourth column: the orient3d of
+     * the four other points, times -(-1)^i |p_i|^2. */
+    for (int32_t i = 0; i < 5; i++) {
+        const struct term *q = s->p[i];
+        struct settled d;
+        uint8_t rest[4];
+        int32_t n = 0;
+        if (q[0].sign == 0 && q[1].sign == 0 && q[2].sign == 0)
+            continue;
+        for (uint8_t k = 0; k < 5; k++) {
+            if (k != i)
+                rest[n++] = k;
+        }
+        incode_breathe(pause, UNITS);
+        set_orient3d(s, rest);
+        settle(&d, s);
+        int32_t middle = d.last - TOP > d.first ? d.last - TOP : d.first;
+        int sign = i % 2 == 0 ? -d.sign : d.sign;
+        if (sign != 0 && (top || middle > d.first))
+            add_lifted(sums, pause, &d, q, top ? middle : d.first,
+                       top ? d.last : middle, sign);
+    }
+}
+
+int incode_exact_in_sphere(const double *const p[5], struct incode_pause *pause)
 {
     struct problem s;
-    struct term squares[5][3], t[6];
-    problem_init(&s, p, 5, 5);
-    for (int32_t i = 0; i < 5; i++) {
-        for (int32_t k = 0; k < 3; k++) {
-            squares[i][k].sign = 0;
-            if (s.p[i][k].sign != 0)
-                term_product(&squares[i][k], &s.p[i][k], &s.p[i][k]);
-        }
-    }
-    /* -det with rows (x, y, z, |p|^2, 1): for each pair i < j of rows that
-     * give the last two columns, (-1)^(i+j) (|p_i|^2 - |p_j|^2) det3. */
-    for (int32_t i = 0; i < 5; i++) {
-        for (int32_t j = i + 1; j < 5; j++) {
-            int32_t rest[3], n = 0, sign = (i + j) % 2 == 0 ? 1 : -1;
-            for (int32_t k = 0; k < 5; k++) {
-                if (k != i && k != j)
-                    rest[n++] = k;
-            }
-            n = minor3(t, &s, rest[0], rest[1], rest[2]);
-            for (int32_t m = 0; m < n; m++) {
-                add_lifted(&s, &t[m], squares[i], sign);
-                add_lifted(&s, &t[m], squares[j], -sign);
-            }
-        }
-    }
-    return problem_sign(&s);
+    struct sums sums;
+    problem_init(&s, p, 5, 3);
+    sums.limbs = limbs_of(&s, 5);
+    sums.doubt = 0;
+    INCODE_ASSERT(sums.limbs <= LIFTED_LIMBS_MAX);
+    for (int32_t i = 0; i < 2; i++)
+        memset(sums.limb[i], 0, (size_t)sums.limbs * sizeof sums.limb[0][0]);
+    add_all(&sums, &s, pause, true);
+    int sign = compare(&sums, sums.doubt);
+    if (sign != 0 || sums.doubt == 0)
+        return sign;
+    add_all(&sums, &s, pause, false);
+    return compare(&sums, 0);
 }
 
 /* s += factor * x * y, factor being 1, -1, 2 or -2. */

@@ -12,6 +12,10 @@
  *   the polynomial itself, without rounding (exact.h).
  * Stack: below INCODE_EXACT_STACK + 1024 bytes. */
 
+/* Units of work, as pause.h counts them, of what no filter decides, at the
+ * most: fixed.h and pair.h, then exact.h, which counts in_sphere itself. */
+enum { ORIENT3D_UNITS = 10, IN_SPHERE_UNITS = 32, EXACT_ORIENT3D_UNITS = 64 };
+
 /* Static filters of Devillers and Pion: the sign of the rounded determinant is
  * right where it exceeds these times the largest differences, as long as no
  * product leaves the range of doubles. */
@@ -53,6 +57,7 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
             return -1;
     }
     tally->exact_orient3d++;
+    incode_breathe(&tally->pause, ORIENT3D_UNITS);
     const double *p[4] = {a, b, c, d};
     int64_t n[3][3];
     if (incode_fixed_differences(n, p + 1, 3, a, most))
@@ -60,6 +65,7 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     int sign;
     if (incode_pair_orient3d(p, most, &sign))
         return sign;
+    incode_breathe(&tally->pause, EXACT_ORIENT3D_UNITS);
     return incode_exact_orient3d(p);
 }
 
@@ -100,11 +106,12 @@ static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
     int64_t n[4][3];
     int sign;
     tally->exact_in_sphere++;
+    incode_breathe(&tally->pause, IN_SPHERE_UNITS);
     if (incode_fixed_differences(n, p, 4, p[4], most))
         return incode_fixed_in_sphere((const int64_t(*)[3])n, near_zero);
     if (incode_pair_in_sphere(p, most, &sign))
         return sign;
-    sign = incode_exact_in_sphere(p);
+    sign = incode_exact_in_sphere(p, &tally->pause);
     return sign != 0 ? sign : in_sphere_tie(tally, p);
 }
 

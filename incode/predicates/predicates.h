@@ -5,7 +5,7 @@
  * predicates.c).  Work: bounded for any finite input, denormals and 2^1023
  * included.
  *
- *     struct incode_tally tally = {0, 0};
+ *     struct incode_tally tally = {0};
  *     if (incode_orient3d(&tally, a, b, c, d) > 0)
  *         inside = incode_in_sphere(&tally, a, b, c, d, e) > 0;
  */
@@ -15,10 +15,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* How often the static filter could not tell and the exact stage decided. */
+#include "pause.h"
+
+/* How often the static filter could not tell and the exact stage decided, and
+ * who is to be called while much is asked: what is exact counts itself there,
+ * and those who ask what filters answer. */
 struct incode_tally {
     uint64_t exact_orient3d;
     uint64_t exact_in_sphere;
+    struct incode_pause pause;
 };
 
 /* Sign of the determinant with rows b-a, c-a, d-a: +1, 0 or -1, exact. */

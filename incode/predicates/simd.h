@@ -1,8 +1,8 @@
 /* Vectors in the compiler's own extension, as wide as the processor's
- * registers: 64 bytes with AVX-512, 32 with AVX2, else 16 (SSE2, NEON, or plain
- * code on a processor without any).  Products and sums stay separate operations
- * (-ffp-contract=off); nothing computed here decides anything without a
- * rigorous error bound beside it.
+ * registers: 64 bytes with AVX-512, 32 with AVX2, 16 with SSE2 and NEON, and a
+ * double at a time on a processor without any.  Products and sums stay separate
+ * operations (-ffp-contract=off); nothing computed here decides anything
+ * without a rigorous error bound beside it.
  *
  * Memory: none.  Work: constant.
  *
@@ -22,6 +22,8 @@
 #define INCODE_SSE2
 #elif defined(__aarch64__)
 #define INCODE_NEON
+#else
+#define INCODE_PLAIN
 #endif
 
 #if defined(INCODE_AVX512) || defined(INCODE_AVX2) || defined(INCODE_SSE2)
@@ -34,6 +36,8 @@
 #define INCODE_VECTOR 64
 #elif defined(INCODE_AVX2)
 #define INCODE_VECTOR 32
+#elif defined(INCODE_PLAIN)
+#define INCODE_VECTOR 8
 #else
 #define INCODE_VECTOR 16
 #endif
@@ -120,8 +124,10 @@ INCODE_INLINE uint32_t incode_vd_mask(incode_vl m)
     return (uint32_t)_mm256_movemask_pd((__m256d)m);
 #elif defined(INCODE_SSE2)
     return (uint32_t)_mm_movemask_pd((__m128d)m);
-#else
+#elif defined(INCODE_NEON)
     return (uint32_t)(m[0] & 1) | (uint32_t)(m[1] & 2);
+#else
+    return m[0] & 1;
 #endif
 }
 
@@ -136,8 +142,7 @@ INCODE_INLINE uint32_t incode_vf_mask(incode_vi m)
 #elif defined(INCODE_NEON)
     return vaddvq_u32((uint32x4_t)(m & (incode_vi){1, 2, 4, 8}));
 #else
-    return (uint32_t)(m[0] & 1) | (uint32_t)(m[1] & 2) | (uint32_t)(m[2] & 4) |
-           (uint32_t)(m[3] & 8);
+    return (uint32_t)(m[0] & 1) | (uint32_t)(m[1] & 2);
 #endif
 }
 
@@ -203,6 +208,8 @@ INCODE_INLINE incode_vd incode_vd_select(incode_vl m, incode_vd a, incode_vd b)
 {
 #ifdef INCODE_AVX2
     return (incode_vd)_mm256_blendv_pd((__m256d)b, (__m256d)a, (__m256d)m);
+#elif defined(INCODE_PLAIN)
+    return m[0] != 0 ? a : b;
 #else
     return (incode_vd)((m & (incode_vl)a) | (~m & (incode_vl)b));
 #endif
@@ -212,6 +219,8 @@ INCODE_INLINE incode_vf incode_vf_select(incode_vi m, incode_vf a, incode_vf b)
 {
 #ifdef INCODE_AVX2
     return (incode_vf)_mm256_blendv_ps((__m256)b, (__m256)a, (__m256)m);
+#elif defined(INCODE_PLAIN)
+    return (incode_vf){m[0] != 0 ? a[0] : b[0], m[1] != 0 ? a[1] : b[1]};
 #else
     return (incode_vf)((m & (incode_vi)a) | (~m & (incode_vi)b));
 #endif
@@ -239,6 +248,8 @@ INCODE_INLINE incode_vd incode_vd_max(incode_vd a, incode_vd b)
     return (incode_vd)_mm256_max_pd((__m256d)a, (__m256d)b);
 #elif defined(INCODE_SSE2)
     return (incode_vd)_mm_max_pd((__m128d)a, (__m128d)b);
+#elif defined(INCODE_PLAIN)
+    return (incode_vd){a[0] > b[0] ? a[0] : b[0]};
 #else
     return incode_vd_select(a > b, a, b);
 #endif
@@ -252,6 +263,8 @@ INCODE_INLINE incode_vd incode_vd_min(incode_vd a, incode_vd b)
     return (incode_vd)_mm256_min_pd((__m256d)a, (__m256d)b);
 #elif defined(INCODE_SSE2)
     return (incode_vd)_mm_min_pd((__m128d)a, (__m128d)b);
+#elif defined(INCODE_PLAIN)
+    return (incode_vd){a[0] < b[0] ? a[0] : b[0]};
 #else
     return incode_vd_select(a < b, a, b);
 #endif
@@ -265,6 +278,8 @@ INCODE_INLINE incode_vf incode_vf_max(incode_vf a, incode_vf b)
     return (incode_vf)_mm256_max_ps((__m256)a, (__m256)b);
 #elif defined(INCODE_SSE2)
     return (incode_vf)_mm_max_ps((__m128)a, (__m128)b);
+#elif defined(INCODE_PLAIN)
+    return (incode_vf){a[0] > b[0] ? a[0] : b[0], a[1] > b[1] ? a[1] : b[1]};
 #else
     return incode_vf_select(a > b, a, b);
 #endif
@@ -278,6 +293,8 @@ INCODE_INLINE incode_vf incode_vf_min(incode_vf a, incode_vf b)
     return (incode_vf)_mm256_min_ps((__m256)a, (__m256)b);
 #elif defined(INCODE_SSE2)
     return (incode_vf)_mm_min_ps((__m128)a, (__m128)b);
+#elif defined(INCODE_PLAIN)
+    return (incode_vf){a[0] < b[0] ? a[0] : b[0], a[1] < b[1] ? a[1] : b[1]};
 #else
     return incode_vf_select(a < b, a, b);
 #endif
@@ -333,6 +350,8 @@ incode_vd_least_of_each(const incode_vd a[INCODE_VD_LANES])
     }
     return (incode_vd)_mm256_min_pd(_mm256_permute2f128_pd(b[0], b[1], 0x20),
                                     _mm256_permute2f128_pd(b[0], b[1], 0x31));
+#elif defined(INCODE_PLAIN)
+    return a[0];
 #else
     incode_vd even = {a[0][0], a[1][0]}, odd = {a[0][1], a[1][1]};
     return incode_vd_min(even, odd);
@@ -341,12 +360,20 @@ incode_vd_least_of_each(const incode_vd a[INCODE_VD_LANES])
 
 INCODE_INLINE incode_vf incode_vf_abs(incode_vf a)
 {
+#ifdef INCODE_PLAIN
+    return (incode_vf){__builtin_fabsf(a[0]), __builtin_fabsf(a[1])};
+#else
     return (incode_vf)((incode_vi)a & incode_vi_all(INT32_MAX));
+#endif
 }
 
 INCODE_INLINE incode_vd incode_vd_abs(incode_vd a)
 {
+#ifdef INCODE_PLAIN
+    return (incode_vd){__builtin_fabs(a[0])};
+#else
     return incode_vd_max(a, -a);
+#endif
 }
 
 /* About a / b. */

@@ -45,6 +45,7 @@ struct solo {
     uint32_t pressure, brick_pressure;
     bool false_start; /* each job is begun twice, the first one abandoned */
     uint32_t units;   /* that a step may work; 0: as many as it likes */
+    struct incode_pause pause;
 
     /* What became of it. */
     struct host_digest digest;
@@ -303,7 +304,8 @@ static inline void solo_make(struct solo *s,
                                            .front = {s, solo_emit_room,
                                                      solo_emit, solo_commit,
                                                      solo_spill, solo_unspill},
-                                           .peers = *peers};
+                                           .peers = *peers,
+                                           .pause = s->pause};
     const char *why = "";
     s->t = incode_triangulator_init(s->arena, s->memory, &s->setup, &outside,
                                     &why);

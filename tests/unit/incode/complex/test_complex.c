@@ -137,7 +137,7 @@ static void draw_set(enum family family, double (*p)[3], uint32_t n)
 static void by_definition(const double (*p)[3], uint32_t n,
                           struct host_tetrahedra *tets)
 {
-    struct incode_tally tally = {0, 0};
+    struct incode_tally tally = {0};
     for (uint32_t m = 0; m < 1u << n; m++) {
         uint32_t t[4], count = 0;
         for (uint32_t i = 0; i < n && count < 5; i++) {

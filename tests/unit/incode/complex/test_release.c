@@ -106,7 +106,7 @@ static uint32_t release(struct scene *s, const double (*p)[3],
         if (final)
             append(s, c, tets);
     }
-    incode_complex_release(x);
+    incode_complex_release(x, &s->tally.pause);
     check_left(s);
     return count;
 }

@@ -91,7 +91,7 @@ static uint8_t *open_list(struct incode_afl *afl, uint32_t faces,
     uint8_t *memory = aligned_alloc(64, (bytes + GUARD + 63) / 64 * 64);
     assert_non_null(memory);
     memset(memory, 0xa5, bytes + GUARD);
-    incode_afl_init(afl, memory, faces, bricks);
+    incode_afl_init(afl, memory, faces, bricks, NULL);
     return memory;
 }
 
@@ -320,7 +320,7 @@ static void held_of_a_long_list(void **unused)
     uint32_t pairs[LIMIT][2], left = MANY;
     void *memory = malloc(incode_afl_bytes(MANY, BRICKS));
     assert_non_null(memory);
-    incode_afl_init(&afl, memory, MANY, BRICKS);
+    incode_afl_init(&afl, memory, MANY, BRICKS, NULL);
     for (uint32_t i = 0; i < MANY; i++)
         incode_afl_toggle(&afl, 1, 2 + i, 3 + i);
     while (left > 0) {
@@ -349,7 +349,7 @@ static void searches_of_long_lists(void **unused)
     static uint32_t pairs[MANY][2];
     void *memory = malloc(incode_afl_bytes(2 * MANY, BRICKS));
     assert_non_null(memory);
-    incode_afl_init(&afl, memory, 2 * MANY, BRICKS);
+    incode_afl_init(&afl, memory, 2 * MANY, BRICKS, NULL);
     for (uint32_t v = 0; v < VERTICES; v++) {
         uint64_t looks = afl.looks;
         for (uint32_t i = 0; i < MANY; i++)

@@ -351,7 +351,7 @@ static void open_world(struct world *w, const char *kind, uint64_t n)
     assert_non_null(w->spilled);
     memset(w->memory, 0xa5, w->bytes + GUARD);
     incode_front_init(&w->front, w->memory, &share, w->bricks, w->rule,
-                      &outside);
+                      &outside, NULL);
 }
 
 static void close_world(struct world *w)

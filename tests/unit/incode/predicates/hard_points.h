@@ -29,13 +29,16 @@ enum hard_family {
     HARD_DENORMAL,   /* multiples of 2^-1074 */
     HARD_UP,         /* the first seven where products begin to overflow */
     HARD_DOWN,       /* the first seven where products begin to underflow */
+    HARD_PERMUTED,   /* one point of any exponents, its coordinates in another
+                        order and with other signs, sometimes moved by an ulp:
+                        mostly on a sphere */
     HARD_FAMILIES
 };
 
 static const char *const hard_names[HARD_FAMILIES] = {
-    "uniform", "small grid", "large grid", "floats",   "plane",
-    "sphere",  "turned",     "spread",     "wide box", "exponents",
-    "ends",    "largest",    "denormal",   "up",       "down"};
+    "uniform",  "small grid", "large grid", "floats",    "plane", "sphere",
+    "turned",   "spread",     "wide box",   "exponents", "ends",  "largest",
+    "denormal", "up",         "down",       "permuted"};
 
 static uint64_t hard_bits(uint64_t *seed)
 {
@@ -157,6 +160,21 @@ static void hard_each(uint64_t *seed, enum hard_family family, double p[5][3])
     }
 }
 
+static void hard_permuted(uint64_t *seed, double p[5][3])
+{
+    double all[5][3];
+    hard_each(seed, HARD_EXPONENTS, all);
+    for (int i = 0; i < 5; i++) {
+        int turn = hard_below(seed, 3), odd = 1 + hard_below(seed, 2);
+        for (int k = 0; k < 3; k++)
+            p[i][k] = hard_sign(seed) * all[0][(odd * k + turn) % 3];
+    }
+    if (hard_below(seed, 2) != 0) {
+        double *moved = &p[hard_below(seed, 5)][hard_below(seed, 3)];
+        *moved = nextafter(*moved, 0);
+    }
+}
+
 static void hard_points(uint64_t *seed, enum hard_family family, double p[5][3])
 {
     double lo[3], hi[3], scale;
@@ -194,6 +212,9 @@ static void hard_points(uint64_t *seed, enum hard_family family, double p[5][3])
         break;
     case HARD_TURNED:
         hard_turned(seed, p);
+        break;
+    case HARD_PERMUTED:
+        hard_permuted(seed, p);
         break;
     case HARD_UP:
     case HARD_DOWN:
