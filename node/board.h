@@ -51,6 +51,14 @@ struct node_identity {
     uint32_t serial_baud;
 };
 
+/* What a board measures of itself, since its start. */
+struct node_gauges {
+    uint32_t stack_bytes;      /* that the node's stack has, */
+    uint32_t stack_high_water; /* and that were ever in use */
+    uint32_t overruns; /* bytes that came by a link and had no room, at most
+                          2^32 - 1 */
+};
+
 struct node_board {
     void *context;
     struct node_identity identity;
@@ -71,6 +79,8 @@ struct node_board {
     /* Bit i: whoever is at the other end of link i could not prove that it has
      * this node's key.  NULL: the wires have no keys. */
     uint32_t (*refused)(void *context);
+    /* NULL: there is nothing to tell. */
+    void (*gauges)(void *context, struct node_gauges *gauges);
     /* The node's end: a fresh start, or where there is a system, an exit with
      * this status. */
     void (*reset)(void *context, int status);

@@ -1,6 +1,7 @@
-/* A node's messages, of which those between it and the host are counted: the
- * host compares the counts with its own, and so learns of those that a node
- * on their way has lost with its memory.
+/* What a node gives its role: messages, of which those between it and the host
+ * are counted, and what looks at the links while it works long.  The host
+ * compares the counts with its own, and so learns of those that a node on their
+ * way has lost with its memory.
  *
  * Memory: the struct.  Work: that of cube_write.
  *
@@ -10,12 +11,14 @@
 #ifndef NODE_COUNTED_H
 #define NODE_COUNTED_H
 
+#include "incode/predicates/pause.h"
 #include "transport/cube.h"
 
 struct node_counted {
     struct cube *cube;
-    uint16_t self;           /* the node's number */
-    uint32_t received, sent; /* from and to the host, in this generation */
+    uint16_t self;             /* the node's number */
+    uint32_t received, sent;   /* from and to the host, in this generation */
+    struct incode_pause pause; /* what looks at the links in long work */
 };
 
 /* As cube_write. */

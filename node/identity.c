@@ -34,6 +34,18 @@ void node_identity_listen(struct learner *learner,
     learner_init(learner, board->pipes, links);
 }
 
+void node_identity_listen_ports(struct learner *learner,
+                                const struct node_board *board, unsigned ports,
+                                bool host)
+{
+    learner_init_ports(learner, board->pipes, ports, host);
+}
+
+void node_identity_ask(struct learner *learner, uint64_t now_us)
+{
+    learner_ask(learner, now_us);
+}
+
 bool node_identity_hear(struct learner *learner, struct node_identity *identity)
 {
     struct learned learned;
@@ -42,9 +54,18 @@ bool node_identity_hear(struct learner *learner, struct node_identity *identity)
     }
     identity->self = learned.self;
     identity->dimension = learned.dimension;
-    identity->host_port =
-        learned.self != 0 && learner->links > learned.dimension;
+    identity->host_port = learned.self != 0 &&
+                          (learner->ports ? learned.host_port
+                                          : learner->links > learned.dimension);
     return true;
+}
+
+bool node_identity_epoch_behind(const struct learner *learner,
+                                struct node_identity *identity)
+{
+    uint32_t known = learner->known.epoch;
+    identity->epoch = known == UINT32_MAX ? 1 : known + 1;
+    return known != 0;
 }
 
 const char *node_identity_doubt(const struct learner *learner)

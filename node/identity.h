@@ -5,11 +5,11 @@
  * Memory: struct learner, the caller's.  Work: a call reads what the links have
  * brought, LEARN_BYTES each at most, and never waits.
  *
- *     if (!node_identity_epoch(&board.identity, &board.source))
- *         return -1; // the board has neither random bytes nor a counter
- *     node_identity_listen(&learner, &board, links);
- *     while (!node_identity_hear(&learner, &board.identity))
+ *     node_identity_listen_ports(&learner, &board, 4, true);
+ *     while (!node_identity_hear(&learner, &board.identity)) {
+ *         node_identity_ask(&learner, board.now_us(board.context));
  *         board.idle(board.context, 50000);
+ *     }
  */
 #ifndef NODE_IDENTITY_H
 #define NODE_IDENTITY_H
@@ -27,9 +27,28 @@ bool node_identity_epoch(struct node_identity *identity,
 void node_identity_listen(struct learner *learner,
                           const struct node_board *board, unsigned links);
 
+/* The same of a board whose pipes 0 .. ports - 1 are sockets of dimensions 0 ..
+ * ports - 1, of which its cube may have fewer; with `host` pipe `ports` is that
+ * of a host, if there is one: where the identity that it hears is node 0's or
+ * has host_port, the board puts it at pipes[dimension] then. */
+void node_identity_listen_ports(struct learner *learner,
+                                const struct node_board *board, unsigned ports,
+                                bool host);
+
+/* Asks the neighbours who the node is, if it is time: for a board with serial
+ * wires, after whose reset they are up and do not greet.  Between two calls of
+ * node_identity_hear. */
+void node_identity_ask(struct learner *learner, uint64_t now_us);
+
 /* True: a neighbour has said who the node is, and identity has it. */
 bool node_identity_hear(struct learner *learner,
                         struct node_identity *identity);
+
+/* After that, for a board that has nothing for node_identity_epoch: the epoch
+ * behind the largest that the neighbours knew of this node, 1 behind 2^32 - 1.
+ * False: none knew one, and it is 1. */
+bool node_identity_epoch_behind(const struct learner *learner,
+                                struct node_identity *identity);
 
 /* NULL, or why a greeting that came told nothing. */
 const char *node_identity_doubt(const struct learner *learner);

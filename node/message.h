@@ -22,7 +22,7 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 9,              /* both ends must agree */
+    NODE_PROTOCOL = 10,             /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
     NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got, */
     NODE_PAGES_LENT_MAX = 8,        /* and of another node of an exchange */
@@ -293,6 +293,11 @@ struct node_finished_message {
     uint64_t pages_forwarded;     /* and asked for, or left, to the host */
     uint64_t retransmitted;       /* frames on all links */
     uint64_t memory_high_water;   /* bytes ever in use, `fixed` included */
+    uint32_t stack_bytes;         /* struct node_gauges of the board; 0 where */
+    uint32_t stack_high_water;    /* it has none */
+    uint32_t overruns;
+    uint32_t look_us_max; /* longest between two looks at the links, while the
+                             node was not idle */
     struct incode_statistics statistics;
 };
 
@@ -316,7 +321,9 @@ static_assert(sizeof(struct node_ready_message) <= CUBE_PAYLOAD_MAX,
               "a memory map fits a message");
 static_assert(offsetof(struct node_finished_message, wall_us) == 16,
               "statistics layout");
-static_assert(offsetof(struct node_finished_message, statistics) == 80,
+static_assert(offsetof(struct node_finished_message, stack_bytes) == 80,
+              "statistics layout");
+static_assert(offsetof(struct node_finished_message, statistics) == 96,
               "statistics layout");
 static_assert(sizeof(struct node_finished_message) <= CUBE_PAYLOAD_MAX,
               "statistics fit a message");

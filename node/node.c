@@ -4,18 +4,12 @@
 
 #include "arena.h"
 #include "incode/predicates/check.h"
+#include "looks.h"
 #include "node/roles/roles.h"
 #include "totals.h"
 #include "transport/wiring.h"
 
-enum {
-    IDLE_MAX_US = 100000,
-    FAREWELL_US = 500000,
-    LOOK_US = 50000,
-    SILENT_US =
-        1200000, /* twice the time in which a link has to say something */
-    SERIAL_BITS = 24000 /* more where frames wait for a slow wire */
-};
+enum { IDLE_MAX_US = 100000, FAREWELL_US = 500000 };
 
 struct node {
     const struct node_board *board;
@@ -35,12 +29,7 @@ struct node {
     struct node_finished_message before; /* of roles before this one */
     struct node_fault fault;
     bool fault_sent;
-    struct {
-        uint64_t frames; /* that had come at the last look */
-        uint32_t quiet_us;
-    } heard[CUBE_LINKS_MAX];
-    uint32_t silent; /* links, as a pong has told or is about to */
-    uint64_t looked_us;
+    struct node_looks looks;
     uint32_t work; /* steps and messages of roles: what a pong tells of it */
     struct node_pace pace;
     uint64_t now_us, stop_us;
@@ -132,8 +121,10 @@ struct node *node_start(const struct node_board *board, const char **why)
     node->role_bytes = board->arena_bytes - own - cube;
     node->cube = cube_init(memory + own, cube, &config);
     INCODE_ASSERT(node->cube != NULL);
+    node_looks_init(&node->looks, board, node->cube);
     node->counted.cube = node->cube;
     node->counted.self = board->identity.self;
+    node->counted.pause = node_looks_pause(&node->looks);
     node_pace_init(&node->pace, board->now_us, board->context);
     return node;
 }
@@ -315,60 +306,20 @@ static bool send_ready(struct node *n)
                               sizeof ready) == 0;
 }
 
-/* A wire whose ends never met is missing, or not there yet: the host says. */
-static uint32_t links_seen(const struct node *n)
-{
-    uint32_t seen = 0;
-    for (unsigned d = 0; d < cube_links(n->cube); d++) {
-        bool up = cube_link_statistics(n->cube, d)->sessions > 0;
-        seen |= (uint32_t)up << d;
-    }
-    return seen;
-}
-
-/* Whether a link that was up has said nothing for long, by this node's own
- * time: while it stood still itself it could not hear. */
-static bool is_silent(struct node *n, unsigned d, uint32_t passed_us)
-{
-    const struct link_statistics *s = cube_link_statistics(n->cube, d);
-    uint32_t baud = n->board->identity.serial_baud;
-    uint32_t limit_us =
-        SILENT_US +
-        (baud == 0 ? 0 : SERIAL_BITS * UINT32_C(10000) / baud * 100);
-    if (s->frames_received != n->heard[d].frames || s->sessions == 0) {
-        n->heard[d].frames = s->frames_received;
-        n->heard[d].quiet_us = 0;
-    } else if (n->heard[d].quiet_us <= limit_us) {
-        n->heard[d].quiet_us += passed_us;
-    }
-    return n->heard[d].quiet_us > limit_us;
-}
-
 /* What is new of silent neighbours the host is told unasked: its pings may not
  * come through. */
 static void look_at_links(struct node *n)
 {
-    uint64_t passed_us = n->now_us - n->looked_us;
-    uint32_t silent = 0;
-    if (passed_us < LOOK_US) {
-        return;
-    }
-    n->looked_us = n->now_us;
-    uint32_t step_us =
-        passed_us < 2 * LOOK_US ? (uint32_t)passed_us : 2 * LOOK_US;
-    for (unsigned d = 0; d < cube_links(n->cube); d++) {
-        silent |= (uint32_t)is_silent(n, d, step_us) << d;
-    }
-    n->owes_pong = n->owes_pong || (silent != n->silent && n->pinged);
-    n->silent = silent;
+    bool news = node_looks_silent(&n->looks, n->now_us);
+    n->owes_pong = n->owes_pong || (news && n->pinged);
 }
 
 static bool send_pong(struct node *n)
 {
     n->pong.start = n->board->identity.epoch;
     n->pong.sent = n->counted.sent;
-    n->pong.links = links_seen(n);
-    n->pong.silent = n->silent;
+    n->pong.links = node_looks_seen(&n->looks);
+    n->pong.silent = n->looks.silent;
     n->pong.refused =
         n->board->refused == NULL ? 0 : n->board->refused(n->board->context);
     n->pong.work = n->work;
@@ -381,15 +332,6 @@ static bool send_pong(struct node *n)
                               sizeof n->pong) == 0;
 }
 
-static void link_totals(const struct node *n,
-                        struct node_finished_message *finished)
-{
-    for (unsigned d = 0; d < cube_links(n->cube); d++) {
-        const struct link_statistics *s = cube_link_statistics(n->cube, d);
-        finished->retransmitted += s->retransmitted;
-    }
-}
-
 /* The statistics, where there is room for them on the link.  epoch: of the job
  * that is done, or 0. */
 static bool send_finished(struct node *n, uint32_t epoch)
@@ -399,12 +341,10 @@ static bool send_finished(struct node *n, uint32_t epoch)
         return false;
     }
     role_totals(n, &finished);
-    link_totals(n, &finished);
-    finished.busy_us = n->board->busy_us(n->board->context);
+    node_looks_totals(&n->looks, &finished);
     finished.epoch = epoch;
     finished.start = n->board->identity.epoch;
     finished.sent = n->counted.sent;
-    finished.links = links_seen(n);
     node_counted_put(&n->counted, CUBE_HOST, NODE_FINISHED, &finished,
                      sizeof finished);
     return true;
@@ -453,15 +393,6 @@ static unsigned send_role(struct node *n)
     return moved;
 }
 
-/* Whether a neighbour needs this node no more: it has said farewell, or is
- * gone. */
-static bool parted(const struct node *n, unsigned d)
-{
-    enum link_state state = cube_link_state(n->cube, d);
-    return state == LINK_CLOSED || state == LINK_DOWN ||
-           cube_link_statistics(n->cube, d)->pipe_closed > 0;
-}
-
 /* The farewell is passed on to other nodes first, then said on each link. */
 static bool may_stop(struct node *n)
 {
@@ -474,7 +405,7 @@ static bool may_stop(struct node *n)
         n->closing = true;
     }
     for (unsigned d = 0; d < cube_links(n->cube) && n->now_us < end; d++) {
-        if (!n->closing || !parted(n, d)) {
+        if (!n->closing || !node_looks_parted(&n->looks, d)) {
             return false;
         }
     }
@@ -513,7 +444,7 @@ static unsigned read_link(struct node *n, unsigned d)
 unsigned node_receive(struct node *node)
 {
     node->now_us = node->board->now_us(node->board->context);
-    unsigned moved = (unsigned)cube_poll(node->cube, node->now_us);
+    unsigned moved = node_looks_poll(&node->looks, node->now_us);
     follow_wiring(node);
     look_at_links(node);
     for (unsigned d = 0; d < cube_links(node->cube); d++) {
@@ -549,11 +480,16 @@ enum node_event node_send(struct node *node, unsigned moved)
     if (may_stop(node)) {
         return NODE_STOPPED;
     }
-    return moved > 0 ? NODE_BUSY : NODE_IDLE;
+    if (moved > 0) {
+        return NODE_BUSY;
+    }
+    node_looks_idle(&node->looks);
+    return NODE_IDLE;
 }
 
 enum node_event node_step(struct node *node)
 {
+    node->looks.tends = true;
     unsigned moved = node_receive(node);
     return node_send(node, moved + node_work(node));
 }

@@ -4,7 +4,8 @@
  *
  * Memory: the board's arena, filled as struct node_map of message.h states.
  * Work: a step handles the frames that links hold, then lets the role
- * compute for NODE_PACE_US (pace.h) and send what may leave.
+ * compute for NODE_PACE_US (pace.h) and send what may leave.  Where a piece of
+ * its work takes longer, the links move their frames in its midst (looks.h).
  *
  *     struct node *node = node_start(&board, &why);
  *     while ((event = node_step(node)) != NODE_STOPPED)
@@ -37,8 +38,9 @@ size_t node_arena_needed(const struct node_identity *identity, size_t memory,
 enum node_event node_step(struct node *node);
 
 /* A step in its parts, for who times nodes by their work and has their links
- * beside their processors.  Moves frames, passes on messages of others and
- * takes its own; lets the role compute: how much was done. */
+ * beside their processors: they are not tended in the midst of work then. Moves
+ * frames, passes on messages of others and takes its own; lets the role
+ * compute: how much was done. */
 unsigned node_receive(struct node *node);
 unsigned node_work(struct node *node);
 

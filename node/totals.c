@@ -12,6 +12,11 @@ static uint64_t higher(uint64_t a, uint64_t b)
     return a > b ? a : b;
 }
 
+static uint32_t most(uint32_t a, uint32_t b)
+{
+    return a > b ? a : b;
+}
+
 static void add_statistics(struct incode_statistics *sum,
                            const struct incode_statistics *more)
 {
@@ -41,5 +46,9 @@ void node_totals_add(struct node_finished_message *sum,
     sum->retransmitted += more->retransmitted;
     sum->memory_high_water =
         higher(sum->memory_high_water, more->memory_high_water);
+    sum->stack_bytes = most(sum->stack_bytes, more->stack_bytes);
+    sum->stack_high_water = most(sum->stack_high_water, more->stack_high_water);
+    sum->overruns += more->overruns;
+    sum->look_us_max = most(sum->look_us_max, more->look_us_max);
     add_statistics(&sum->statistics, &more->statistics);
 }

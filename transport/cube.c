@@ -224,20 +224,26 @@ void cube_drop_all(struct cube *cube)
     cube->again = false;
 }
 
-/* A link's last free slot goes to messages of others and of this node in
- * turn, so that neither starves. */
+/* A link's last room for a message of any size goes to messages of others and
+ * of this node in turn, so that neither starves: small ones, of a frame each,
+ * would leave a large one none for ever. */
 static bool may_pass_on(struct cube *cube, unsigned out, size_t size)
 {
-    unsigned room = link_room(cube->links[out], size);
+    const struct link *link = cube->links[out];
     uint32_t bit = (uint32_t)1 << out;
-    if (room == 0) {
+    if (cube->tending) {
+        return link_room(link, CUBE_MESSAGE_MAX) > 1;
+    }
+    if (link_room(link, size) == 0) {
         return false;
     }
-    if (room == 1 && (cube->kept_back & bit) != 0) {
-        cube->again = true;
+    bool last = link_room_behind(link, size, CUBE_MESSAGE_MAX) == 0;
+    if (last && (cube->kept_back & bit) != 0) {
+        /* Its turn comes with the next poll, or with an acknowledgement. */
+        cube->again |= link_room(link, CUBE_MESSAGE_MAX) > 0;
         return false;
     }
-    if (room == 1) {
+    if (last) {
         cube->kept_back |= bit;
     }
     return true;
@@ -281,6 +287,17 @@ static int pass_on_from(struct cube *cube, unsigned d)
     return passed;
 }
 
+static int pass_on_all(struct cube *cube)
+{
+    int count = 0;
+    cube->turn = cube->turn + 1 >= cube->count ? 0 : cube->turn + 1;
+    for (unsigned i = 0; i < cube->count; i++) {
+        unsigned d = cube->turn + i;
+        count += pass_on_from(cube, d < cube->count ? d : d - cube->count);
+    }
+    return count;
+}
+
 int cube_poll(struct cube *cube, uint64_t now_us)
 {
     int count = 0;
@@ -289,17 +306,29 @@ int cube_poll(struct cube *cube, uint64_t now_us)
         count += link_poll_receive(cube->links[d], now_us);
     }
     cube_gossip(cube, now_us);
-    cube->turn = cube->turn + 1 >= cube->count ? 0 : cube->turn + 1;
     uint32_t kept_before = cube->kept_back;
-    for (unsigned i = 0; i < cube->count; i++) {
-        unsigned d = cube->turn + i;
-        count += pass_on_from(cube, d < cube->count ? d : d - cube->count);
-    }
+    count += pass_on_all(cube);
     for (unsigned d = 0; d < cube->count; d++) {
         /* Kept back for one poll with room, no longer. */
         if (link_room(cube->links[d], CUBE_MESSAGE_MAX) > 0) {
             cube->kept_back &= ~(kept_before & (uint32_t)1 << d);
         }
+        count += link_poll_send(cube->links[d], now_us);
+    }
+    return count;
+}
+
+int cube_tend(struct cube *cube, uint64_t now_us)
+{
+    int count = 0;
+    for (unsigned d = 0; d < cube->count; d++) {
+        count += link_tend_receive(cube->links[d], now_us);
+    }
+    cube_note_comings(cube, now_us);
+    cube->tending = true;
+    count += pass_on_all(cube);
+    cube->tending = false;
+    for (unsigned d = 0; d < cube->count; d++) {
         count += link_poll_send(cube->links[d], now_us);
     }
     return count;

@@ -181,6 +181,13 @@ struct cube *cube_init(void *arena, size_t bytes,
  * the number of frames handled (0: nothing to do until bytes or time come). */
 int cube_poll(struct cube *cube, uint64_t now_us);
 
+/* The same for who is in the midst of something: between cube_read and
+ * cube_release, or between a look at cube_room and cube_write.  It enters no
+ * generation, and leaves room where there was some: neighbours' datagrams and
+ * farewells wait for cube_poll, and of others' messages only those pass that
+ * leave room for one of this node. */
+int cube_tend(struct cube *cube, uint64_t now_us);
+
 /* Queues a message.  dest: a node, CUBE_HOST or CUBE_ALL (every node but the
  * sender, along the binomial tree rooted at the sender; the host's goes by
  * the host gateway, or by all host ports where host_ports is given).  0, or

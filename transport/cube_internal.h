@@ -49,6 +49,7 @@ struct cube {
     unsigned held;      /* link of the message being read, or CUBE_LINKS_MAX */
     uint32_t kept_back; /* links whose last slot is left to this node once */
     uint16_t stamp;     /* of messages: wiring_stamp */
+    bool tending;       /* messages of others leave some room to this node's */
     bool again;         /* a message waits only for that turn to pass */
     uint8_t datagram[WIRING_BYTES_MAX]; /* the wiring, as it is told */
     size_t datagram_size;
@@ -68,7 +69,9 @@ void cube_drop_all(struct cube *cube);
  * that frame next. */
 void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence);
 
-/* gossip.c */
+/* gossip.c: a neighbour that came again may be in another generation. */
+void cube_note_comings(struct cube *cube, uint64_t now_us);
+
 void cube_gossip_start(struct cube *cube);
 void cube_gossip(struct cube *cube, uint64_t now_us);
 uint64_t cube_gossip_due_us(const struct cube *cube, uint64_t now_us);

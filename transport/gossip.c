@@ -214,12 +214,8 @@ static bool lags(const struct cube *cube, unsigned d)
     return !cube->neighbours[d].agreed && link_state(cube->links[d]) == LINK_UP;
 }
 
-void cube_gossip(struct cube *cube, uint64_t now_us)
+void cube_note_comings(struct cube *cube, uint64_t now_us)
 {
-    struct link_message datagram;
-    bool ask;
-    cube->now_us = now_us;
-    look(cube, now_us);
     for (unsigned d = 0; d < cube->count; d++) {
         const struct link_statistics *s = link_statistics(cube->links[d]);
         struct cube_neighbour *n = &cube->neighbours[d];
@@ -228,6 +224,17 @@ void cube_gossip(struct cube *cube, uint64_t now_us)
             n->agreed = n->together = false;
             n->told_us = now_us - CUBE_GOSSIP_US;
         }
+    }
+}
+
+void cube_gossip(struct cube *cube, uint64_t now_us)
+{
+    struct link_message datagram;
+    bool ask;
+    cube->now_us = now_us;
+    look(cube, now_us);
+    cube_note_comings(cube, now_us);
+    for (unsigned d = 0; d < cube->count; d++) {
         if (link_take_datagram(cube->links[d], &datagram, &ask)) {
             take_datagram(cube, d, &datagram, ask, now_us);
         }

@@ -1,9 +1,14 @@
 /* Who a node is that has neither options nor a file: it listens on its links
  * until a neighbour, or the host, greets a node that has such links there.  A
- * greeting to another is counted, and passed over.  Nothing is sent.
+ * greeting to another is counted, and passed over.
+ *
+ * A neighbour whose link is up does not greet, and a serial wire does not tell
+ * it that this end began anew: who has such wires asks, until it knows.  Over
+ * TCP without a key a question is not what a listener expects first: a pipe
+ * without `send` is not asked.
  *
  * Memory: struct learner, LEARN_BYTES a link.  Work: learner_poll reads at most
- * LEARN_BYTES a link.
+ * LEARN_BYTES a link; learner_ask sends at most 21 bytes a link.
  *
  *     learner_init(&learner, pipes, links);
  *     while (!learner_poll(&learner, &learned))
@@ -15,7 +20,13 @@
 
 #include "cube.h"
 
-enum { LEARN_BYTES = 64 }; /* a greeting takes 44 on the wire */
+enum {
+    LEARN_BYTES = 64,      /* a greeting takes 44 on the wire */
+    LEARN_ASK_BYTES = 32,  /* a question 21, and what its encoder writes past */
+    LEARN_ASK_US = 100000, /* between two on a link, at least */
+    LEARN_ASKS = 10,       /* a link of the node's own may leave unanswered, */
+    LEARN_HOST_ASKS = 3    /* and one to a host that may not be there */
+};
 
 struct learned {
     uint16_t self; /* who this node is, */
@@ -23,11 +34,25 @@ struct learned {
     bool host_port;   /* (other than node 0) the host itself says so */
     uint16_t teacher; /* by the account of this node or CUBE_HOST, */
     uint8_t link;     /* on this link */
+    uint32_t epoch;   /* the largest that any greeting said it knew of this
+                         node; 0: none did */
 };
 
 struct learner {
     struct link_pipe pipes[CUBE_LINKS_MAX];
     unsigned links;
+    bool ports;         /* begun by learner_init_ports */
+    unsigned host_link; /* there; CUBE_LINKS_MAX: none */
+    uint8_t ask[LEARN_ASK_BYTES];
+    unsigned ask_size;
+    unsigned asks;     /* times, each on all links, */
+    unsigned waited;   /* and so many of them since it was found */
+    uint64_t asked_us; /* the last time */
+    bool found;
+    struct learned known; /* once it was found */
+    /* Links whose other end has said what it knows of this node, or that it is
+     * learning itself, and so knows nothing. */
+    uint32_t settled;
     /* Greetings that came in by another link than they should: the last. */
     uint32_t misplaced;
     uint8_t misplaced_link, misplaced_expected;
@@ -36,14 +61,30 @@ struct learner {
     struct {
         uint8_t bytes[LEARN_BYTES];
         uint8_t size;
-        bool skipping; /* to the next zero */
+        uint8_t ask_left; /* bytes of a question */
+        bool skipping;    /* to the next zero */
     } heard[CUBE_LINKS_MAX];
 };
 
 void learner_init(struct learner *learner, const struct link_pipe *pipes,
                   unsigned links);
 
-/* True: *learned tells; what more the pipes have brought is for the cube. */
+/* Of a board with more sockets than its cube may have dimensions: pipes[0 ..
+ * ports - 1] are dimensions 0 .. ports - 1 of whatever cube, up to that
+ * dimension; with `host`, pipes[ports] is to the host, if one is there.  At
+ * most CUBE_LINKS_MAX pipes in all. */
+void learner_init_ports(struct learner *learner, const struct link_pipe *pipes,
+                        unsigned ports, bool host);
+
+/* Asks on each link that has `send`, at most every LEARN_ASK_US; to be called
+ * as often as learner_poll, since a pipe may take a part.  A link that is up,
+ * or opens, answers with a greeting and stays as it is. */
+void learner_ask(struct learner *learner, uint64_t now_us);
+
+/* True: *learned tells; what more the pipes have brought is for the cube.  One
+ * of learner_init_ports that asks waits, once it is found, for all its own
+ * links to settle, LEARN_ASKS questions long at most: its neighbours may know
+ * of different starts of it, and the largest epoch must be among them. */
 bool learner_poll(struct learner *learner, struct learned *learned);
 
 #endif

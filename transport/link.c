@@ -1,6 +1,5 @@
 #include "link.h"
 
-#include <assert.h>
 #include <string.h>
 
 #include "check.h"
@@ -10,104 +9,7 @@
 
 /* --- memory -------------------------------------------------------------- */
 
-enum {
-    STAGING_MOST = 8,
-    TIMEOUT_MIN_US = 100000,
-    TIMEOUT_FIRST_US = 200000,
-    TIMEOUT_MAX_US = 1000000
-};
-
-static uint32_t or_default(uint32_t value, uint32_t otherwise)
-{
-    return value != 0 ? value : otherwise;
-}
-
-static struct link_config complete(const struct link_config *config)
-{
-    struct link_config c = *config;
-    unsigned half = c.window / 2u > 4 ? c.window / 2u : 4;
-    unsigned staging = c.window < half ? c.window : half;
-    staging = staging < STAGING_MOST ? staging : STAGING_MOST;
-    c.message_max = (uint16_t)or_default(c.message_max, LINK_MESSAGE_MAX);
-    c.frame_payload = (uint16_t)or_default(c.frame_payload, c.message_max);
-    c.staging = (uint16_t)or_default(c.staging, staging);
-    c.timeout_min_us = or_default(c.timeout_min_us, TIMEOUT_MIN_US);
-    c.timeout_max_us = or_default(c.timeout_max_us, TIMEOUT_MAX_US);
-    c.ack_delay_us = or_default(c.ack_delay_us, 5000);
-    c.hello_us = or_default(c.hello_us, 50000);
-    c.keep_alive_us = or_default(c.keep_alive_us, 500000);
-    c.silence_us = or_default(c.silence_us, 3000000);
-    return c;
-}
-
-/* Bytes that may go over the wire between a frame and its acknowledgement: what
- * either driver has given to the wire, and what the peer has encoded ahead. */
-enum { SERIAL_BYTES = 2400, SERIAL_BAUD_MIN = 300 };
-
-void link_for_serial(struct link_config *config, uint32_t baud)
-{
-    uint32_t rate = baud < SERIAL_BAUD_MIN ? SERIAL_BAUD_MIN : baud;
-    uint32_t wait_us = (uint32_t)(UINT64_C(10000000) * SERIAL_BYTES / rate);
-    config->frame_payload = 408;
-    config->staging = 2;
-    config->timeout_min_us =
-        wait_us < TIMEOUT_MIN_US ? TIMEOUT_MIN_US : wait_us;
-    config->timeout_max_us = 4 * config->timeout_min_us;
-    if (config->timeout_max_us < TIMEOUT_MAX_US) {
-        config->timeout_max_us = TIMEOUT_MAX_US;
-    }
-    config->ack_delay_us = 1000;
-}
-
-static unsigned fragments(const struct link_config *c, size_t size)
-{
-    return size == 0
-               ? 1
-               : (unsigned)((size + c->frame_payload - 1u) / c->frame_payload);
-}
-
-static_assert(LINK_WINDOW_MAX == 64 && LINK_MESSAGE_MAX == 1616 &&
-                  LINK_FRAME_PAYLOAD_MIN == 32 &&
-                  LINK_FRAME_PAYLOAD_MAX == 1616,
-              "the texts of a fault say so");
-
-/* Of a config that is complete. */
-static const char *fault_of(const struct link_config *c)
-{
-    if (c->pipe.send == NULL || c->pipe.receive == NULL) {
-        return "a pipe has no functions";
-    }
-    if (c->epoch == 0) {
-        return "epoch is 0";
-    }
-    if (c->window < 1 || c->window > LINK_WINDOW_MAX) {
-        return "window is not 1 .. 64 frames";
-    }
-    if (c->message_max > LINK_MESSAGE_MAX) {
-        return "message_max is above 1616 bytes";
-    }
-    if (c->frame_payload % 8 != 0 ||
-        c->frame_payload < LINK_FRAME_PAYLOAD_MIN ||
-        c->frame_payload > LINK_FRAME_PAYLOAD_MAX) {
-        return "frame_payload is no multiple of 8 from 32 to 1616 bytes";
-    }
-    if (fragments(c, c->message_max) > c->window) {
-        return "window does not hold the frames of a message";
-    }
-    if (c->staging > LINK_WINDOW_MAX) {
-        return "staging is above 64 frames";
-    }
-    if (c->timeout_min_us > c->timeout_max_us) {
-        return "timeout_min_us is above timeout_max_us";
-    }
-    return NULL;
-}
-
-const char *link_config_fault(const struct link_config *config)
-{
-    struct link_config c = complete(config);
-    return fault_of(&c);
-}
+enum { TIMEOUT_FIRST_US = 200000 };
 
 static size_t up8(size_t bytes)
 {
@@ -125,13 +27,13 @@ static size_t buffer_bytes(const struct link_config *c)
 static size_t receive_bytes(const struct link_config *c)
 {
     return (size_t)c->frame_payload *
-           (c->window + fragments(c, c->message_max) - 1u);
+           (c->window + link_fragments(c, c->message_max) - 1u);
 }
 
 size_t link_bytes(const struct link_config *config)
 {
-    struct link_config c = complete(config);
-    if (fault_of(&c) != NULL) {
+    struct link_config c = link_complete(config);
+    if (link_config_fault(config) != NULL) {
         return 0;
     }
     return up8(sizeof(struct link)) +
@@ -151,7 +53,7 @@ static void *carve(uint8_t **memory, size_t bytes)
 struct link *link_init(void *memory, size_t bytes,
                        const struct link_config *config)
 {
-    struct link_config c = complete(config);
+    struct link_config c = link_complete(config);
     size_t needed = link_bytes(config);
     if (needed == 0 || bytes < needed || (uintptr_t)memory % 8 != 0) {
         return NULL;
@@ -170,7 +72,7 @@ struct link *link_init(void *memory, size_t bytes,
     LINK_ASSERT((size_t)(rest - (uint8_t *)memory) == needed);
     memset(link->send.slots, 0, c.window * sizeof *link->send.slots);
     memset(link->receive.slots, 0, c.window * sizeof *link->receive.slots);
-    link->fragments_max = (uint16_t)fragments(&c, c.message_max);
+    link->fragments_max = (uint16_t)link_fragments(&c, c.message_max);
     link->send.first = link->send.next = link->send.end = (uint16_t)c.epoch;
     link->send.limit = link->send.first;
     link->statistics.timeout_us = TIMEOUT_FIRST_US < c.timeout_min_us
@@ -182,13 +84,24 @@ struct link *link_init(void *memory, size_t bytes,
 
 /* --- messages ------------------------------------------------------------ */
 
+static unsigned frames_free(const struct link *link)
+{
+    return link->closing || link->closed
+               ? 0
+               : link->config.window - link_used(link);
+}
+
 unsigned link_room(const struct link *link, size_t size)
 {
-    if (link->closing || link->closed) {
-        return 0;
-    }
-    return (link->config.window - link_used(link)) /
-           fragments(&link->config, size);
+    return frames_free(link) / link_fragments(&link->config, size);
+}
+
+unsigned link_room_behind(const struct link *link, size_t first, size_t size)
+{
+    unsigned left = frames_free(link), taken;
+    taken = link_fragments(&link->config, first);
+    LINK_ASSERT(taken <= left);
+    return (left - taken) / link_fragments(&link->config, size);
 }
 
 /* A message in two parts, from which fragments are cut. */
@@ -362,6 +275,9 @@ static void enter(struct link *link, enum link_session session)
 static void on_frame(struct link *link, struct link_frame *frame)
 {
     const struct frame_header *header = &frame->header;
+    if (link->tending && header->kind == LINK_BYE) {
+        return;
+    }
     if (header->kind != LINK_HELLO) {
         enum link_session session = link_accept_session(link, header->session);
         if (session == LINK_FOREIGN) {
@@ -443,6 +359,14 @@ int link_poll_receive(struct link *link, uint64_t now_us)
             break;
         }
     }
+    return count;
+}
+
+int link_tend_receive(struct link *link, uint64_t now_us)
+{
+    link->tending = true;
+    int count = link_poll_receive(link, now_us);
+    link->tending = false;
     return count;
 }
 

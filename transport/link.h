@@ -203,6 +203,10 @@ int link_poll(struct link *link, uint64_t now_us);
 int link_poll_receive(struct link *link, uint64_t now_us);
 int link_poll_send(struct link *link, uint64_t now_us);
 
+/* As link_poll_receive, for who is about to write and has looked for room: a
+ * farewell, which would take it, is passed over.  It comes again. */
+int link_tend_receive(struct link *link, uint64_t now_us);
+
 /* Queues a message made of two parts: 0, or LINK_AGAIN while there is no room.
  * Messages may be queued before the peer was heard. */
 int link_write(struct link *link, const void *head, size_t head_size,
@@ -210,6 +214,9 @@ int link_write(struct link *link, const void *head, size_t head_size,
 
 /* Messages of `size` bytes that link_write would take now. */
 unsigned link_room(const struct link *link, size_t size);
+
+/* The same behind one of `first` bytes, for which there is room. */
+unsigned link_room_behind(const struct link *link, size_t first, size_t size);
 
 /* The oldest message, valid until link_release; false: none. */
 bool link_read(struct link *link, struct link_message *message);

@@ -129,9 +129,14 @@ struct link {
     uint32_t told_by;  /* the start of the peer that said that it is in use, */
     uint64_t told_us;  /* and when */
     uint64_t now_us, heard_us, sent_us, hello_us, bye_us, deadline_us;
-    bool pipe_up, up, hello_now, stalled;
+    bool pipe_up, up, hello_now, stalled, tending;
     bool closing, closed, bye_due;
 };
+
+/* link_config.c: the defaults are filled in; frames of a message of that
+ * size. */
+struct link_config link_complete(const struct link_config *config);
+unsigned link_fragments(const struct link_config *config, size_t size);
 
 /* Of one encoded frame, of any kind. */
 static inline size_t link_frame_bytes(const struct link_config *config)

@@ -150,6 +150,19 @@ static void tell_of_greeting(const struct learner *learner, bool *told)
     }
 }
 
+/* A terminal does not break when a node ends: its neighbours may be up, and
+ * greet only if they are asked.  A socket does, and is not asked, as a question
+ * is no greeting to who decides by the first bytes whether to let one in. */
+static void ask_terminals(const struct linux_board *board,
+                          struct learner *learner)
+{
+    for (unsigned i = 0; i < board->links_count; i++) {
+        if (board->wire[i].kind != LINUX_TERMINAL) {
+            learner->pipes[i].send = NULL;
+        }
+    }
+}
+
 /* Waits until a neighbour has said who this node is. */
 static void learn(const struct node_board *board, struct linux_options *options)
 {
@@ -158,8 +171,10 @@ static void learn(const struct node_board *board, struct linux_options *options)
     struct node_identity identity = {.self = 0};
     bool told = false;
     node_identity_listen(&learner, board, links->links_count);
+    ask_terminals(links, &learner);
     while (!node_identity_hear(&learner, &identity)) {
         tell_of_greeting(&learner, &told);
+        node_identity_ask(&learner, now_us(links));
         idle(links, 50000);
     }
     options->node = identity.self;

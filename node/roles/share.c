@@ -293,16 +293,24 @@ bool node_share_out_bytes(struct node_share *share, enum node_share_kind kind,
     return put >= 0;
 }
 
+/* Whoever has a share answers at once, where its own program goes on; one who
+ * has taken a list may wait for that other, or for pages. */
 uint16_t node_share_owing(const struct node_share *share)
 {
+    uint16_t owing = CUBE_HOST;
     for (uint16_t i = 0; i < share->places; i++) {
         struct tuples_account account = tuples_account(share->space, i);
-        if (share->node_of[i] != share->counted->self &&
-            account.taken != account.put) {
+        if (share->node_of[i] == share->counted->self) {
+            continue;
+        }
+        if (tuples_due(share->space, i) > 0) {
             return share->node_of[i];
         }
+        if (owing == CUBE_HOST && account.taken != account.put) {
+            owing = share->node_of[i];
+        }
     }
-    return CUBE_HOST;
+    return owing;
 }
 
 /* ---- the carrier ---- */

@@ -81,7 +81,8 @@ struct node_carrier node_share_carrier(struct node_share *share,
                                        enum node_share_kind takes,
                                        uint32_t takes_max);
 
-/* At the manager: a node that has taken a list and put no answer; CUBE_HOST:
+/* At the manager: a node that has not answered an operation, such as the eval
+ * of its process; else one that has taken a list and put no answer; CUBE_HOST:
  * there is none. */
 uint16_t node_share_owing(const struct node_share *share);
 

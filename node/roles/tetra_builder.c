@@ -52,7 +52,7 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
     node_requests_init(&t->requests, setup->holders, NULL, counted, fault);
     const struct incode_page_source source = node_requests_source(&t->requests);
     incode_builder_init(&t->builder, memory, bytes, &setup->setup,
-                        setup->jobs_per_worker, &source);
+                        setup->jobs_per_worker, &source, &counted->pause);
     return true;
 }
 

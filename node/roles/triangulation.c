@@ -41,7 +41,8 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
     const struct incode_outside outside = {
         .pages = node_requests_source(&t->requests),
         .front = node_outlet_outside(&t->outlet),
-        .peers = *peers};
+        .peers = *peers,
+        .pause = counted->pause};
     t->triangulator = incode_triangulator_init(memory + before, bytes - before,
                                                &setup->setup, &outside, &why);
     if (t->triangulator == NULL) {

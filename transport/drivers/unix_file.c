@@ -33,6 +33,12 @@ static int bind_for_owner(int fd, const struct tcp_address *address)
     return status;
 }
 
+int unix_file_pair(int fds[2])
+{
+    return socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0,
+                      fds);
+}
+
 int unix_file_bind(int fd, const struct tcp_address *address)
 {
     if (bind_for_owner(fd, address) == 0) {

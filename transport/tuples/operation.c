@@ -195,6 +195,18 @@ int tuples_rdp(struct tuples *space, const struct tuple *pattern)
     return ask(space, TUPLES_VERB_RDP, pattern);
 }
 
+unsigned tuples_due(const struct tuples *space, uint16_t place)
+{
+    unsigned due = 0;
+    LINK_ASSERT(place < space->config.places);
+    for (unsigned i = 0; i < space->each; i++) {
+        uint8_t tied = space->operations[i].ties[place];
+        due += tied == TUPLES_ASKED || tied == TUPLES_ASKED_LAST ||
+               tied == TUPLES_PUT_SENT;
+    }
+    return due;
+}
+
 bool tuples_is_open(const struct tuples *space, int operation)
 {
     LINK_ASSERT(operation >= 0 && operation < space->config.operations);

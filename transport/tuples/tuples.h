@@ -140,6 +140,11 @@ struct tuples_account {
 struct tuples_account tuples_account(const struct tuples *space,
                                      uint16_t place);
 
+/* Operations of this place that a place was asked for and has not answered: one
+ * that takes its messages does so at its next step, unless it was sent what it
+ * has no room for. */
+unsigned tuples_due(const struct tuples *space, uint16_t place);
+
 /* Operations that may be begun now. */
 unsigned tuples_room(const struct tuples *space);
 

@@ -59,6 +59,13 @@ static void epochs(void **unused)
     assert_int_equal(id.self, 3);
 }
 
+/* NOLINTNEXTLINE(readability-non-const-parameter): a pipe's signature */
+static int deaf(void *context, uint8_t *bytes, size_t size)
+{
+    (void)context, (void)bytes, (void)size;
+    return 0;
+}
+
 /* Node 1 of two hears node 0, whose wire may be in the wrong link first. */
 static void a_neighbour_says_it(void **unused)
 {
@@ -107,8 +114,41 @@ static void a_neighbour_says_it(void **unused)
     assert_int_equal(id.dimension, 1);
     assert_int_equal(id.window, 5);
     assert_false(id.host_port);
+    /* A board of four sockets and one for a host, which asks: node 0 has not
+     * met it before, and it has no wire to a host. */
+    board.pipes[4] = host_sim_cube_pipe(&wires, 0, 1);
+    board.pipes[1].receive = board.pipes[2].receive = deaf;
+    board.pipes[3] = board.pipes[1];
+    board.pipes[4].receive = deaf;
+    id = (struct node_identity){.window = 5};
+    node_identity_listen_ports(&learner, &board, 4, true);
+    for (unsigned i = 0; !node_identity_hear(&learner, &id); i++) {
+        assert_true(i < 100);
+        node_identity_ask(&learner, now_us);
+        now_us += 20000;
+        (void)cube_poll(cube, now_us);
+    }
+    assert_int_equal(id.self, 1);
+    assert_int_equal(id.dimension, 1);
+    assert_false(id.host_port);
+    assert_false(node_identity_epoch_behind(&learner, &id));
     free(memory);
     host_sim_cube_close(&wires);
+}
+
+static void an_epoch_follows_what_neighbours_knew(void **unused)
+{
+    struct learner learner = {.known = {.epoch = 0}};
+    struct node_identity id = {.epoch = 0};
+    (void)unused;
+    assert_false(node_identity_epoch_behind(&learner, &id));
+    assert_int_equal(id.epoch, 1);
+    learner.known.epoch = 17;
+    assert_true(node_identity_epoch_behind(&learner, &id));
+    assert_int_equal(id.epoch, 18);
+    learner.known.epoch = UINT32_MAX;
+    assert_true(node_identity_epoch_behind(&learner, &id));
+    assert_int_equal(id.epoch, 1);
 }
 
 int main(void)
@@ -116,6 +156,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(epochs),
         cmocka_unit_test(a_neighbour_says_it),
+        cmocka_unit_test(an_epoch_follows_what_neighbours_knew),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -242,6 +242,35 @@ static void a_flood_does_not_starve_the_node_it_passes(void **unused)
     destroy(m);
 }
 
+/* Nor where its own messages are of four frames, and those that pass of one. */
+static void small_messages_leave_room_for_a_large_one(void **unused)
+{
+    static const uint8_t large[CUBE_PAYLOAD_MAX];
+    struct host_sim_cube_options slow = perfect;
+    struct cube_config c = {.window = 7, .frame_payload = 408, .staging = 2};
+    struct cube_message message;
+    unsigned own = 0, others = 0;
+    (void)unused;
+    slow.wire.bytes_per_s = 100000;
+    struct machine *m = build(2, &c, &slow, 1);
+    for (unsigned i = 0; i < 50000; i++) {
+        m->now_us += 100;
+        for (unsigned k = 0; k < m->nodes; k++) {
+            struct cube *node = m->places[k].cube;
+            cube_poll(node, m->now_us);
+            cube_write(node, CUBE_HOST, 1, large, k == 0 ? sizeof large : 40);
+        }
+        struct cube *host = m->places[m->nodes].cube;
+        cube_poll(host, m->now_us);
+        while (cube_read(host, &message)) {
+            *(message.source == 0 ? &own : &others) += 1;
+            cube_release(host);
+        }
+    }
+    assert_true(own > 100 && others > 200);
+    destroy(m);
+}
+
 static void a_wrong_wire_is_named(void **unused)
 {
     struct cube_config c = {.window = 2};
@@ -445,6 +474,7 @@ int main(void)
         cmocka_unit_test(a_host_that_is_slow),
         cmocka_unit_test(an_unread_message_holds_its_own_link_alone),
         cmocka_unit_test(a_flood_does_not_starve_the_node_it_passes),
+        cmocka_unit_test(small_messages_leave_room_for_a_large_one),
         cmocka_unit_test(a_wrong_wire_is_named),
         cmocka_unit_test(wrong_wires_in_words),
         cmocka_unit_test(limits_of_a_config),
