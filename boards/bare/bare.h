@@ -1,0 +1,79 @@
+/* A node without an operating system: what its board must give, and what all
+ * such boards share (this folder).  A board's start-up code sets up stacks,
+ * .data and .bss (start.ld), and calls bare_main with interrupts off.
+ *
+ * Memory: that of start.ld's sections.  Work: each function's bound is beside
+ * it.
+ *
+ *     board_start();
+ *     board_unlock(0);
+ *     while (!bare_uart_heard(&bare_uart[0]))
+ *         board_wait(10000);
+ */
+#ifndef BOARDS_BARE_BARE_H
+#define BOARDS_BARE_BARE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "flash.h"
+#include "uart.h"
+
+/* Of the linker script, which asserts it. */
+enum {
+    BARE_STACK_BYTES = 49152,
+    BARE_NOINIT_BYTES = 256 /* memory that a restart leaves as it is */
+};
+
+/* --- what a board gives --------------------------------------------------- */
+
+struct board_facts {
+    const char *name; /* of its folder */
+    /* UART 0 is the console and the host's wire, UARTs 1 .. ports are those of
+     * dimensions 0 .. ports - 1; at most BARE_UARTS_MAX - 1. */
+    unsigned ports;
+    uint32_t baud;
+    size_t data_bytes; /* of its data memory: .noinit included, at most 4 MiB */
+    const struct bare_flash *flash; /* NULL: it has none */
+};
+
+extern const struct board_facts board_facts;
+
+/* Begins time, the guard, and the UARTs with their interrupts. */
+void board_start(void);
+
+/* Microseconds since board_start, never going back.  In handlers too. */
+uint64_t board_now_us(void);
+
+/* Keeps interrupts away; gives back how it was. */
+uint32_t board_lock(void);
+void board_unlock(uint32_t before);
+
+/* Under a lock: sleeps until an interrupt is due, or wait_us are over, or
+ * before.  The interrupt is taken once the lock is given back. */
+void board_wait(uint64_t wait_us);
+
+/* Bytes were put to bare_uart[uart].send: sees to it that they go, now or when
+ * those before them are gone. */
+void board_uart_send(unsigned uart);
+
+/* Sends a byte of the console, by waiting until the UART takes it, at most
+ * 100 ms.  Works when nothing else does.  False: it was not taken. */
+bool board_console_put(uint8_t byte);
+
+/* Restarts the board unless board_feed is called again within so long, telling
+ * who hung.  0: the guard is off. */
+void board_guard(uint32_t period_us);
+void board_feed(void);
+
+/* Everything begins anew, as after power on; .noinit stays.  What the UARTs
+ * have been given goes first, as far as they still can. */
+_Noreturn void board_restart(void);
+
+/* --- what all share ------------------------------------------------------- */
+
+/* The node program, from start to restart. */
+_Noreturn void bare_main(void);
+
+#endif

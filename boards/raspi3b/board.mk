@@ -1,0 +1,12 @@
+# Raspberry Pi 3: a Cortex-A53, 64 bits; the first of its four processors.
+# Interrupts' handlers, which are this folder's, save no vectors.
+prefix  = aarch64-linux-gnu-
+machine = -mcpu=cortex-a53 -mno-outline-atomics -fno-pie -no-pie \
+	-fno-stack-protector -fno-asynchronous-unwind-tables
+sources =
+$(BUILD)/firmware/raspi3b/boards/raspi3b/%.o: private BARE += \
+	-mgeneral-regs-only
+# Of the handlers' stack, what start.S takes first.
+exception_bytes = 192
+# How tests start it.
+emulator = qemu-system-aarch64 -M raspi3b
