@@ -21,6 +21,7 @@
 #include "host/mesh/tetrahedra.h"
 #include "host/run/arguments.h"
 #include "host/run/begin.h"
+#include "host/run/emulate.h"
 #include "host/run/launch.h"
 #include "host/run/on_cube.h"
 #include "host/run/run.h"
@@ -328,9 +329,12 @@ static const struct command commands[] = {
     {"cube", "FILE", "check a cube file, print what starts its nodes",
      command_cube},
     {"key", "FILE", "make a cube's key", command_key},
-    {"bench", "paper|links|peers",
-     "the paper's tables on this machine; its links;\nother triangulators in "
-     "turn with this one",
+    {"emulate", "-o FILE.cube",
+     "boards without a system, emulated, and the cube\nfile that leads to them",
+     host_emulate},
+    {"bench", "paper|links|..",
+     "the paper's tables on this machine; its links;\nbare boards; other "
+     "triangulators beside this one",
      host_bench},
     {"sim", "--seeds A..B", "whole cubes in virtual time, with faults",
      command_sim},

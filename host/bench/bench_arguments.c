@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bench_boards.h"
 #include "bench_class.h"
 #include "bench_links.h"
 #include "bench_paper.h"
@@ -31,7 +32,8 @@ enum {
 struct arguments {
     const char *what; /* the benchmark */
     struct host_paper_options paper;
-    const char *of_paper, *of_peers; /* options given that they alone have */
+    /* Options given that they alone have; of_both: paper and boards. */
+    const char *of_paper, *of_peers, *of_both;
     struct host_bench_peers_options peers;
     struct host_error *error;
 };
@@ -49,8 +51,10 @@ static const struct argp_option options[] = {
      "The grid of NASA's Blunt Fin. Default: one like it", 1},
     {"million", KEY_MILLION, NULL, 0,
      "The goal for 1,000,000 points on 1,024 nodes, too", 1},
-    {"csv", KEY_CSV, "FILE", 0, "All rows, as CSV", 1},
-    {"svg", KEY_SVG, "FILE", 0, "Figure 11, by gnuplot", 1},
+    {NULL, 0, NULL, 0, "Of paper and boards:", 3},
+    {"csv", KEY_CSV, "FILE", 0, "All rows, as CSV", 3},
+    {"svg", KEY_SVG, "FILE", 0,
+     "Figure 11, by gnuplot; or each board's instructions as a bar", 3},
     {NULL, 0, NULL, 0, "Of peers:", 2},
     {"rounds", KEY_ROUNDS, "N", 0, "Medians of N rounds. Default: 3", 2},
     {"class", KEY_CLASS, "NAME", 0,
@@ -119,11 +123,11 @@ static bool parse_paper(int key, const char *value, struct arguments *a)
         paper->large = true;
         return true;
     case KEY_CSV:
-        a->of_paper = "--csv";
+        a->of_both = "--csv";
         paper->csv = value;
         return true;
     case KEY_SVG:
-        a->of_paper = "--svg";
+        a->of_both = "--svg";
         paper->svg = value;
         return true;
     default:
@@ -175,12 +179,13 @@ static error_t parse_bench(int key, char *value, struct argp_state *state)
 static const struct argp bench = {
     options,
     parse_bench,
-    "paper\nlinks\npeers [DIRECTORY|FILE]...",
+    "paper\nlinks\nboards\npeers [DIRECTORY|FILE]...",
     "Measures this machine: paper prints Tables 1 to 7 and figure 11 of "
     "Cignoni, Laforenza, Perego, Scopigno and Montani (1995) beside the "
     "paper's figures, for up to 256 nodes in virtual time; links prints what a "
-    "link "
-    "does over each driver; peers, in the source tree, runs CGAL, TetGen and "
+    "link does over each driver; boards, in the source tree, what a "
+    "tetrahedron costs each bare board, emulated, in instructions and bytes, "
+    "and where they go; peers, in the source tree, runs CGAL, TetGen and "
     "Qhull in turn with this program on points that it makes and on those "
     "given, and prints times, ratios and the goals of each class.",
     NULL,
@@ -192,15 +197,16 @@ static int check(const struct arguments *a, struct host_error *error)
 {
     bool peers = strcmp(a->what, "peers") == 0;
     bool paper = strcmp(a->what, "paper") == 0;
-    if (!peers && !paper && strcmp(a->what, "links") != 0) {
+    bool boards = strcmp(a->what, "boards") == 0;
+    if (!peers && !paper && !boards && strcmp(a->what, "links") != 0) {
         return host_fail(error, HOST_USAGE,
                          "bench %s: not in this version; allowed: paper, "
-                         "links, peers",
+                         "links, boards, peers",
                          a->what);
     }
     const char *other = peers ? a->of_paper : a->of_peers;
-    if (other == NULL && !peers && !paper) {
-        other = a->of_paper;
+    if (other == NULL && !paper) {
+        other = a->of_paper != NULL || boards ? a->of_paper : a->of_both;
     }
     if (other != NULL) {
         return host_fail(error, HOST_USAGE,
@@ -223,7 +229,8 @@ int host_bench(int argc, char **argv, struct host_error *error)
     }
     if (a.what == NULL) {
         return host_fail(error, HOST_USAGE,
-                         "%s: too few arguments; give paper, links or peers, "
+                         "%s: too few arguments; give paper, links, boards or "
+                         "peers, "
                          "see --help",
                          argv[0]);
     }
@@ -232,6 +239,10 @@ int host_bench(int argc, char **argv, struct host_error *error)
     }
     if (strcmp(a.what, "links") == 0) {
         return host_bench_links(error);
+    }
+    if (strcmp(a.what, "boards") == 0) {
+        struct host_bench_boards_options boards = {a.paper.csv, a.paper.svg};
+        return host_bench_boards(&boards, error);
     }
     if (strcmp(a.what, "peers") == 0) {
         return host_bench_peers(&a.peers, error);

@@ -73,8 +73,30 @@ static int make(const char *folder, const char *path, struct host_error *error)
                ? 0
                : host_fail(error, HOST_BROKEN,
                            "%s: it cannot be made (%s); run make %s, or leave "
-                           "it out with --peers",
+                           "it out",
                            path, trial.said, path);
+}
+
+static int need_source(const char *bench, struct host_error *error)
+{
+    return access("Makefile", R_OK) == 0 &&
+                   access("tests/bench/peer.hpp", R_OK) == 0
+               ? 0
+               : host_fail(error, HOST_USAGE,
+                           "bench %s: there is no tests/bench here, of which "
+                           "it is made; run it at the top of the source tree",
+                           bench);
+}
+
+int host_bench_made(const char *name, char path[4096], struct host_error *error)
+{
+    char folder[PATH_MAX];
+    if (need_source("boards", error) != 0) {
+        return error->code;
+    }
+    build_folder(folder);
+    (void)snprintf(path, 4096, "%.4000s/peers/%s", folder, name);
+    return make(folder, path, error);
 }
 
 int host_bench_build(struct host_bench_builds *builds, const char *wanted,
@@ -87,12 +109,8 @@ int host_bench_build(struct host_bench_builds *builds, const char *wanted,
         0) {
         return error->code;
     }
-    if (access("Makefile", R_OK) != 0 ||
-        access("tests/bench/peer.hpp", R_OK) != 0) {
-        return host_fail(error, HOST_USAGE,
-                         "bench peers: there is no tests/bench here, of which "
-                         "the peers are made; run it at the top of the source "
-                         "tree");
+    if (need_source("peers", error) != 0) {
+        return error->code;
     }
     build_folder(folder);
     host_progress_phase("making the peers", NULL);

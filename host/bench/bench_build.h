@@ -24,4 +24,9 @@ struct host_bench_builds {
 int host_bench_build(struct host_bench_builds *builds, const char *wanted,
                      struct host_error *error);
 
+/* Makes a file of build/peers, from tests/bench: 0 and its path, or as above.
+ */
+int host_bench_made(const char *name, char path[4096],
+                    struct host_error *error);
+
 #endif

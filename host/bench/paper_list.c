@@ -34,7 +34,7 @@ int host_paper_list(const struct host_tetrahedra *tets, uint64_t vertices,
     }
     list->seconds = INFINITY;
     for (int times = 0; times < TIMES; times++) {
-        incode_afl_init(&afl, memory, capacity, bricks);
+        incode_afl_init(&afl, memory, capacity, bricks, NULL);
         uint64_t start = host_now_us();
         for (uint64_t i = 0; i < tets->count; i++) {
             for (int k = 0; k < 4; k++) {

@@ -113,7 +113,7 @@ static void check_tetrahedra(void *context, unsigned part)
 {
     (void)part;
     struct verify *v = context;
-    struct incode_tally tally = {0, 0};
+    struct incode_tally tally = {0};
     uint64_t count = v->tets->count, i;
     while ((i = take_chunk(v, count)) < count) {
         uint64_t end = count - i < CHUNK ? count : i + CHUNK;
@@ -206,7 +206,7 @@ static void check_facets(void *context, unsigned part)
 {
     (void)part;
     struct verify *v = context;
-    struct incode_tally tally = {0, 0};
+    struct incode_tally tally = {0};
     struct host_group group = {0};
     struct host_error error = {0};
     uint64_t vertices = v->points->count, p;

@@ -1,17 +1,16 @@
 /* Nodes as processes of this machine, of the program of boards/linux. */
 #include "boards.h"
 
-extern const struct host_board host_board_linux;
-
-static int start(const struct host_cluster_options *options,
+static int start(const struct host_board *board,
+                 const struct host_cluster_options *options,
                  struct host_started *started, struct host_error *error)
 {
     static struct host_cluster cluster;
     static char program[4096];
     struct host_cluster_options mine = *options;
     mine.program = program;
-    if (host_cluster_program(options->program, host_board_linux.program,
-                             program, sizeof program, error) != 0 ||
+    if (host_cluster_program(options->program, board->program, program,
+                             sizeof program, error) != 0 ||
         host_cluster_start(&cluster, &mine, error) != 0) {
         return error->code;
     }

@@ -8,7 +8,7 @@
  * Memory: the table.  Work: as that of the board's start.
  *
  *     const struct host_board *board = host_board_named("linux");
- *     if (board == NULL || board->start(&options, &started, &error) != 0)
+ *     if (board == NULL || board->start(board, &options, &started, &error))
  *         return error.code;
  *     service.machine = &started.machine;
  */
@@ -18,6 +18,7 @@
 #include <stdbool.h>
 
 #include "host/machines/cluster.h"
+#include "host/machines/emulator.h"
 #include "host/service/machine.h"
 
 /* A cube of nodes that a board has started. */
@@ -33,10 +34,13 @@ struct host_started {
 struct host_board {
     const char *name;
     const char *help;    /* what it is, in one line */
-    const char *program; /* its nodes' own, a file beside this one */
+    const char *program; /* its nodes' own, a file beside this one; NULL: it
+                            has no system to start one */
+    const struct host_bare *bare; /* then: what it is, and what emulates it */
     /* Starts nodes of this board here, wired as a cube.  0, HOST_CUBE or
      * HOST_BROKEN.  Once at a time. */
-    int (*start)(const struct host_cluster_options *options,
+    int (*start)(const struct host_board *board,
+                 const struct host_cluster_options *options,
                  struct host_started *started, struct host_error *error);
 };
 
@@ -44,10 +48,10 @@ struct host_board {
 const struct host_board *host_board_row(unsigned i);
 const char *host_board_name(unsigned i);
 
+/* Of a cube file whose nodes run on several: a name, and nothing to start. */
+extern const struct host_board host_board_mixed;
+
 /* NULL: there is none of that name. */
 const struct host_board *host_board_named(const char *name);
-
-/* Names that other versions know, with a comma before and after each. */
-extern const char host_boards_elsewhere[];
 
 #endif

@@ -109,8 +109,11 @@ static void become_node(const void *context, unsigned node)
 static int start_node(struct host_cluster *c, unsigned node,
                       struct host_error *error)
 {
+    const struct host_cluster_options *o = &c->options;
     const struct host_child child = {
-        node, c->path, "ask for fewer with --nodes", become_node, c};
+        node, c->path, "ask for fewer with --nodes",
+        o->become != NULL ? o->become : become_node,
+        o->become != NULL ? o->context : c};
     c->epoch++;
     return host_child_start(&c->process[node], &child, error);
 }
@@ -153,7 +156,7 @@ int host_cluster_start(struct host_cluster *cluster,
     cluster->wires.host = -1;
     cluster->nodes = options->nodes;
     cluster->options = *options;
-    cluster->limited = LIMITED;
+    cluster->limited = LIMITED && options->become == NULL;
     /* Not where others wait for the processor. */
     cluster->awake_us = options->nodes < host_threads() ? AWAKE_US : 0;
     cluster->epoch = first_epoch();
@@ -171,7 +174,9 @@ int host_cluster_start(struct host_cluster *cluster,
     }
     cluster->host_epoch = cluster->epoch;
     for (unsigned i = 0; status == 0 && i < cluster->nodes; i++) {
-        status = start_node(cluster, i, error);
+        if ((options->left_out >> i & 1) == 0) {
+            status = start_node(cluster, i, error);
+        }
     }
     if (status != 0) {
         host_cluster_stop(cluster);
@@ -273,6 +278,7 @@ struct host_machine host_cluster_machine(struct host_cluster *cluster)
     machine.nodes = cluster->nodes;
     machine.dimension = cluster->dimension;
     machine.epoch = cluster->host_epoch;
+    machine.serial_baud = cluster->options.serial_baud;
     machine.pipe = host_port_pipe(&cluster->port);
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;

@@ -1,7 +1,7 @@
 /* The nodes that the host starts on this machine: processes of incode-node,
  * each with the wires of a hypercube and no others, its data memory limited by
- * the kernel, all gone when the host goes.  One that dies is started again, on
- * the same wires; one that dies too often is an error.
+ * the kernel, or of an emulator, all gone when the host goes.  One that dies is
+ * started again, on the same wires; one that dies too often is an error.
  *
  * Memory: 24 bytes a node; both ends of every wire, for nodes that start again.
  * Work: a fork and an exec a start of a node.
@@ -22,6 +22,7 @@
 #include "host/base/error.h"
 #include "host/service/machine.h"
 #include "port.h"
+#include "trouble.h"
 #include "wires.h"
 
 enum {
@@ -37,6 +38,17 @@ struct host_cluster_options {
     uint64_t unplug_us;           /* for tests: see port.h */
     unsigned window;     /* frames a link and direction; 0: node's choice */
     const char *program; /* NULL: incode-node beside this executable */
+    /* Other programs than that one: what the child of a node does, which has
+     * inherited the wires; it returns where that fails, with errno.  NULL: it
+     * becomes incode-node. */
+    void (*become)(const void *context, unsigned node);
+    const void *context;   /* of become */
+    uint64_t left_out;     /* a bit for each node that is not to be started */
+    const char *directory; /* of emulated boards: what is to stay, or to be
+                              reached from outside; NULL: nothing */
+    bool open;             /* there, all wires between boards: not joined */
+    uint32_t serial_baud;  /* see machine.h */
+    struct host_trouble trouble; /* for tests, of emulated boards */
 };
 
 struct host_cluster {

@@ -49,25 +49,6 @@ static int read_key(struct host_cube_file *file, const config_setting_t *where,
     return 0;
 }
 
-static int read_board(struct host_cube_file *file, const config_setting_t *root,
-                      struct host_error *error)
-{
-    const config_setting_t *where = config_setting_get_member(root, "board");
-    const char *name =
-        where == NULL ? host_board_name(0) : config_setting_get_string(where);
-    char text[120] = "board: not one that there is; give ";
-    file->board = name == NULL ? NULL : host_board_named(name);
-    if (file->board != NULL) {
-        return 0;
-    }
-    for (unsigned i = 0; host_board_name(i) != NULL; i++) {
-        size_t used = strlen(text);
-        snprintf(text + used, sizeof text - used, "%s\"%s\"",
-                 i == 0 ? "" : " or ", host_board_name(i));
-    }
-    return host_cube_wrong(file, where, error, text);
-}
-
 /* The nodes that the host starts. */
 static int read_start(struct host_cube_file *file, const config_setting_t *root,
                       struct host_error *error)
@@ -137,7 +118,7 @@ static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
     file->window = (unsigned)window;
     file->dead_s = (unsigned)dead;
     if (read_memory(file, root, error) != 0 ||
-        read_board(file, root, error) != 0 ||
+        host_cube_read_boards(file, root, error) != 0 ||
         read_start(file, root, error) != 0) {
         return error->code;
     }
@@ -147,9 +128,9 @@ static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
 static int read_settings(struct host_cube_file *file, const config_t *config,
                          struct host_error *error)
 {
-    static const char *const names[] = {"dimension", "board", "memory",
-                                        "window",    "key",   "start",
-                                        "dead",      "links", NULL};
+    static const char *const names[] = {
+        "dimension", "board", "memory", "window", "key",
+        "start",     "dead",  "links",  "nodes",  NULL};
     const config_setting_t *root = config_root_setting(config);
     const config_setting_t *links = config_setting_get_member(root, "links");
     if (host_cube_check_names(file, root, names, error) != 0 ||
@@ -182,7 +163,8 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
             return error->code;
         }
     }
-    return host_cube_check_wires(file, links, error) != 0
+    return host_cube_check_wires(file, links, error) != 0 ||
+                   host_cube_check_boards(file, root, error) != 0
                ? error->code
                : host_cube_check_ends(file, error);
 }

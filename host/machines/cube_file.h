@@ -1,5 +1,6 @@
 /* The cube file: which nodes there are, and how they are wired.  README.md has
- * the format, boards/linux/ an example for each kind of wire.
+ * the format, boards/linux/ an example for each kind of wire.  Links between
+ * two bare boards go from UART to UART, and may be left out.
  *
  * Memory: about 600 bytes a wire.  Work: one pass over the file, and a look-up
  * for each host name.
@@ -35,14 +36,15 @@ struct host_cube_wire {
 struct host_cube_file {
     const char *path;
     unsigned nodes, dimension;
-    const struct host_board *board;
+    const struct host_board *board; /* of all nodes, or "mixed" */
+    const struct host_board *board_of[HOST_NODES_MAX];
     uint64_t memory;
     unsigned window;
     unsigned dead_s; /* a link silent so long is given up; 0: never */
     char key_path[HOST_NODE_OPTION_BYTES];
     bool has_key;
     uint8_t key[SECURE_KEY_BYTES];
-    uint32_t serial_baud; /* of the slowest serial wire; 0: there is none */
+    uint32_t serial_baud; /* of the slowest serial wire or UART; 0: none */
     struct host_cube_wire *wire;
     unsigned wires;
     bool local[HOST_NODES_MAX]; /* the host starts this node itself */
@@ -56,6 +58,14 @@ int host_cube_file_read(struct host_cube_file *file, const char *path,
 int host_cube_file_parse(struct host_cube_file *file, const char *path,
                          const char *text, struct host_error *error);
 void host_cube_file_free(struct host_cube_file *file);
+
+/* Whether the node has no system. */
+static inline bool host_cube_is_bare(const struct host_cube_file *file,
+                                     unsigned node)
+{
+    return node < HOST_NODES_MAX && node < file->nodes &&
+           file->board_of[node]->bare != NULL;
+}
 
 /* What its wires are, as statistics name it. */
 const struct host_link *host_cube_link(const struct host_cube_file *file);
@@ -73,7 +83,8 @@ unsigned host_cube_node_options(
     const struct host_cube_file *file, unsigned node,
     char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES]);
 
-/* The line for a shell that starts a node; NULL: it does not fit. */
+/* The line for a shell that starts a node; NULL: it does not fit, or the node
+ * has no system that would. */
 const char *host_cube_start_line(const struct host_cube_file *file,
                                  unsigned node, char *line, size_t size);
 

@@ -78,9 +78,10 @@ unsigned host_cube_node_options(
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--wire");
         print_wire(wire, d, wire->node == node, options[n++]);
     }
-    if (file->board != host_board_row(0)) {
+    if (file->board_of[node] != host_board_row(0)) {
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--board");
-        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", file->board->name);
+        snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s",
+                 file->board_of[node]->name);
     }
     return n;
 }
@@ -90,7 +91,8 @@ const char *host_cube_start_line(const struct host_cube_file *file,
 {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     unsigned count = host_cube_node_options(file, node, options);
-    if (host_text_quote(line, size, file->board->program) != 0) {
+    const char *program = file->board_of[node]->program;
+    if (program == NULL || host_text_quote(line, size, program) != 0) {
         return NULL;
     }
     for (unsigned k = 0; k < count; k++) {
@@ -115,6 +117,34 @@ const char *host_cube_wire_name(const struct host_cube_wire *wire, char *name,
     return name;
 }
 
+/* What a person does who has a board in the hand. */
+static void print_bare(const struct host_cube_file *file, unsigned node)
+{
+    const struct host_board *board = file->board_of[node];
+    char name[HOST_NODE_OPTION_BYTES];
+    unsigned count;
+    printf("# node %u (%s): put its firmware on it, %s of make firmware; UART "
+           "0: ",
+           node, board->name, board->bare->image);
+    for (unsigned k = 0; k < 2; k++) {
+        const struct host_cube_wire *wire = host_cube_host_wire(file, k);
+        if (wire != NULL && wire->node == node) {
+            printf("host, ");
+        }
+    }
+    printf("console");
+    for (unsigned d = 0; d < file->dimension; d++) {
+        const struct host_cube_wire *wire =
+            host_cube_between(file, node, node ^ 1u << d, &count);
+        printf("; %u: node %u", d + 1, node ^ 1u << d);
+        if (wire != NULL) {
+            print_wire(wire, d, wire->node == node, name);
+            printf(" (%s)", strchr(name, '=') + 1);
+        }
+    }
+    printf("\n");
+}
+
 int host_cube_print(const char *path, struct host_error *error)
 {
     /* A byte becomes "$(printf '\\377')" at most. */
@@ -124,8 +154,12 @@ int host_cube_print(const char *path, struct host_error *error)
         return error->code;
     }
     for (unsigned i = 0; i < file.nodes; i++) {
-        (void)host_cube_start_line(&file, i, line, sizeof line);
-        printf("%s\n", line);
+        if (host_cube_is_bare(&file, i)) {
+            print_bare(&file, i);
+        } else {
+            (void)host_cube_start_line(&file, i, line, sizeof line);
+            printf("%s\n", line);
+        }
     }
     host_cube_file_free(&file);
     return 0;

@@ -53,6 +53,17 @@ int host_cube_beside(const struct host_cube_file *file,
 void host_cube_print_address(const struct tcp_address *address, char *text,
                              size_t size);
 
+/* What the nodes run on: one board for all, or by name for some. */
+int host_cube_read_boards(struct host_cube_file *file,
+                          const config_setting_t *root,
+                          struct host_error *error);
+
+/* Whether bare boards have the wires and the memory that they need, when all
+ * else is read.  Sets what their UARTs are set to. */
+int host_cube_check_boards(struct host_cube_file *file,
+                           const config_setting_t *root,
+                           struct host_error *error);
+
 /* Adds the wire of a group to file->wire, which has room for it. */
 int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
                         struct host_error *error);

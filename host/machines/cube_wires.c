@@ -307,9 +307,12 @@ const struct host_link *host_cube_link(const struct host_cube_file *file)
     const char *first = NULL;
     for (unsigned i = 0; i < file->wires; i++) {
         const struct host_cube_wire *w = &file->wire[i];
-        const char *name = w->serial                          ? "serial"
-                           : tcp_address_path(&w->at) != NULL ? "unix"
-                                                              : "tcp";
+        const char *name =
+            w->serial ? "serial"
+            : host_cube_is_bare(file, w->node) || host_cube_is_bare(file, w->to)
+                ? "uart"
+            : tcp_address_path(&w->at) != NULL ? "unix"
+                                               : "tcp";
         if (first != NULL && strcmp(first, name) != 0) {
             return host_link_named("mixed");
         }
@@ -370,7 +373,8 @@ int host_cube_check_wires(const struct host_cube_file *file,
                                  "%u; leave one of them out",
                                  file->path, w->line, i, other);
             }
-            if (count == 0) {
+            if (count == 0 && !(host_cube_is_bare(file, i) &&
+                                host_cube_is_bare(file, other))) {
                 snprintf(text, sizeof text,
                          "no link between nodes %u and %u; add { node = %u; "
                          "to = %u; .. }",

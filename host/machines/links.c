@@ -5,6 +5,7 @@
 
 #include "transport/drivers/serial.h"
 #include "transport/drivers/tcp.h"
+#include "transport/drivers/unix_file.h"
 
 static const struct host_link rows[] = {
     {.name = "tcp",
@@ -21,10 +22,14 @@ static const struct host_link rows[] = {
      .ranks = true},
 };
 
-/* What cube files have besides. */
+/* What cube files and boards have besides. */
 static const struct host_link of_files[] = {
     {.name = "unix", .help = "sockets with a path"},
     {.name = "mixed", .help = "wires of several kinds"},
+    {.name = "uart",
+     .help = "those of emulated boards",
+     .pair = unix_file_pair,
+     .needs = "socket pairs"},
 };
 
 const struct host_link *host_link_row(unsigned i)

@@ -28,8 +28,8 @@ struct host_link {
 const struct host_link *host_link_row(unsigned i);
 const char *host_link_name(unsigned i);
 
-/* Of those, or of those that only a cube file has (`unix`, `mixed`); NULL:
- * there is none of that name. */
+/* Of those, or of those that only a cube file or a board has (`unix`, `mixed`,
+ * `uart`); NULL: there is none of that name. */
 const struct host_link *host_link_named(const char *name);
 
 #endif

@@ -22,7 +22,7 @@ static void become_node(const void *context, unsigned node)
     char *argv[HOST_NODE_OPTIONS_MAX + 2] = {name};
     char *no_environment[] = {NULL};
     unsigned count = host_cube_node_options(r->file, node, options);
-    snprintf(name, sizeof name, "%s", r->file->board->program);
+    snprintf(name, sizeof name, "%s", r->file->board_of[node]->program);
     for (unsigned i = 0; i < count; i++) {
         argv[1 + i] = options[i];
     }
@@ -193,6 +193,11 @@ static const char *machine_doubt(void *context, unsigned node)
         snprintf(text, sizeof text, "%s; %s", doubt.what, doubt.next);
         return text;
     }
+    if (r->console[port].faults > 0) {
+        snprintf(text, sizeof text, "its console says: %.100s",
+                 r->console[port].fault);
+        return text;
+    }
     snprintf(text, sizeof text, "%s", fault == 0 ? "" : strerror(fault));
     text[0] = (char)tolower((unsigned char)text[0]);
     return fault == 0 ? NULL : text;
@@ -248,6 +253,18 @@ static uint8_t absent_s(const struct host_cube_file *file)
                                              : s);
 }
 
+/* A bare board's console shares its wire. */
+static struct link_pipe pipe_of(struct host_remote *r, unsigned port)
+{
+    unsigned node = host_cube_host_wire(r->file, port)->node;
+    struct link_pipe pipe = host_port_pipe(&r->port[port]);
+    if (!host_cube_is_bare(r->file, node)) {
+        return pipe;
+    }
+    host_console_init(&r->console[port], node, r->file->board_of[node]->name);
+    return host_console_pipe(&r->console[port], pipe);
+}
+
 struct host_machine host_remote_machine(struct host_remote *remote)
 {
     const struct host_cube_wire *second = host_cube_host_wire(remote->file, 1);
@@ -261,10 +278,10 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     while (machine.epoch == 0) {
         (void)!getrandom(&machine.epoch, sizeof machine.epoch, 0);
     }
-    machine.pipe = host_port_pipe(&remote->port[0]);
+    machine.pipe = pipe_of(remote, 0);
     if (second != NULL) {
         machine.spare_node = second->node;
-        machine.spare = host_port_pipe(&remote->port[1]);
+        machine.spare = pipe_of(remote, 1);
     }
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
@@ -272,6 +289,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     /* Without them, nodes are waited for as patiently as the user wants. */
     bool all_here = true;
     for (unsigned i = 0; i < machine.nodes; i++) {
+        machine.slow = machine.slow || host_cube_is_bare(remote->file, i);
         all_here = all_here && remote->file->local[i];
     }
     machine.restarts = all_here ? machine_restarts : NULL;

@@ -13,6 +13,7 @@
 #define HOST_REMOTE_H
 
 #include "child.h"
+#include "console.h"
 #include "cube_file.h"
 #include "port.h"
 
@@ -23,6 +24,7 @@ struct host_remote {
     const char *program;
     unsigned ports;
     struct host_port port[HOST_PORTS_MAX];
+    struct host_console console[HOST_PORTS_MAX]; /* of bare boards there */
     struct secure_ends ends[HOST_PORTS_MAX];     /* of their wires */
     struct host_process process[HOST_NODES_MAX]; /* of those started here */
     unsigned restarts;

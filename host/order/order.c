@@ -336,7 +336,7 @@ static int make_grid(struct host_order *order, struct host_error *error)
 static int check_dimension(const struct host_order *order, const char *where,
                            struct host_error *error)
 {
-    struct incode_tally tally = {0, 0};
+    struct incode_tally tally = {0};
     double a[3], b[3], c[3], d[3];
     host_vertex(order, 0, a);
     uint32_t last = order->bricks - 1;

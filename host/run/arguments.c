@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "arguments_parts.h"
 #include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/base/text.h"
@@ -11,40 +12,6 @@
 #include "host/order/names.h"
 #include "host/service/strategies/strategies.h"
 #include "incode/builder.h"
-
-enum {
-    KEY_STRATEGY = 256,
-    KEY_PARTITION,
-    KEY_INDEX,
-    KEY_NODES,
-    KEY_FACE_RULE,
-    KEY_BUILD,
-    KEY_LINK,
-    KEY_BOARD,
-    KEY_PATIENCE,
-    KEY_CUBE,
-    KEY_MEMORY,
-    KEY_LINDA,
-    KEY_CLUSTER,
-    KEY_BUILDERS,
-    KEY_FACES_PER_JOB,
-    KEY_JOBS_PER_WORKER,
-    KEY_STATS,
-    KEY_VERIFY,
-    KEY_NO_PROGRESS,
-    KEY_TABLE,
-    KEY_MAP,
-    KEY_WINDOW,
-    KEY_SHUFFLE_SEED,
-    KEY_HOST_STALL,
-    KEY_HOST_RATE,
-    KEY_HOST_RATE_TIME,
-    KEY_HOST_UNPLUG,
-    KEY_SEED,
-    KEY_NODE_PROGRAM,
-    KEY_FORMAT,
-    KEY_END
-};
 
 static const struct argp_option options_of_run[] = {
     {NULL, 0, NULL, 0, "What to compute, and where:", 1},
@@ -133,28 +100,16 @@ static const struct argp_option options_of_run[] = {
     {"host-unplug", KEY_HOST_UNPLUG, "MS", 0,
      "The host closes its serial wire every MS milliseconds, for half a second",
      3},
+    {"board-reset", KEY_BOARD_RESET, "MS", 0,
+     "One emulated board after the other, each once, is reset every MS "
+     "milliseconds,",
+     3},
+    {"board-stop", KEY_BOARD_STOP, "MS", 0, "stopped for half of them,", 3},
+    {"board-kill", KEY_BOARD_KILL, "MS", 0, "or killed", 3},
     {"seed", KEY_SEED, "N", 0, "Seed of --host-stall", 3},
     {"node-program", KEY_NODE_PROGRAM, "FILE", 0,
      "Start FILE for a node instead of incode-node", 3},
     {0}};
-
-struct parse {
-    struct host_run_options *options;
-    struct host_error *error;
-    unsigned linda; /* of the rows of --linda */
-    uint64_t given; /* bits of keys from KEY_STRATEGY on */
-};
-
-/* names: a list with a comma before and after each, or NULL. */
-static bool is_among(const char *names, const char *name)
-{
-    size_t n = strlen(name);
-    const char *at = names == NULL || n == 0 ? NULL : strstr(names, name);
-    while (at != NULL && (at == names || at[-1] != ',' || at[n] != ',')) {
-        at = strstr(at + 1, name);
-    }
-    return at != NULL;
-}
 
 typedef const char *row_name(unsigned i);
 
@@ -164,9 +119,9 @@ static const char *name_at(const void *context, unsigned i)
 }
 
 /* Which of the rows that `name` gives, up to NULL, `value` is, or -1 with the
- * error: what is allowed, and what other versions have (later). */
-static int choose(struct parse *p, const char *option, const char *value,
-                  row_name *name, const char *later)
+ * error: what is allowed. */
+static int choose(struct host_arguments *p, const char *option,
+                  const char *value, row_name *name)
 {
     char allowed[sizeof p->error->text] = "";
     size_t used = 0;
@@ -180,12 +135,10 @@ static int choose(struct parse *p, const char *option, const char *value,
         }
     }
     const char *nearest = host_text_nearest(value, name_at, &name);
-    bool elsewhere = is_among(later, value);
-    host_fail(p->error, HOST_USAGE, "--%s %s: %s; %s%s%sallowed: %s", option,
-              value, elsewhere ? "not in this version" : "no such name",
-              elsewhere || nearest == NULL ? "" : "did you mean ",
-              elsewhere || nearest == NULL ? "" : nearest,
-              elsewhere || nearest == NULL ? "" : "? ", allowed);
+    host_fail(p->error, HOST_USAGE, "--%s %s: no such name; %s%s%sallowed: %s",
+              option, value, nearest == NULL ? "" : "did you mean ",
+              nearest == NULL ? "" : nearest, nearest == NULL ? "" : "? ",
+              allowed);
     return -1;
 }
 
@@ -209,8 +162,8 @@ static const char *face_rule_name(unsigned i)
     return host_face_rules[i];
 }
 
-static int number(struct parse *p, const char *option, const char *value,
-                  uint64_t lo, uint64_t hi, uint64_t *result)
+static int number(struct host_arguments *p, const char *option,
+                  const char *value, uint64_t lo, uint64_t hi, uint64_t *result)
 {
     if (host_parse_number(value, lo, hi, result) != 0) {
         return host_fail(p->error, HOST_USAGE,
@@ -222,7 +175,7 @@ static int number(struct parse *p, const char *option, const char *value,
     return 0;
 }
 
-static void parse_memory(struct parse *p, const char *value)
+static void parse_memory(struct host_arguments *p, const char *value)
 {
     uint64_t *bytes = &p->options->memory;
     if (host_parse_bytes(value, bytes) != 0 || *bytes < HOST_MEMORY_MIN ||
@@ -235,7 +188,7 @@ static void parse_memory(struct parse *p, const char *value)
     *bytes = *bytes / 4096 * 4096;
 }
 
-static void parse_output(struct parse *p, const char *value)
+static void parse_output(struct host_arguments *p, const char *value)
 {
     if (p->options->outputs == HOST_OUTPUTS_MAX) {
         host_fail(p->error, HOST_USAGE,
@@ -247,40 +200,38 @@ static void parse_output(struct parse *p, const char *value)
     p->options->output[p->options->outputs++] = value;
 }
 
-static bool parse_names(int key, const char *value, struct parse *p)
+static bool parse_names(int key, const char *value, struct host_arguments *p)
 {
     struct host_run_options *o = p->options;
     switch (key) {
     case KEY_STRATEGY:
         o->strategy = host_strategy_row(
-            (unsigned)choose(p, "strategy", value, host_strategy_name, NULL));
+            (unsigned)choose(p, "strategy", value, host_strategy_name));
         return true;
     case KEY_PARTITION:
-        o->partition = (enum host_partition)choose(p, "partition", value,
-                                                   partition_name, NULL);
+        o->partition =
+            (enum host_partition)choose(p, "partition", value, partition_name);
         return true;
     case KEY_INDEX:
-        o->index =
-            (enum incode_index)choose(p, "index", value, index_name, NULL);
+        o->index = (enum incode_index)choose(p, "index", value, index_name);
         return true;
     case KEY_FACE_RULE:
         o->face_rule = (enum incode_face_rule)choose(p, "face-rule", value,
-                                                     face_rule_name, NULL);
+                                                     face_rule_name);
         return true;
     case KEY_BUILD:
-        o->build =
-            (enum incode_build)choose(p, "build", value, build_name, NULL);
+        o->build = (enum incode_build)choose(p, "build", value, build_name);
         return true;
     case KEY_LINK:
-        o->link = host_link_row(
-            (unsigned)choose(p, "link", value, host_link_name, NULL));
+        o->link =
+            host_link_row((unsigned)choose(p, "link", value, host_link_name));
         return true;
     case KEY_LINDA:
-        p->linda = (unsigned)choose(p, "linda", value, host_linda_name, NULL);
+        p->linda = (unsigned)choose(p, "linda", value, host_linda_name);
         return true;
     case KEY_BOARD:
-        o->board = host_board_row((unsigned)choose(
-            p, "board", value, host_board_name, host_boards_elsewhere));
+        o->board = host_board_row(
+            (unsigned)choose(p, "board", value, host_board_name));
         return true;
     default:
         return false;
@@ -288,7 +239,7 @@ static bool parse_names(int key, const char *value, struct parse *p)
 }
 
 /* How a strategy shares the work: keys from KEY_CLUSTER on. */
-static bool parse_sharing(int key, const char *value, struct parse *p)
+static bool parse_sharing(int key, const char *value, struct host_arguments *p)
 {
     struct host_sharing *s = &p->options->sharing;
     const struct {
@@ -309,7 +260,7 @@ static bool parse_sharing(int key, const char *value, struct parse *p)
     return true;
 }
 
-static bool parse_testing(int key, const char *value, struct parse *p)
+static bool parse_testing(int key, const char *value, struct host_arguments *p)
 {
     struct host_run_options *o = p->options;
     uint64_t n = 0;
@@ -337,6 +288,12 @@ static bool parse_testing(int key, const char *value, struct parse *p)
         (void)number(p, "host-unplug", value, 50, 86400000, &n);
         o->unplug_us = 1000 * n;
         return true;
+    case KEY_BOARD_RESET:
+    case KEY_BOARD_STOP:
+    case KEY_BOARD_KILL:
+        (void)number(p, "board-reset, -stop, -kill", value, 10, 86400000, &n);
+        o->trouble.every_us[key - KEY_BOARD_RESET] = 1000 * n;
+        return true;
     case KEY_SEED:
         (void)number(p, "seed", value, 0, UINT64_MAX, &o->throttle.seed);
         return true;
@@ -348,7 +305,8 @@ static bool parse_testing(int key, const char *value, struct parse *p)
     }
 }
 
-static error_t parse_report(int key, const char *value, struct parse *p)
+static error_t parse_report(int key, const char *value,
+                            struct host_arguments *p)
 {
     struct host_run_options *o = p->options;
     switch (key) {
@@ -392,7 +350,7 @@ static error_t parse_report(int key, const char *value, struct parse *p)
 
 static error_t parse_option(int key, char *value, struct argp_state *state)
 {
-    struct parse *p = state->input;
+    struct host_arguments *p = state->input;
     if (key >= KEY_STRATEGY && key < KEY_END) {
         p->given |= UINT64_C(1) << (key - KEY_STRATEGY);
     }
@@ -427,123 +385,6 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     }
 }
 
-static bool given(const struct parse *p, int key)
-{
-    return (p->given >> (key - KEY_STRATEGY) & 1) != 0;
-}
-
-/* An option that would change nothing is a misunderstanding. */
-static int check_together(const struct parse *p)
-{
-    const struct host_run_options *o = p->options;
-    bool cube = o->cube != NULL, ranks = !cube && o->link->ranks;
-    unsigned heeds = o->strategy == NULL ? 0 : o->strategy->sharing;
-    const struct {
-        int key;
-        bool vain;
-        const char *why;
-    } options[] = {
-        {KEY_MEMORY, cube, "--memory: the cube file of --cube says it"},
-        {KEY_LINK, cube, "--link: the cube file of --cube says it"},
-        {KEY_BOARD, cube, "--board: the cube file of --cube says it"},
-        {KEY_WINDOW, cube, "--window: the cube file of --cube says it"},
-        {KEY_HOST_UNPLUG, cube || !o->link->terminals,
-         "--host-unplug: goes with --link serial alone"},
-        {KEY_NODE_PROGRAM, ranks, "--node-program: not with --link mpi"},
-        {KEY_HOST_RATE_TIME, !given(p, KEY_HOST_RATE),
-         "--host-rate-time: goes with --host-rate alone"},
-        {KEY_SEED, !given(p, KEY_HOST_STALL),
-         "--seed: goes with --host-stall alone"},
-        {KEY_LINDA, o->strategy == NULL || o->strategy->linda == NULL,
-         "--linda: goes with --strategy linda alone"},
-        {KEY_CLUSTER, (heeds & HOST_SHARING_CLUSTER) == 0,
-         "--cluster: goes with a strategy of clusters alone, as hybrid"},
-        {KEY_BUILDERS, (heeds & HOST_SHARING_BUILDERS) == 0,
-         "--builders: goes with strategies that lend lists of faces"},
-        {KEY_FACES_PER_JOB, (heeds & HOST_SHARING_LISTS) == 0,
-         "--faces-per-job: goes with strategies that lend lists of faces"},
-        {KEY_JOBS_PER_WORKER, (heeds & HOST_SHARING_LISTS) == 0,
-         "--jobs-per-worker: goes with strategies that lend lists of faces"}};
-    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
-        if (options[i].vain && given(p, options[i].key)) {
-            return host_fail(p->error, HOST_USAGE, "%s; leave it out",
-                             options[i].why);
-        }
-    }
-    return 0;
-}
-
-static const char *link_help(unsigned i)
-{
-    return host_link_row(i)->help;
-}
-
-static const char *board_help(unsigned i)
-{
-    return host_board_row(i)->help;
-}
-
-/* Option's help with the rows of the table that its values are from; usual: the
- * default's name. */
-static char *list_rows(const char *text, const char *(*name)(unsigned i),
-                       const char *(*help)(unsigned i), const char *usual)
-{
-    size_t size = strlen(text) + 1;
-    for (unsigned i = 0; name(i) != NULL; i++) {
-        size += strlen(name(i)) + strlen(help(i)) + sizeof " (; the default),";
-    }
-    char *whole = malloc(size);
-    size_t used = 0;
-    if (whole == NULL) {
-        return NULL;
-    }
-    used += (size_t)snprintf(whole, size, "%s", text);
-    for (unsigned i = 0; name(i) != NULL; i++) {
-        used += (size_t)snprintf(whole + used, size - used, "%s %s (%s%s)",
-                                 i == 0 ? "" : ",", name(i), help(i),
-                                 strcmp(name(i), usual) == 0 ? "; the default"
-                                                             : "");
-    }
-    return whole;
-}
-
-/* `text` with the formats of a use, as `put` has them, in the place of its %s.
- */
-static char *list_formats(const char *text, enum host_use use,
-                          void (*put)(enum host_use use, char *text,
-                                      size_t size))
-{
-    char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
-    const char *place = strstr(text, "%s");
-    put(use, list, sizeof list);
-    return asprintf(&whole, "%.*s%s%s", (int)(place - text), text, list,
-                    place + strlen("%s")) < 0
-               ? NULL
-               : whole;
-}
-
-/* As argp asks for it: `text` itself, or what is to be freed. */
-static char *complete_help(int key, const char *text, void *input)
-{
-    (void)input;
-    switch (key) {
-    case 'o':
-        return list_formats(text, HOST_WRITE_TETRAHEDRA, host_format_help);
-    case KEY_FORMAT:
-        return list_formats(text, HOST_READ_POINTS, host_format_list);
-    case ARGP_KEY_HELP_POST_DOC:
-        return list_formats(text, HOST_READ_POINTS, host_format_help);
-    case KEY_STRATEGY:
-        return list_rows(text, host_strategy_name, host_strategy_help, "auto");
-    case KEY_LINK:
-        return list_rows(text, host_link_name, link_help, host_link_name(0));
-    case KEY_BOARD:
-        return list_rows(text, host_board_name, board_help, host_board_name(0));
-    default:
-        return (char *)text;
-    }
-}
-
 /* flags: of argp_parse. */
 static int parse_run(int argc, char **argv, unsigned flags,
                      struct host_run_options *options, struct host_error *error)
@@ -568,9 +409,9 @@ static int parse_run(int argc, char **argv, unsigned flags,
         "ends it as a signal does (130 in a shell). Unless it is 0, no output "
         "has its name, and what had it before is as it was.",
         NULL,
-        complete_help,
+        host_arguments_help,
         NULL};
-    struct parse parse = {options, error, 0, 0};
+    struct host_arguments parse = {options, error, 0, 0};
     host_run_defaults(options);
     int status = host_options_parse(&argp, argc, argv, flags, &parse, error);
     if (status != 0) {
@@ -581,10 +422,10 @@ static int parse_run(int argc, char **argv, unsigned flags,
         options->throttle.slow_us = 30000000;
     }
     if (options->strategy != NULL && options->strategy->linda != NULL &&
-        given(&parse, KEY_LINDA)) {
+        host_arguments_given(&parse, KEY_LINDA)) {
         options->strategy = host_strategy_linda(parse.linda);
     }
-    return check_together(&parse);
+    return host_arguments_together(&parse);
 }
 
 int host_arguments_run(int argc, char **argv, struct host_run_options *options,

@@ -14,14 +14,16 @@ static void stop(void *context)
     secure_wipe(the_file.key, sizeof the_file.key);
 }
 
-/* Whether there are nodes that the host starts. */
-static bool starts_some(const struct host_cube_file *file)
+/* What the first node of those that the host starts runs on; NULL: there is
+ * none. */
+static const struct host_board *started_board(const struct host_cube_file *file)
 {
-    bool some = false;
     for (unsigned i = 0; i < file->nodes; i++) {
-        some = some || file->local[i];
+        if (file->local[i]) {
+            return file->board_of[i];
+        }
     }
-    return some;
+    return NULL;
 }
 
 static int begin(const struct host_run_options *options,
@@ -31,9 +33,10 @@ static int begin(const struct host_run_options *options,
     static struct host_remote remote;
     static char program[4096];
     (void)result;
-    if ((starts_some(&the_file) &&
-         host_cluster_program(options->node_program, the_file.board->program,
-                              program, sizeof program, error) != 0) ||
+    const struct host_board *board = started_board(&the_file);
+    if ((board != NULL &&
+         host_cluster_program(options->node_program, board->program, program,
+                              sizeof program, error) != 0) ||
         host_remote_start(&remote, &the_file, program, error) != 0) {
         return error->code;
     }
@@ -60,7 +63,7 @@ int host_run_on_cube(struct host_run_options *options, struct host_error *error)
                          "has its own; leave it out",
                          options->cube);
     }
-    if (options->node_program != NULL && !starts_some(&the_file)) {
+    if (options->node_program != NULL && started_board(&the_file) == NULL) {
         return host_fail(error, HOST_USAGE,
                          "--node-program: the host starts none of the nodes of "
                          "%s; leave it out",
@@ -74,7 +77,11 @@ int host_run_on_cube(struct host_run_options *options, struct host_error *error)
         options->processors += !the_file.local[i];
     }
     const struct host_cube_wire *wire = host_cube_host_wire(&the_file, 0);
-    options->wire_bytes_s = wire != NULL && wire->serial ? wire->baud / 10 : 0;
+    options->wire_bytes_s = wire == NULL   ? 0
+                            : wire->serial ? wire->baud / 10
+                            : host_cube_is_bare(&the_file, wire->node)
+                                ? HOST_BARE_WIRE_BYTES
+                                : 0;
     options->begin = begin;
     return 0;
 }

@@ -81,6 +81,12 @@ static void node_lines(FILE *file, const struct host_run_result *r)
             r->memory_held == NULL ? "" : r->memory_held);
 }
 
+uint64_t host_node_stack_bytes(const struct host_node_report *report)
+{
+    uint32_t told = report->statistics.stack_bytes;
+    return told > 0 ? told : HOST_STACK_BYTES;
+}
+
 static void map_line(FILE *file, uint64_t bytes, const char *what,
                      uint64_t count, const char *unit)
 {
@@ -95,14 +101,15 @@ void host_report_map(FILE *file, const struct host_run_result *result)
 {
     const struct node_map *m = &result->node[0].map.map;
     const struct node_role *role = node_role_named(result->node[0].map.role);
+    uint64_t stack = host_node_stack_bytes(&result->node[0]);
     unsigned links = 1;
     while (1u << (links - 1) < result->nodes) {
         links++;
     }
     fprintf(file, "\nMemory map of node 0, bytes of %llu\n",
             (unsigned long long)result->memory);
-    map_line(file, HOST_STACK_BYTES, "stack", 0, "");
-    map_line(file, m->fixed - HOST_STACK_BYTES, ".data, .bss", 0, "");
+    map_line(file, stack, "stack", 0, "");
+    map_line(file, m->fixed - stack, ".data, .bss", 0, "");
     map_line(file, m->node, "node program", 0, "");
     map_line(file, m->cube, "windows of links", links * m->window,
              "frames each way");
@@ -116,10 +123,12 @@ void host_report_map(FILE *file, const struct host_run_result *result)
         used += m->tables[i].bytes;
     }
     map_line(file, result->memory - used, "left over", 0, "");
-    fprintf(file,
-            "Outside it, in the kernel: %d and %d bytes of buffers for each "
-            "end of a wire.\n",
-            result->socket_send_bytes, result->socket_receive_bytes);
+    if (result->board->bare == NULL) {
+        fprintf(file,
+                "Outside it, in the kernel: %d and %d bytes of buffers for "
+                "each end of a wire.\n",
+                result->socket_send_bytes, result->socket_receive_bytes);
+    }
 }
 
 void host_report_run(FILE *file, const struct host_run_options *options,

@@ -19,6 +19,9 @@ void host_report_run(FILE *file, const struct host_run_options *options,
                      const struct host_run_result *result,
                      const struct host_run_result *alone);
 
+/* Of a node's memory: what its board tells, or what processes have. */
+uint64_t host_node_stack_bytes(const struct host_node_report *report);
+
 /* How the tables of node 0 fill its memory. */
 void host_report_map(FILE *file, const struct host_run_result *result);
 

@@ -236,7 +236,8 @@ static int begin_on_board(const struct host_run_options *options,
     nodes.link = options->link;
     nodes.unplug_us = options->unplug_us;
     nodes.program = options->node_program;
-    if (options->board->start(&nodes, &started, error) != 0) {
+    nodes.trouble = options->trouble;
+    if (options->board->start(options->board, &nodes, &started, error) != 0) {
         return error->code;
     }
     *machine = started.machine;

@@ -55,6 +55,7 @@ struct host_run_options {
     uint64_t shuffle_seed;
     uint64_t unplug_us;
     struct host_throttle throttle;
+    struct host_trouble trouble; /* of emulated boards */
     const char *node_program;
     /* Begins a cube of result->nodes where it is not the board that does. */
     int (*begin)(const struct host_run_options *options,

@@ -25,7 +25,11 @@ unsigned host_run_nodes(const struct host_run_options *options)
     }
     unsigned nodes =
         options->strategy == NULL ? 0 : options->strategy->nodes_default;
-    return nodes != 0 ? nodes : suitable_nodes();
+    nodes = nodes != 0 ? nodes : suitable_nodes();
+    unsigned most = options->board->bare == NULL
+                        ? nodes
+                        : host_bare_nodes_max(options->board->bare);
+    return nodes < most ? nodes : most;
 }
 
 /* For whom memory is asked about. */

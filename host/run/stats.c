@@ -7,6 +7,7 @@
 #include "host/files/output.h"
 #include "host/order/names.h"
 #include "node/roles/roles.h"
+#include "report.h"
 
 double host_candidates_mean(const struct host_run_result *result)
 {
@@ -54,6 +55,28 @@ static const char *built_by(const struct incode_statistics *s)
                                                             : "both";
 }
 
+/* How the node's memory is filled, in bytes. */
+static json_t *map_object(const struct host_run_result *r, unsigned i)
+{
+    const struct node_map *m = &r->node[i].map.map;
+    const struct node_role *role = node_role_named(r->node[i].map.role);
+    uint64_t stack = host_node_stack_bytes(&r->node[i]);
+    json_t *o = json_object();
+    put(o, "stack", stack);
+    put(o, "static", m->fixed > stack ? m->fixed - stack : 0);
+    put(o, "node", m->node);
+    put(o, "links", m->cube);
+    uint64_t used = m->fixed + m->node + m->cube;
+    for (unsigned k = 0; role != NULL && k < NODE_TABLES_MAX; k++) {
+        if (role->tables[k].name != NULL) {
+            put(o, role->tables[k].name, m->tables[k].bytes);
+        }
+        used += m->tables[k].bytes;
+    }
+    put(o, "left_over", r->memory > used ? r->memory - used : 0);
+    return o;
+}
+
 static json_t *node_object(const struct host_run_result *r, unsigned i)
 {
     const struct host_node_report *report = &r->node[i];
@@ -91,6 +114,13 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     put(o, "retransmitted_frames", f->retransmitted);
     put(o, "memory_high_water_bytes", f->memory_high_water);
     put(o, "memory_frames", report->map.map.pages);
+    put(o, "look_us_max", f->look_us_max);
+    if (f->stack_bytes > 0) { /* its board tells */
+        put(o, "stack_bytes", f->stack_bytes);
+        put(o, "stack_high_water_bytes", f->stack_high_water);
+        put(o, "overruns", f->overruns);
+    }
+    json_object_set_new(o, "memory_map", map_object(r, i));
     return o;
 }
 

@@ -18,8 +18,9 @@ enum {
 
 uint64_t host_bring_up_patience(const struct host_service *service)
 {
-    return service->machine->restarts != NULL ? STARTED_HERE_US
-                                              : service->patience_us;
+    const struct host_machine *m = service->machine;
+    return m->restarts != NULL && !m->slow ? STARTED_HERE_US
+                                           : service->patience_us;
 }
 
 /* How many nodes are not there, and the first of them, nearest first.  by_wire:

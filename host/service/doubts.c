@@ -6,7 +6,11 @@
 #include "failure_detector.h"
 #include "notices.h"
 
-enum { DOUBT_US = 1300000, WIRE_US = 1200000 };
+enum {
+    DOUBT_US = 1300000,
+    SLOW_US = 10000000, /* of nodes that this machine may keep waiting */
+    WIRE_US = 1200000
+};
 
 static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
 {
@@ -86,9 +90,10 @@ static void look_at_links(struct host_service *s, unsigned i,
         bool both = is_heard(s, i) && is_heard(s, i ^ 1u << d);
         wires &= both ? ~(uint32_t)0 : ~(1u << d);
     }
+    uint64_t limit = s->machine->slow ? SLOW_US : WIRE_US / 2;
     wires &= (1u << s->machine->dimension) - 1;
     node->wires_us = wires != 0 ? node->wires_us + elapsed_us : 0;
-    for (unsigned d = 0; wires >> d != 0 && node->wires_us > WIRE_US / 2; d++) {
+    for (unsigned d = 0; wires >> d != 0 && node->wires_us > limit; d++) {
         if ((wires >> d & 1) != 0) {
             doubt_wire(s, i, d);
         }
@@ -101,8 +106,8 @@ void host_doubts_check(struct host_service *service, uint64_t elapsed_us)
     unsigned others;
     look_at_wire(s, elapsed_us);
     for (unsigned i = 0; i < s->machine->nodes && s->started; i++) {
-        uint64_t limit =
-            s->patience_us / 2 < DOUBT_US ? s->patience_us / 2 : DOUBT_US;
+        uint64_t limit = s->machine->slow ? SLOW_US : DOUBT_US;
+        limit = s->patience_us / 2 < limit ? s->patience_us / 2 : limit;
         if (s->work.lost[i] || s->node[i].doubted) {
             continue;
         }

@@ -4,6 +4,7 @@
 
 #include "bring_up.h"
 #include "doubts.h"
+#include "faults.h"
 #include "idle_nodes.h"
 #include "missing_links.h"
 #include "notices.h"
@@ -117,6 +118,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
     if (s->probing) {
         ping_next(s);
     }
+    host_faults_begin(s);
 }
 
 void host_detector_end(struct host_service *service)
@@ -135,6 +137,7 @@ bool host_detector_ping(struct host_service *service, uint16_t to)
     if (cube_write(service->cube, to, NODE_PING, &ping, sizeof ping) != 0) {
         return false;
     }
+    host_faults_pinged(service, to, node->sent);
     node->sent++;
     node->ping_due = false;
     node->pinged = true;
@@ -192,11 +195,14 @@ int host_detector_pong(struct host_service *service,
     host_doubts_heard(s, message->source, anew && first);
     host_missing_links_heard(s, message->source, pong.links);
     node->pinged = false;
-    node->ping_due = false; /* what would have been asked again, is answered */
+    /* What would have been asked again, is answered. */
+    node->ping_due = node->vouches == HOST_DOUBTED;
     if (first && s->probing) {
         ping_next(s);
     }
-    return 0;
+    return s->loss
+               ? 0
+               : host_faults_answered(s, message->source, pong.pinged, error);
 }
 
 static unsigned pings_due(const struct host_service *s)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "failure_detector.h"
+#include "faults.h"
 #include "idle_nodes.h"
 #include "missing_links.h"
 #include "node/totals.h"
@@ -239,33 +240,6 @@ static int take_ready(struct host_service *s,
     return 0;
 }
 
-/* What to do about a fault that a node reports, by a word of its text. */
-static const char *advice(const char *text)
-{
-    static const char *const known[][2] = {
-        {"memory", "give the nodes more memory"},
-        {"protocol version", "run the same version of the program everywhere"},
-        {"role", "run the same version of the program everywhere"}};
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        if (strstr(text, known[i][0]) != NULL) {
-            return known[i][1];
-        }
-    }
-    return "please report this with the points";
-}
-
-static int take_fault(const struct cube_message *message,
-                      struct host_error *error)
-{
-    char text[NODE_FAULT_TEXT_MAX + 1];
-    size_t size = message->size < NODE_FAULT_TEXT_MAX ? message->size
-                                                      : NODE_FAULT_TEXT_MAX;
-    memcpy(text, message->data, size);
-    text[size] = '\0';
-    return host_fail(error, HOST_CUBE, "node %u: %s; %s", message->source, text,
-                     advice(text));
-}
-
 /* What the strategy's roles have to say.  An error that it has set stays. */
 static int take_other(struct host_service *s,
                       const struct cube_message *message,
@@ -314,7 +288,7 @@ static int take(struct host_service *service,
     case NODE_FINISHED:
         return take_finished(service, message, error);
     case NODE_FAULT:
-        return take_fault(message, error);
+        return host_faults_take(service, message, error);
     default:
         return take_other(service, message, error);
     }

@@ -35,9 +35,9 @@ static bool is_owed(const struct host_service *s, unsigned i)
            (s->setup.credits > 0 && credits >= s->setup.credits / 2);
 }
 
-/* Who holds this node up: who keeps the page that it waits for, who owes it
- * answers, or itself. */
-static unsigned culprit(const struct host_service *s, unsigned i)
+/* The living node that this one waits for: who keeps its page, or owes it
+ * answers; or CUBE_HOST. */
+static unsigned awaits(const struct host_service *s, unsigned i)
 {
     struct node_setup_message setup = s->setup;
     s->strategy->set_up(&s->work, i, &setup);
@@ -45,9 +45,23 @@ static unsigned culprit(const struct host_service *s, unsigned i)
     uint32_t keeper =
         page == INCODE_NONE ? CUBE_HOST : node_keeper(page, setup.holders);
     keeper = s->node[i].owing != CUBE_HOST ? s->node[i].owing : keeper;
-    bool holds = keeper < s->machine->nodes && !s->work.lost[keeper] &&
-                 s->node[keeper].still_us > s->patience_us / 2;
-    return holds ? keeper : i;
+    bool living = keeper < s->machine->nodes && !s->work.lost[keeper];
+    return living ? keeper : CUBE_HOST;
+}
+
+/* Who holds this node up: the last of those who wait for each other, be it
+ * itself; or CUBE_HOST: one of them goes on, so that all may. */
+static unsigned culprit(const struct host_service *s, unsigned i)
+{
+    unsigned next = awaits(s, i);
+    for (unsigned k = 0; k < s->machine->nodes && next != CUBE_HOST; k++) {
+        if (s->node[next].still_us <= s->patience_us / 2) {
+            return CUBE_HOST;
+        }
+        i = next;
+        next = awaits(s, i);
+    }
+    return i;
 }
 
 static const char *work_of_one_left(const struct host_service *s)
@@ -93,6 +107,9 @@ void host_idle_check(struct host_service *service, uint64_t elapsed_us)
         }
         char why[80];
         unsigned who = culprit(s, i);
+        if (who == CUBE_HOST) {
+            continue;
+        }
         snprintf(why, sizeof why, "answers, but has done nothing for %llu s",
                  (unsigned long long)s->patience_us / 1000000);
         if (!host_idle_leave(s, who, why)) {

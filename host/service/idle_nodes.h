@@ -4,10 +4,11 @@
  * it has to work for: its pongs count the steps that it does, and whatever else
  * it sends is progress as well.  One that owes something, is owed nothing by
  * the host, and shows no progress for the length of the service's patience is
- * idle; if it waits for a page or for answers of a node that shows none either,
- * that one is. The machine ends it, if it can start it again; if it cannot, or
- * has done so before, the node is left aside for the rest of the run, which
- * goes on without its work, but by its links.
+ * idle; if it waits for a page or for answers of another node, that one is, or
+ * who that one waits for, unless it goes on: then nobody is.  The machine ends
+ * it, if it can start it again; if it cannot, or has done so before, the node
+ * is left aside for the rest of the run, which goes on without its work, but by
+ * its links.
  *
  * Memory: none of its own.  Work: constant a message, a pass over the nodes a
  * check.

@@ -29,6 +29,9 @@ struct host_machine {
     uint32_t epoch;        /* of this start of the host, never repeated */
     struct link_pipe pipe; /* the bytes to and from node 0 */
     uint32_t serial_baud;  /* of the slowest serial wire; 0: there is none */
+    bool slow; /* its nodes may be silent for seconds, and where it starts them
+                  need as long as the user has patience, as this machine
+                  emulates them */
     /* A second wire, to another node, for when node 0 is lost; 0: none. */
     uint16_t spare_node;
     struct link_pipe spare;

@@ -34,6 +34,8 @@ enum {
     HOST_PATIENCE_US = 60000000 /* unless the caller says otherwise */
 };
 
+enum host_vouching { HOST_VOUCHES, HOST_DOUBTED, HOST_ASKED };
+
 /* What the host knows of one node while it runs. */
 struct host_node {
     uint32_t pages[HOST_PAGES_QUEUED_MAX]; /* asked for, to be sent */
@@ -53,26 +55,28 @@ struct host_node {
     bool working;  /* a job is out */
     bool reported; /* statistics of all that it has done are here */
     /* Whether it is there: failure_detector.h. */
-    bool given_up;           /* for the rest of the run */
-    bool aside;              /* has no work for the rest of the run */
-    bool left;               /* for the rest of this generation */
-    bool started_anew;       /* as it was not to be trusted with work */
-    uint32_t work;           /* as its last pong counted it, */
-    uint32_t awaited;        /* the page that it waited for, */
-    uint32_t owing;          /* and who owed it answers */
-    uint32_t refused;        /* links where it met another key */
-    uint64_t still_us;       /* without progress: idle_nodes.h */
-    bool pinged;             /* a ping has not been answered */
-    bool ping_last;          /* what it was sent last is a ping */
-    uint32_t sent, received; /* counted messages of this generation */
-    uint32_t missed;         /* pings that were lost before the first answer */
-    uint32_t start;          /* the epoch of its start; 0: not heard of */
-    uint64_t silent_us;      /* that it has not answered */
-    bool cut_off;            /* no live wire leads to it */
-    uint32_t silent;         /* links by which it hears nothing */
-    bool doubted;            /* the user was told so: doubts.h; */
-    uint32_t wires_doubted;  /* and of these links, */
-    uint64_t wires_us;       /* after so long */
+    bool given_up;              /* for the rest of the run */
+    bool aside;                 /* has no work for the rest of the run */
+    bool left;                  /* for the rest of this generation */
+    bool started_anew;          /* as it was not to be trusted with work */
+    enum host_vouching vouches; /* that nothing was lost: faults.h, */
+    uint32_t asked;             /* and the count in the ping that asks it */
+    uint32_t work;              /* as its last pong counted it, */
+    uint32_t awaited;           /* the page that it waited for, */
+    uint32_t owing;             /* and who owed it answers */
+    uint32_t refused;           /* links where it met another key */
+    uint64_t still_us;          /* without progress: idle_nodes.h */
+    bool pinged;                /* a ping has not been answered */
+    bool ping_last;             /* what it was sent last is a ping */
+    uint32_t sent, received;    /* counted messages of this generation */
+    uint32_t missed;        /* pings that were lost before the first answer */
+    uint32_t start;         /* the epoch of its start; 0: not heard of */
+    uint64_t silent_us;     /* that it has not answered */
+    bool cut_off;           /* no live wire leads to it */
+    uint32_t silent;        /* links by which it hears nothing */
+    bool doubted;           /* the user was told so: doubts.h; */
+    uint32_t wires_doubted; /* and of these links, */
+    uint64_t wires_us;      /* after so long */
     uint64_t pinged_us, ping_again_us;
     uint32_t links;          /* that have been up, as either end has said */
     uint64_t links_heard_us; /* uncabled_us when this end said so last */
@@ -89,6 +93,13 @@ struct host_node_report {
     struct node_finished_message statistics;
     uint64_t pages; /* that this node alone had from the host */
     uint64_t page_bytes;
+};
+
+/* What a node has reported, which counts once all have answered: faults.h. */
+struct host_fault {
+    bool told;
+    unsigned node;
+    char text[NODE_FAULT_TEXT_MAX + 1];
 };
 
 struct host_service {
@@ -129,6 +140,7 @@ struct host_service {
     uint32_t generation; /* of the wiring that is followed */
     bool loss;           /* a new generation is due */
     unsigned blamed;     /* the node of the last loss, as far as is known */
+    struct host_fault fault;
     /* Losses in a row without a brick between them that was committed. */
     unsigned fruitless;
     uint32_t committed_before;

@@ -24,6 +24,7 @@ static uint64_t memory_of(const struct host_sim_run *r)
     unsigned dimension = (unsigned)__builtin_ctz(p->nodes);
     struct node_identity identity = {.dimension = (uint8_t)dimension,
                                      .window = (uint8_t)p->window,
+                                     .serial_baud = p->serial_baud,
                                      .epoch = 1};
     memcpy(setup.setup.cells, r->order.cells, sizeof setup.setup.cells);
     uint64_t memory = 0, needed = 1;
@@ -51,6 +52,9 @@ static int open_world(struct host_sim_run *r, struct host_error *error)
         .dead_us = p->dead_us,
         .step_us = p->step_us,
         .host_us = p->host_us,
+        .look_us = p->look_us,
+        .bare = p->wanted[HOST_SIM_BARE],
+        .serial_baud = p->serial_baud,
         .time_us_max = TIME_US_MAX,
         .steps_max = STEPS_MAX,
         .absent_s = p->absent_s,

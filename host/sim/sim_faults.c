@@ -12,6 +12,8 @@ enum {
     HOST_US_CALM = 200, /* for a look at the clock, at most, in the end */
     ABSENT_S = 30,
     ABSENT_S_MIN = 3,
+    FIFO_BYTES = 16, /* of a UART */
+    BARE_POINTS_MAX = 300,
     HOST_KEEPS_US = 3000000 /* node 0 to a host that it does not hear */
 };
 
@@ -76,6 +78,49 @@ static void draw_second_host(struct host_sim_plan *p)
     most = HOST_KEEPS_US / 30;
     p->weather.stall_us =
         p->weather.stall_us < most ? p->weather.stall_us : most;
+}
+
+/* From a state of its own, as what follows. */
+static void draw_slow_nodes(struct host_sim_plan *p)
+{
+    uint64_t state = sim_seed(p->seed, 88);
+    if (p->nodes > 64 || host_sim_draw(&state, 1, 4) > 1) {
+        return;
+    }
+    p->wanted[HOST_SIM_SLOW_NODE] = true;
+    p->look_us = (uint32_t)host_sim_draw_log(&state, 20, 1000);
+}
+
+static void draw_serial_wire(struct sim_quality *q, uint32_t baud,
+                             uint64_t *state)
+{
+    q->bytes_per_s = baud / 10;
+    q->latency_us = (uint32_t)host_sim_draw_log(state, 1, 3000);
+    q->room = (uint32_t)host_sim_draw_log(state, 16, 1024);
+    q->bytes = SIM_BYTES_MIN;
+}
+
+/* What is told of the rate may be wrong, as a board knows that of its own UARTs
+ * alone.  A UART never closes, and has one host. */
+static void draw_bare(struct host_sim_plan *p)
+{
+    static const uint32_t rates[] = {19200, 19200, 115200, 115200, 921600};
+    uint64_t state = sim_seed(p->seed, 89);
+    if (p->nodes > 16 || p->wanted[HOST_SIM_SECOND_HOST] ||
+        p->wanted[HOST_SIM_DEAD_WIRE] || p->wanted[HOST_SIM_MISSING_WIRE] ||
+        p->wanted[HOST_SIM_TINY] || host_sim_draw(&state, 1, 3) > 1) {
+        return;
+    }
+    p->wanted[HOST_SIM_BARE] = true;
+    p->wanted[HOST_SIM_CUT] = p->wanted[HOST_SIM_PARTITION] = false;
+    uint32_t baud = rates[host_sim_draw(&state, 0, 4)];
+    p->serial_baud = host_sim_draw(&state, 1, 2) == 1 ? 115200 : baud;
+    draw_serial_wire(&p->wire, baud, &state);
+    draw_serial_wire(&p->host_wire, baud, &state);
+    p->gather_us = (uint32_t)(UINT64_C(10000000) * FIFO_BYTES / baud);
+    if (p->points > BARE_POINTS_MAX) {
+        p->points = 30 + p->points % BARE_POINTS_MAX;
+    }
 }
 
 /* --- what they do --------------------------------------------------------- */
@@ -147,7 +192,8 @@ static bool crash(struct host_sim_run *r, const struct host_sim_event *e)
          r->world.now_us - second->refused_us >= REFUSED_US)) {
         return false;
     }
-    host_world_crash(&r->world, e->node, e->lasts_us, draw(r, 0, 1) == 0);
+    bool unplugged = draw(r, 0, 1) == 0 && !r->plan->wanted[HOST_SIM_BARE];
+    host_world_crash(&r->world, e->node, e->lasts_us, unplugged);
     return true;
 }
 
@@ -208,6 +254,21 @@ static uint64_t count_missing(const struct host_sim_run *r,
     return sum;
 }
 
+/* Looks, of which some were at the links as well. */
+static uint64_t count_slow_node(const struct host_sim_run *r,
+                                enum host_sim_fault kind)
+{
+    return r->plan->wanted[kind] ? r->world.looks : 0;
+}
+
+/* Starts of nodes that others had met before. */
+static uint64_t count_bare(const struct host_sim_run *r,
+                           enum host_sim_fault kind)
+{
+    (void)kind;
+    return r->world.learned;
+}
+
 /* --- the table ------------------------------------------------------------ */
 
 const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
@@ -236,6 +297,9 @@ const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
     [HOST_SIM_SECOND_HOST] = {"second-host", .draw = draw_second_host},
     [HOST_SIM_IDLER] = {"idle-node", .draw = host_sim_draw_idler},
     [HOST_SIM_FOREIGN] = {"generation", .draw = host_sim_draw_teller},
+    [HOST_SIM_SLOW_NODE] = {"slow-node", .draw = draw_slow_nodes,
+                            .count = count_slow_node},
+    [HOST_SIM_BARE] = {"bare", .draw = draw_bare, .count = count_bare},
 };
 
 /* --- when ----------------------------------------------------------------- */

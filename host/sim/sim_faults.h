@@ -35,6 +35,9 @@ enum host_sim_fault {
     HOST_SIM_IDLER,        /* a node, but for node 0, answers and never works */
     HOST_SIM_FOREIGN,      /* a node tells others of another host's generation,
                               one far away or at an end of the numbers */
+    HOST_SIM_SLOW_NODE, /* nodes work long between two looks at their links */
+    HOST_SIM_BARE,      /* serial wires, which never close, between boards
+                           that ask who they are whenever they start */
     HOST_SIM_FAULTS
 };
 

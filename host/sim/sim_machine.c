@@ -67,6 +67,7 @@ struct host_machine host_world_machine(struct host_world *world)
     machine.nodes = world->nodes;
     machine.dimension = o->dimension;
     machine.epoch = world->epoch++;
+    machine.serial_baud = world->options.serial_baud;
     machine.pipe = host_sim_cube_pipe(&world->cube, host, 0);
     if (o->spare_node != 0) {
         machine.spare_node = o->spare_node;

@@ -34,6 +34,8 @@ struct host_sim_plan {
     uint64_t memory_more; /* bytes a node beyond the least that works */
     struct sim_quality wire, host_wire;
     uint32_t gather_us, step_us, host_us;
+    uint32_t look_us;     /* as in struct host_world_options */
+    uint32_t serial_baud; /* that nodes and host are told of; 0: none */
     /* What goes wrong. */
     bool wanted[HOST_SIM_FAULTS];
     struct sim_faults weather; /* of the wires that have any */

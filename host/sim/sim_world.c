@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim_boot.h"
 #include "sim_draw.h"
 
 enum {
@@ -12,7 +13,10 @@ enum {
     START_US_MAX = 100000, /* after which all nodes have been started */
     CONNECT_US = 20000,    /* between attempts, as TCP_PAUSE_MIN_US, */
     CONNECT_US_MAX = 1000000,
-    PASS_US = 50 /* between two looks of links whose processor is busy */
+    LONG_US = 50000, /* between two looks of a slow node, once in so many */
+    LONG_IN = 32,
+    LISTEN_US = 50000, /* as in node/identity.h */
+    PASS_US = 50       /* between two looks of links whose processor is busy */
 };
 
 /* --- the nodes in the order of their clocks ------------------------------ */
@@ -144,10 +148,24 @@ static uint64_t spent_ns(const struct host_world_node *node)
                      node->used_ns;
 }
 
+/* The world's clock goes with a slow node's until its step is over: what the
+ * others do meanwhile the node sees later. */
+static void take_time(struct host_world *w)
+{
+    bool lasts = host_sim_draw(&w->look_random, 1, LONG_IN) == 1;
+    w->looks++;
+    w->now_us += host_sim_draw(&w->look_random, 0,
+                               lasts ? LONG_US : 2 * w->options.look_us);
+}
+
 static uint64_t node_now_us(void *context)
 {
     const struct host_world_node *node = context;
-    return node->world->now_us + node->offset_us + spent_ns(node) / 1000;
+    struct host_world *w = node->world;
+    if (node->stepping && w->options.look_us > 0) {
+        take_time(w);
+    }
+    return w->now_us + node->offset_us + spent_ns(node) / 1000;
 }
 
 static uint64_t node_busy_us(void *context)
@@ -169,38 +187,12 @@ static void node_reset(void *context, int status)
     node->state = HOST_WORLD_ENDED;
 }
 
-static void give_up(struct host_world *w, unsigned node, const char *why)
+void host_world_give_up(struct host_world *world, unsigned node,
+                        const char *why)
 {
-    if (w->fault == NULL) {
-        w->fault = why;
-        w->fault_node = node;
-    }
-}
-
-/* A start: what memory holds before is chance. */
-static void boot(struct host_world *w, unsigned i)
-{
-    struct host_world_node *n = &w->node[i];
-    const char *why = NULL;
-    n->offset_us = sim_draw(&w->random) >> 24;
-    if (w->options.used_ns == NULL) {
-        memset(n->board.arena, (int)(sim_draw(&w->random) >> 32 & 0xff),
-               n->board.arena_bytes);
-    }
-    n->used_ns = 0;
-    n->board.identity.epoch = w->epoch++;
-    n->starts++;
-    n->state = HOST_WORLD_UP;
-    n->node = NULL;
-    n->stand_in = NULL;
-    if (n->orders.kind != HOST_NO_STAND_IN) {
-        n->stand_in = host_stand_in_start(&n->board, &n->orders);
-        why = "the memory does not hold a stand-in";
-    } else {
-        n->node = node_start(&n->board, &why);
-    }
-    if (n->node == NULL && n->stand_in == NULL) {
-        give_up(w, i, why);
+    if (world->fault == NULL) {
+        world->fault = why;
+        world->fault_node = node;
     }
 }
 
@@ -280,9 +272,10 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
 /* When an idle node has something to do. */
 static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
 {
-    uint64_t due =
-        w->now_us + (n->stand_in != NULL ? host_stand_in_wait_us(n->stand_in)
-                                         : node_wait_us(n->node));
+    uint64_t due = w->now_us;
+    due += n->learning           ? LISTEN_US
+           : n->stand_in != NULL ? host_stand_in_wait_us(n->stand_in)
+                                 : node_wait_us(n->node);
     unsigned i = n->board.identity.self;
     for (unsigned d = 0; d < n->links; d++) {
         const struct sim_end *end = host_sim_cube_port(&w->cube, i, d)->end;
@@ -330,6 +323,19 @@ static uint64_t charged_step(struct host_world_node *n, enum node_event *event)
     return ns / 1000;
 }
 
+/* The same of one whose clock may go on by itself. */
+static uint64_t timed_step(struct host_world_node *n, enum node_event *event)
+{
+    struct host_world *w = n->world;
+    uint64_t begin_us = w->now_us;
+    n->stepping = true;
+    *event = node_step(n->node);
+    n->stepping = false;
+    uint64_t passed_us = w->now_us - begin_us;
+    w->now_us = begin_us;
+    return passed_us;
+}
+
 static void step(struct host_world *w, unsigned i)
 {
     struct host_world_node *n = &w->node[i];
@@ -342,19 +348,22 @@ static void step(struct host_world *w, unsigned i)
     uint64_t cost = host_sim_draw(&w->random, 1, 2 * w->options.step_us);
     if (n->state == HOST_WORLD_OFF) {
         plug_in(w, i, true);
-        boot(w, i);
+        host_sim_boot(w, i);
         n->busy_until_us = w->now_us + BOOT_US;
         wake_at(w, i, n->busy_until_us);
         return;
     }
     look_for_room(w, i);
     enum node_event event = NODE_BUSY;
-    if (n->stand_in != NULL) {
+    if (n->learning) {
+        host_sim_learn(w, i);
+        event = NODE_IDLE;
+    } else if (n->stand_in != NULL) {
         event = host_stand_in_step(n->stand_in);
     } else if (charged) {
         cost = charged_step(n, &event);
     } else {
-        event = node_step(n->node);
+        cost += timed_step(n, &event);
     }
     if (event == NODE_STOPPED) {
         n->board.reset(n, 0);
@@ -424,7 +433,7 @@ static void happen(struct host_world *w, enum what what, unsigned host)
         break;
     }
     if (++w->steps > w->options.steps_max) {
-        give_up(w, w->nodes, "too many steps");
+        host_world_give_up(w, w->nodes, "too many steps");
     }
 }
 
@@ -447,7 +456,7 @@ void host_world_run(struct host_world *world, uint64_t until, bool for_host)
     }
     w->now_us = until > w->now_us ? until : w->now_us;
     if (w->now_us > w->options.time_us_max) {
-        give_up(w, w->nodes, "too long");
+        host_world_give_up(w, w->nodes, "too long");
     }
 }
 
@@ -472,6 +481,7 @@ static int open_node(struct host_world *w, unsigned i)
     n->board.identity.window = o->window;
     n->board.identity.host_port = i != 0 && i == o->cube.spare_node;
     n->board.identity.dead_us = o->dead_us;
+    n->board.identity.serial_baud = o->serial_baud;
     n->board.now_us = node_now_us;
     n->board.busy_us = node_busy_us;
     n->board.idle = node_idle;
@@ -527,6 +537,7 @@ int host_world_open(struct host_world *world,
     w->options.cube.context = w;
     w->nodes = 1u << options->cube.dimension;
     w->random = sim_seed(options->cube.seed, 1);
+    w->look_random = sim_seed(options->cube.seed, 4);
     w->strike_us = w->second_us = UINT64_MAX;
     w->epoch = (uint32_t)(sim_draw(&w->random) >> 33) | 1;
     w->connection[0].wanted = w->connection[0].connected = true;

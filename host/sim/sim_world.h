@@ -16,6 +16,7 @@
 #define HOST_SIM_WORLD_H
 
 #include "host/service/machine.h"
+#include "node/identity.h"
 #include "node/node.h"
 #include "sim_cube.h"
 #include "stand_in.h"
@@ -39,6 +40,13 @@ struct host_world_options {
      * over; its clock goes on within a step.  NULL: chance decides. */
     uint64_t (*used_ns)(void *context, unsigned i, const struct node *node);
     void *used_context;
+    /* Microseconds by which a node's clock goes on within a step, each time
+     * that it looks at it, more or less; 0: it stands still. */
+    uint32_t look_us;
+    /* As on bare boards: a node is not told who it is, asks its neighbours, and
+     * has its epoch from what they knew of it. */
+    bool bare;
+    uint32_t serial_baud; /* as in struct node_identity */
     bool routers; /* and links pass on messages while a processor is busy */
     uint64_t time_us_max, steps_max; /* then it counts as hanging */
     uint8_t absent_s;                /* as in struct host_machine */
@@ -73,6 +81,8 @@ struct host_world_node {
     uint64_t wake_us, busy_until_us, busy_us, offset_us;
     uint64_t used_ns; /* at the begin of a step, where work is charged */
     bool stepping;
+    bool learning; /* who it is: there is no node yet */
+    struct learner learner;
     uint32_t starts, place; /* in the heap */
     unsigned links;
 };
@@ -82,8 +92,10 @@ struct host_world {
     struct host_sim_cube cube;
     unsigned nodes;
     uint64_t now_us, steps, strike_us, second_us;
-    uint64_t random;
-    uint32_t epoch; /* of the next start of anything */
+    uint64_t random, look_random;
+    uint64_t looks;   /* by which clocks went on within steps */
+    uint64_t learned; /* starts whose neighbours knew one before */
+    uint32_t epoch;   /* of the next start of anything */
     uint64_t host_pause_us;
     const char *fault; /* why nothing moves any more, or NULL */
     unsigned fault_node;
@@ -135,6 +147,10 @@ void host_world_idle(struct host_world *world, unsigned node);
 
 /* The node never comes back. */
 void host_world_kill(struct host_world *world, unsigned node);
+
+/* Nothing moves any more, for that reason: the first that is given. */
+void host_world_give_up(struct host_world *world, unsigned node,
+                        const char *why);
 
 /* NULL, or what a node left behind that was not its own. */
 const char *host_world_damage(const struct host_world *world);

@@ -46,6 +46,7 @@ static struct cube_config configure(const struct node_board *board)
     config.epoch = who->epoch;
     config.host_port = who->host_port;
     config.dead_us = who->dead_us;
+    cube_for_serial(&config, who->serial_baud);
     memcpy(config.pipes, board->pipes, sizeof config.pipes);
     return config;
 }

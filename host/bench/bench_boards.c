@@ -1,0 +1,298 @@
+#include "bench_boards.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "bench_boards_count.h"
+#include "bench_boards_plot.h"
+#include "bench_build.h"
+#include "bench_set.h"
+#include "bench_trial.h"
+#include "host/base/progress.h"
+#include "host/machines/boards.h"
+
+enum { POINTS = 5000, LIMIT_S = 900, NODES = 2, NODES_WORD = 4 };
+
+/* An instruction of an emulated processor takes it 2^SHIFT ns: so its own clock
+ * counts them. */
+enum { SHIFT = 3 };
+
+struct bench {
+    const struct host_bench_boards_options *options;
+    struct host_bench_set set;
+    char folder[64];    /* of the emulators' stand-ins, and what they leave */
+    char counter[4096]; /* tests/bench/instructions.c */
+    char stats[80];
+    char digest[80]; /* of processes of this machine */
+    struct host_boards_row row[HOST_BOARDS_ROWS];
+    unsigned rows;
+};
+
+/* --- the emulator, with what counts -----------------------------------------
+ */
+
+/* A program of its name, which is found before it and becomes it. */
+static int stand_in(const struct bench *b, const struct host_bare *bare,
+                    const char *program, struct host_error *error)
+{
+    char path[160];
+    (void)snprintf(path, sizeof path, "%s/%s", b->folder, bare->program);
+    FILE *file = fopen(path, "we");
+    if (file != NULL) {
+        fprintf(file,
+                "#!/bin/sh\nexec '%s' \"$@\" -icount shift=%d,sleep=on "
+                "-plugin '%s,folder=%s'\n",
+                program, SHIFT, b->counter, b->folder);
+    }
+    if (file == NULL || fclose(file) != 0 || chmod(path, 0700) != 0) {
+        host_fail(error, HOST_BROKEN, "%s: %s; make room there", path,
+                  strerror(errno));
+    }
+    return error->code;
+}
+
+static void take_away(const struct bench *b, const char *name)
+{
+    char path[PATH_MAX];
+    (void)snprintf(path, sizeof path, "%s/%s", b->folder, name);
+    (void)remove(path);
+}
+
+/* A run that failed leaves counts there. */
+static void take_all_away(const struct bench *b)
+{
+    struct dirent *entry;
+    DIR *folder = opendir(b->folder);
+    while (folder != NULL && (entry = readdir(folder)) != NULL) {
+        if (entry->d_name[0] != '.') {
+            take_away(b, entry->d_name);
+        }
+    }
+    if (folder != NULL) {
+        (void)closedir(folder);
+    }
+    (void)rmdir(b->folder);
+}
+
+/* Programs are found in the folder first, or as they were. */
+static void find_first(const struct bench *b, const char *before)
+{
+    char path[8192];
+    (void)snprintf(path, sizeof path, "%s:%s", b->folder, before);
+    (void)setenv("PATH", b->folder[0] == '\0' ? before : path, 1);
+}
+
+/* --- a run
+ * -------------------------------------------------------------------- */
+
+static double sum_of(json_t *nodes, const char *name)
+{
+    double sum = 0;
+    size_t i;
+    json_t *node;
+    json_array_foreach(nodes, i, node)
+    {
+        sum += json_number_value(json_object_get(node, name));
+    }
+    return sum;
+}
+
+/* What the statistics of the run say of the row. */
+static int read_stats(const struct bench *b, struct host_boards_row *row,
+                      struct host_error *error)
+{
+    json_t *root = json_load_file(b->stats, 0, NULL);
+    json_t *nodes = json_object_get(root, "per_node");
+    double tetrahedra = json_number_value(json_object_get(root, "tetrahedra"));
+    if (!(tetrahedra > 0)) {
+        json_decref(root);
+        return host_fail(error, HOST_BROKEN,
+                         "%s: no statistics of a run; run it again", b->stats);
+    }
+    row->nodes = NODES;
+    row->points = b->set.points;
+    row->tetrahedra = (uint64_t)tetrahedra;
+    row->instructions =
+        sum_of(nodes, "cpu_s") * 1e9 / (1 << SHIFT) / tetrahedra;
+    row->bytes_in = sum_of(nodes, "bytes_in") / tetrahedra;
+    row->bytes_out = sum_of(nodes, "bytes_out") / tetrahedra;
+    json_decref(root);
+    return 0;
+}
+
+/* A run on that board, with the right result. */
+static int run(struct bench *b, const char *board, struct host_error *error)
+{
+    char nodes[NODES_WORD];
+    const char *words[] = {
+        "/proc/self/exe", "run",     b->set.path, "-q",     "--format", "npy",
+        "--strategy",     "spatial", "--board",   board,    "--nodes",  nodes,
+        "--patience",     "600",     "--stats",   b->stats, NULL};
+    struct host_trial trial;
+    (void)snprintf(nodes, sizeof nodes, "%d", NODES);
+    if (host_trial_run((char *const *)words, LIMIT_S, &trial, error) != 0) {
+        return error->code;
+    }
+    if (trial.late || trial.status != 0) {
+        return host_fail(error, HOST_CUBE, "%s: %s; see incode run --board %s",
+                         board, trial.late ? "not ended in time" : trial.said,
+                         board);
+    }
+    json_t *root = json_load_file(b->stats, 0, NULL);
+    const char *digest = json_string_value(json_object_get(root, "digest"));
+    if (b->digest[0] == '\0' && digest != NULL) {
+        (void)snprintf(b->digest, sizeof b->digest, "%s", digest);
+    }
+    if (digest == NULL || strcmp(digest, b->digest) != 0) {
+        host_fail(error, HOST_BROKEN,
+                  "%s: its tetrahedra are not those of this machine; try: "
+                  "tests/system/arithmetic.sh",
+                  board);
+    }
+    json_decref(root);
+    return error->code;
+}
+
+/* A row, with the emulator counting. */
+static int measure(struct bench *b, const struct host_board *board,
+                   struct host_error *error)
+{
+    struct host_boards_row *row = &b->row[b->rows];
+    struct host_emulator emulator;
+    const char *path = getenv("PATH");
+    char map[PATH_MAX + 8];
+    char *before = strdup(path == NULL ? "/usr/bin:/bin" : path);
+    if (before == NULL ||
+        host_emulator_find(board->bare, &emulator, error) != 0 ||
+        stand_in(b, board->bare, emulator.program, error) != 0) {
+        free(before);
+        return error->code;
+    }
+    (void)snprintf(map, sizeof map, "%s", emulator.image);
+    char *end = strrchr(map, '.');
+    (void)snprintf(end, 5, ".map");
+    row->board = board->name;
+    host_progress_phase(board->name, NULL);
+    find_first(b, before);
+    if (run(b, board->name, error) == 0 && read_stats(b, row, error) == 0 &&
+        host_boards_count(map, b->folder, row->counted, error) == 0) {
+        b->rows++;
+    }
+    (void)setenv("PATH", before, 1);
+    take_away(b, board->bare->program);
+    host_progress_phase("", NULL);
+    free(before);
+    return error->code;
+}
+
+/* --- what is printed
+ * ------------------------------------------------------------ */
+
+static void print_head(void)
+{
+    printf("Instructions a tetrahedron, of the nodes while they do not wait "
+           "(%d of a board,\n%d uniform points); where all go that are "
+           "executed, in percent; bytes a\ntetrahedron that nodes take from, "
+           "and put on, their wires.\n\n%-11s %7s",
+           NODES, POINTS, "board", "instr.");
+    for (unsigned i = 0; i < HOST_ROOMS; i++) {
+        printf(" %*s", (int)strlen(host_room_names[i]) + 1, host_room_names[i]);
+    }
+    printf(" %6s %6s\n", "in", "out");
+}
+
+static void print_row(const struct host_boards_row *row)
+{
+    printf("%-11s %7.0f", row->board, row->instructions);
+    for (unsigned i = 0; i < HOST_ROOMS; i++) {
+        printf(" %*.1f", (int)strlen(host_room_names[i]) + 1,
+               host_boards_share(row, i));
+    }
+    printf(" %6.1f %6.1f\n", row->bytes_in, row->bytes_out);
+    fflush(stdout);
+}
+
+static int write_csv(const struct bench *b, struct host_error *error)
+{
+    const char *path = b->options->csv;
+    FILE *file = fopen(path, "we");
+    if (file != NULL) {
+        fprintf(file, "board,nodes,points,tetrahedra,instructions");
+        for (unsigned i = 0; i < HOST_ROOMS; i++) {
+            fprintf(file, ",%s_percent", host_room_names[i]);
+        }
+        fprintf(file, ",bytes_in,bytes_out\n");
+        for (unsigned n = 0; n < b->rows; n++) {
+            const struct host_boards_row *row = &b->row[n];
+            fprintf(file, "%s,%u,%llu,%llu,%.0f", row->board, row->nodes,
+                    (unsigned long long)row->points,
+                    (unsigned long long)row->tetrahedra, row->instructions);
+            for (unsigned i = 0; i < HOST_ROOMS; i++) {
+                fprintf(file, ",%.2f", host_boards_share(row, i));
+            }
+            fprintf(file, ",%.2f,%.2f\n", row->bytes_in, row->bytes_out);
+        }
+    }
+    if (file == NULL || ferror(file) != 0 || fclose(file) != 0) {
+        host_fail(error, HOST_BROKEN, "%s: %s; choose another file", path,
+                  strerror(errno));
+    }
+    return error->code;
+}
+
+static int bench_all(struct bench *b, struct host_error *error)
+{
+    const struct host_board *board;
+    if (run(b, "linux", error) != 0) {
+        return error->code;
+    }
+    print_head();
+    for (unsigned i = 0; (board = host_board_row(i)) != NULL; i++) {
+        if (board->bare == NULL) {
+            continue;
+        }
+        if (measure(b, board, error) != 0) {
+            return error->code;
+        }
+        print_row(&b->row[b->rows - 1]);
+    }
+    if (b->options->csv != NULL && write_csv(b, error) != 0) {
+        return error->code;
+    }
+    return b->options->svg == NULL
+               ? 0
+               : host_boards_plot(b->options->svg, b->row, b->rows, error);
+}
+
+int host_bench_boards(const struct host_bench_boards_options *options,
+                      struct host_error *error)
+{
+    static struct bench b;
+    const char *tmp = getenv("TMPDIR");
+    memset(&b, 0, sizeof b);
+    b.options = options;
+    b.set.file = -1;
+    if (host_bench_made("instructions.so", b.counter, error) != 0 ||
+        host_bench_set_made(&b.set, "uniform", POINTS, error) != 0) {
+        host_bench_set_free(&b.set);
+        return error->code;
+    }
+    (void)snprintf(b.folder, sizeof b.folder, "%.40s/incode-bench.XXXXXX",
+                   tmp == NULL ? "/tmp" : tmp);
+    if (mkdtemp(b.folder) == NULL) {
+        host_fail(error, HOST_BROKEN, "%s: %s; name another in TMPDIR",
+                  b.folder, strerror(errno));
+    } else {
+        (void)snprintf(b.stats, sizeof b.stats, "%s/stats", b.folder);
+        (void)bench_all(&b, error);
+        take_all_away(&b);
+    }
+    host_bench_set_free(&b.set);
+    return error->code;
+}

@@ -1,0 +1,405 @@
+#include "board_emulated.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "console.h"
+#include "emulator.h"
+#include "host/base/clock.h"
+#include "host/base/progress.h"
+#include "qmp.h"
+#include "transport/drivers/tcp.h"
+#include "transport/drivers/unix_file.h"
+
+/* One board of the cube, and what outlives its process. */
+struct board {
+    struct host_emulator emulator;
+    struct host_console console;
+    struct host_qmp qmp;
+    int monitor[2]; /* the host's end, and the emulator's */
+    int said;       /* what UART 0 has sent, where no frames go over it; */
+    off_t heard;    /* so far */
+    int flash;
+    pid_t pid; /* of the process that qmp speaks to */
+    /* Where they have names: of UARTs, of what UART 0 has said, of the chip, of
+     * the monitor. */
+    char wire[HOST_UARTS_MAX][PATH_MAX];
+    char log[PATH_MAX], chip[PATH_MAX], control[PATH_MAX];
+};
+
+struct cube {
+    struct host_cluster cluster;
+    struct host_machine machine; /* the cluster's own */
+    struct host_troubled troubled;
+    int errors; /* what the emulators have said of themselves */
+    struct board board[HOST_EMULATED_MAX];
+};
+
+/* One at a time, see boards.h. */
+static struct cube the_cube;
+
+/* --- boards --------------------------------------------------------------- */
+
+/* In the child. */
+static void become(const void *context, unsigned node)
+{
+    const struct cube *cube = context;
+    const struct host_cluster *c = &cube->cluster;
+    struct host_emulator emulator = cube->board[node].emulator;
+    emulator.errors = cube->errors;
+    for (unsigned d = 0; d < c->dimension; d++) {
+        if (emulator.uart[1 + d].wire.path == NULL) {
+            emulator.uart[1 + d].wire.fd = c->wires.end[node][d];
+        }
+    }
+    if (node == 0 && emulator.uart[0].wire.path == NULL) {
+        emulator.uart[0].wire.fd = c->wires.end[0][c->dimension];
+    }
+    host_emulator_become(&emulator, node);
+}
+
+static int refuse(const char *what, struct host_error *error)
+{
+    return host_fail(error, HOST_BROKEN, "%s: %s; free some files, or memory",
+                     what, strerror(errno));
+}
+
+static int refuse_file(const char *path, struct host_error *error)
+{
+    return host_fail(error, HOST_INPUT,
+                     "%s: cannot be written (%s); free %u MB a board there, or "
+                     "choose another place",
+                     path, strerror(errno), HOST_FLASH_BYTES >> 20);
+}
+
+/* A chip that is new, unless a file has one. */
+static int make_flash(struct board *board, bool named, struct host_error *error)
+{
+    struct stat about;
+    board->flash = named ? open(board->chip, O_RDWR | O_CREAT | O_CLOEXEC, 0600)
+                         : memfd_create("flash", MFD_CLOEXEC);
+    if (board->flash < 0 || fstat(board->flash, &about) != 0) {
+        return named ? refuse_file(board->chip, error) : refuse("flash", error);
+    }
+    if (about.st_size != HOST_FLASH_BYTES &&
+        host_emulator_erase(board->flash) != 0) {
+        if (!named) {
+            return refuse("flash", error);
+        }
+        (void)refuse_file(board->chip, error);
+        (void)unlink(board->chip); /* half a chip fills what is full */
+        return error->code;
+    }
+    board->emulator.flash.fd = board->flash;
+    return 0;
+}
+
+/* What UART 0 says where no frames go over it. */
+static int make_log(struct board *board, bool named, struct host_error *error)
+{
+    board->said =
+        named ? open(board->log, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)
+              : memfd_create("console", MFD_CLOEXEC);
+    if (board->said < 0) {
+        return named ? refuse_file(board->log, error)
+                     : refuse("console", error);
+    }
+    board->emulator.uart[0].log.fd = board->said;
+    return 0;
+}
+
+/* What is to be reached from outside: the host's wire or the console, those to
+ * nodes that are left out or not joined, and the monitor. */
+static void name_files(struct cube *cube, unsigned node,
+                       const struct host_cluster_options *options)
+{
+    struct board *board = &cube->board[node];
+    struct host_emulator *e = &board->emulator;
+    char name[32];
+    snprintf(board->log, PATH_MAX, "%s/console%u.log", options->directory,
+             node);
+    snprintf(board->chip, PATH_MAX, "%s/flash%u", options->directory, node);
+    snprintf(board->control, PATH_MAX, "%s/qmp%u.socket", options->directory,
+             node);
+    e->qmp.path = board->control;
+    for (unsigned i = 0; 1u << i <= options->nodes; i++) {
+        unsigned other = i == 0 ? node : node ^ 1u << (i - 1);
+        if (i == 0 || options->open || (options->left_out >> other & 1) != 0) {
+            host_emulated_wire(node, i, name);
+            snprintf(board->wire[i], PATH_MAX, "%s/%s", options->directory,
+                     name);
+            e->uart[i].wire.path = board->wire[i];
+        }
+    }
+}
+
+void host_emulated_wire(unsigned node, unsigned uart, char name[32])
+{
+    if (uart == 0) {
+        snprintf(name, 32, node == 0 ? "host.socket" : "console%u.socket",
+                 node);
+    } else {
+        snprintf(name, 32, "%u-%u.socket", node, node ^ 1u << (uart - 1));
+    }
+}
+
+static int make_board(struct cube *cube, const struct host_bare *bare,
+                      unsigned node, const struct host_cluster_options *options,
+                      struct host_error *error)
+{
+    struct board *board = &cube->board[node];
+    bool named = options->directory != NULL;
+    host_console_init(&board->console, node, bare->machine);
+    if (host_emulator_find(bare, &board->emulator, error) != 0) {
+        return error->code;
+    }
+    if (named) {
+        name_files(cube, node, options);
+    } else if (unix_file_pair(board->monitor) != 0) {
+        return refuse("monitor", error);
+    } else {
+        host_qmp_init(&board->qmp, board->monitor[0]);
+        board->emulator.qmp.fd = board->monitor[1];
+    }
+    if (node != 0 && make_log(board, named, error) != 0) {
+        return error->code;
+    }
+    return bare->flash ? make_flash(board, named, error) : 0;
+}
+
+static void close_boards(struct cube *cube)
+{
+    for (unsigned i = 0; i < HOST_EMULATED_MAX; i++) {
+        struct board *board = &cube->board[i];
+        int *const files[] = {&board->monitor[0], &board->monitor[1],
+                              &board->said, &board->flash};
+        for (size_t k = 0; k < sizeof files / sizeof files[0]; k++) {
+            if (*files[k] >= 0) {
+                close(*files[k]);
+                *files[k] = -1;
+            }
+        }
+    }
+    if (cube->errors >= 0) {
+        close(cube->errors);
+        cube->errors = -1;
+    }
+}
+
+/* --- as a machine --------------------------------------------------------- */
+
+/* What consoles have said since. */
+static void hear_consoles(struct cube *cube)
+{
+    uint8_t bytes[1024];
+    for (unsigned i = 1; i < cube->cluster.nodes; i++) {
+        struct board *board = &cube->board[i];
+        ssize_t got;
+        if (board->said < 0) {
+            continue;
+        }
+        while ((got = pread(board->said, bytes, sizeof bytes, board->heard)) >
+               0) {
+            board->heard += got;
+            host_console_hear(&board->console, bytes, (size_t)got);
+        }
+    }
+}
+
+static int make_trouble(struct cube *cube, struct host_error *error)
+{
+    static const enum host_qmp_request requests[] = {
+        [HOST_TROUBLE_RESET] = HOST_QMP_RESET,
+        [HOST_TROUBLE_STOP] = HOST_QMP_STOP,
+        [HOST_TROUBLE_CONT] = HOST_QMP_CONT};
+    enum host_trouble_kind kind;
+    unsigned node;
+    if (!host_trouble_due(&cube->troubled, host_now_us(), &kind, &node)) {
+        return 0;
+    }
+    if (kind == HOST_TROUBLE_KILL) {
+        (void)host_child_kill(&cube->cluster.process[node]);
+        return 0;
+    }
+    return host_qmp_ask(&cube->board[node].qmp, requests[kind], error);
+}
+
+/* The last line of what emulators have said of themselves, which begins with
+ * their name; a processor's registers may follow. */
+static void tell_errors(const struct cube *cube)
+{
+    char text[4096];
+    const char *said = NULL, *image = "";
+    off_t size = lseek(cube->errors, 0, SEEK_END);
+    off_t from =
+        size > (off_t)sizeof text - 1 ? size - ((off_t)sizeof text - 1) : 0;
+    ssize_t got = pread(cube->errors, text, sizeof text - 1, from);
+    text[got > 0 ? got : 0] = '\0';
+    for (char *rest = text, *line; (line = strsep(&rest, "\n")) != NULL;) {
+        said = strncmp(line, "qemu", 4) == 0 ? line : said;
+    }
+    for (unsigned i = 0; i < cube->cluster.nodes && *image == '\0'; i++) {
+        image = cube->board[i].emulator.image;
+    }
+    if (said != NULL) {
+        host_note("%s; is %s whole? make firmware makes it", said, image);
+    }
+}
+
+static int machine_check(void *context, struct host_error *error)
+{
+    struct cube *cube = &the_cube;
+    hear_consoles(cube);
+    if (cube->machine.check(context, error) != 0) {
+        tell_errors(cube);
+        return error->code;
+    }
+    for (unsigned i = 0; i < cube->cluster.nodes; i++) {
+        struct board *board = &cube->board[i];
+        if (board->pid != cube->cluster.process[i].pid) {
+            board->pid = cube->cluster.process[i].pid;
+            host_qmp_forget(&board->qmp);
+        }
+    }
+    return make_trouble(cube, error);
+}
+
+static const char *machine_doubt(void *context, unsigned node)
+{
+    static char text[sizeof "its console says: " + HOST_CONSOLE_TEXT];
+    const char *fault = host_console_fault(&the_cube.board[node].console);
+    (void)context;
+    snprintf(text, sizeof text, "its console says: %s",
+             fault == NULL ? "" : fault);
+    return fault == NULL ? NULL : text;
+}
+
+/* A board has no end: nobody waits for it. */
+static bool machine_ended(void *context)
+{
+    (void)context;
+    return true;
+}
+
+static void machine_stop(void *context)
+{
+    struct cube *cube = &the_cube;
+    cube->machine.stop(context);
+    hear_consoles(cube);
+    close_boards(cube);
+}
+
+static struct host_machine machine_of(struct cube *cube)
+{
+    struct host_machine machine = cube->machine;
+    machine.pipe = host_console_pipe(&cube->board[0].console, machine.pipe);
+    machine.slow = true;
+    machine.check = machine_check;
+    machine.doubt = machine_doubt;
+    machine.ended = machine_ended;
+    machine.stop = machine_stop;
+    return machine;
+}
+
+int host_emulated_start(const struct host_board *board,
+                        const struct host_cluster_options *options,
+                        struct host_started *started, struct host_error *error)
+{
+    const struct host_bare *bare = board->bare;
+    struct cube *cube = &the_cube;
+    struct host_cluster_options mine = *options;
+    struct host_link link = *options->link;
+    struct host_emulator *any = &cube->board[0].emulator;
+    memset(cube, 0, sizeof *cube);
+    cube->errors = -1;
+    for (unsigned i = 0; i < HOST_EMULATED_MAX; i++) {
+        struct board *b = &cube->board[i];
+        b->monitor[0] = b->monitor[1] = b->said = b->flash = -1;
+    }
+    for (unsigned i = 0; i < options->nodes && error->code == 0; i++) {
+        if ((options->left_out >> i & 1) == 0) {
+            any = &cube->board[i].emulator;
+            (void)make_board(cube, bare, i, options, error);
+        }
+    }
+    cube->troubled.trouble = options->trouble;
+    cube->troubled.nodes = options->nodes;
+    link.pair = bare->pair;
+    mine.link = &link;
+    mine.program = any->program;
+    mine.become = become;
+    mine.context = cube;
+    mine.serial_baud = bare->serial_baud;
+    cube->errors = memfd_create("errors", MFD_CLOEXEC);
+    if (cube->errors < 0 || fcntl(cube->errors, F_SETFL, O_APPEND) != 0) {
+        (void)refuse("errors", error);
+    }
+    if (error->code != 0 ||
+        host_cluster_start(&cube->cluster, &mine, error) != 0) {
+        close_boards(cube);
+        return error->code;
+    }
+    cube->machine = host_cluster_machine(&cube->cluster);
+    started->machine = machine_of(cube);
+    started->limited = true;
+    started->memory_held = ", held by the board";
+    (void)tcp_buffers(cube->cluster.port.tcp.fd, &started->send_bytes,
+                      &started->receive_bytes);
+    return 0;
+}
+
+/* --- the boards ----------------------------------------------------------- */
+
+static const struct host_bare an500 = {.machine = "mps2-an500",
+                                       .program = "qemu-system-arm",
+                                       .package = "qemu-system-arm",
+                                       .image = "mps2-an500.img",
+                                       .uarts = 5,
+                                       .flash = true,
+                                       .serial_baud = 115200,
+                                       .pair = unix_file_pair};
+
+const struct host_board host_board_mps2_an500 = {
+    .name = "mps2-an500",
+    .help = "emulated: Cortex-M7 with double precision, up to 16 nodes",
+    .bare = &an500,
+    .start = host_emulated_start,
+};
+
+static const struct host_bare an385 = {.machine = "mps2-an385",
+                                       .program = "qemu-system-arm",
+                                       .package = "qemu-system-arm",
+                                       .image = "mps2-an385.img",
+                                       .uarts = 5,
+                                       .flash = true,
+                                       .serial_baud = 115200,
+                                       .pair = unix_file_pair};
+
+const struct host_board host_board_mps2_an385 = {
+    .name = "mps2-an385",
+    .help = "emulated: Cortex-M3, up to 16 nodes",
+    .bare = &an385,
+    .start = host_emulated_start,
+};
+
+/* The emulator waits for room in a wire of these UARTs, and with it the node:
+ * so a wire has to hold what neighbours send each other at a time. */
+static const struct host_bare raspi = {.machine = "raspi3b",
+                                       .program = "qemu-system-aarch64",
+                                       .package = "qemu-system-arm",
+                                       .image = "raspi3b.img",
+                                       .uarts = 2,
+                                       .serial_baud = 115200,
+                                       .pair = tcp_pair};
+
+const struct host_board host_board_raspi3b = {
+    .name = "raspi3b",
+    .help = "emulated: Raspberry Pi 3 without an operating system, 2 nodes",
+    .bare = &raspi,
+    .start = host_emulated_start,
+};

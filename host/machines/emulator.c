@@ -1,0 +1,227 @@
+#include "emulator.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <sched.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { ARGUMENTS_MAX = 64, ARGUMENT_BYTES = 2 * PATH_MAX + 128 };
+
+extern char **environ;
+
+/* --- what it needs -------------------------------------------------------- */
+
+static int find_program(const struct host_bare *bare, char path[PATH_MAX],
+                        struct host_error *error)
+{
+    const char *folders = getenv("PATH");
+    folders = folders == NULL ? "/usr/bin:/bin" : folders;
+    while (*folders != '\0') {
+        int length = (int)strcspn(folders, ":");
+        int size =
+            snprintf(path, PATH_MAX, "%.*s/%s", length, folders, bare->program);
+        if (length > 0 && size < PATH_MAX && access(path, X_OK) == 0) {
+            return 0;
+        }
+        folders += length + (folders[length] == ':');
+    }
+    return host_fail(error, HOST_CUBE,
+                     "%s: not found in PATH, and it emulates the board %s; "
+                     "install it with: apt-get install %s",
+                     bare->program, bare->machine, bare->package);
+}
+
+/* Where `make firmware` and `make install` put it. */
+static int find_image(const struct host_bare *bare, char path[PATH_MAX],
+                      struct host_error *error)
+{
+    static const char *const folders[] = {"firmware", "../lib/incode"};
+    char here[PATH_MAX - 64];
+    ssize_t length = readlink("/proc/self/exe", here, sizeof here - 1);
+    here[length > 0 ? length : 0] = '\0';
+    char *slash = strrchr(here, '/');
+    if (slash == NULL) {
+        return host_fail(error, HOST_BROKEN,
+                         "/proc/self/exe: cannot be read; is /proc mounted?");
+    }
+    *slash = '\0';
+    for (size_t i = 0; i < sizeof folders / sizeof folders[0]; i++) {
+        snprintf(path, PATH_MAX, "%s/%s/%s", here, folders[i], bare->image);
+        if (access(path, R_OK) == 0) {
+            return 0;
+        }
+    }
+    return host_fail(error, HOST_CUBE,
+                     "%s/firmware/%s: %s; make the board's firmware with: make "
+                     "firmware",
+                     here, bare->image, strerror(errno));
+}
+
+int host_emulator_find(const struct host_bare *bare,
+                       struct host_emulator *emulator, struct host_error *error)
+{
+    memset(emulator, 0, sizeof *emulator);
+    emulator->bare = bare;
+    emulator->flash.fd = emulator->qmp.fd = emulator->errors = -1;
+    for (unsigned i = 0; i < HOST_UARTS_MAX; i++) {
+        emulator->uart[i].wire.fd = emulator->uart[i].log.fd = -1;
+    }
+    return find_program(bare, emulator->program, error) != 0
+               ? error->code
+               : find_image(bare, emulator->image, error);
+}
+
+int host_emulator_erase(int fd)
+{
+    static uint8_t erased[1 << 16];
+    memset(erased, 0xff, sizeof erased);
+    for (size_t at = 0; at < HOST_FLASH_BYTES; at += sizeof erased) {
+        if (pwrite(fd, erased, sizeof erased, (off_t)at) !=
+            (ssize_t)sizeof erased) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+/* --- its start ------------------------------------------------------------ */
+
+/* The command's words, in the child. */
+struct words {
+    char *argv[ARGUMENTS_MAX + 1];
+    char text[ARGUMENTS_MAX][ARGUMENT_BYTES];
+    unsigned count;
+};
+
+static __attribute__((format(printf, 2, 3))) void add(struct words *w,
+                                                      const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    if (w->count < ARGUMENTS_MAX) {
+        w->argv[w->count] = w->text[w->count];
+        vsnprintf(w->text[w->count++], ARGUMENT_BYTES, format, list);
+    }
+    va_end(list);
+}
+
+static bool is_given(struct host_place place)
+{
+    return place.fd >= 0 || place.path != NULL;
+}
+
+/* Behind the last word: a name of a file in a list of settings, where a comma
+ * is written twice. */
+static void add_file(struct words *w, const char *name, struct host_place place)
+{
+    char *text = w->text[w->count - 1];
+    size_t used = strlen(text);
+    used += (size_t)snprintf(text + used, ARGUMENT_BYTES - used, ",%s=", name);
+    if (place.fd >= 0) {
+        (void)fcntl(place.fd, F_SETFD, 0);
+        snprintf(text + used, ARGUMENT_BYTES - used, "/proc/self/fd/%d",
+                 place.fd);
+        return;
+    }
+    for (const char *at = place.path; *at != '\0'; at++) {
+        if (used + 3 > ARGUMENT_BYTES) {
+            break;
+        }
+        text[used++] = *at;
+        if (*at == ',') {
+            text[used++] = ',';
+        }
+    }
+    text[used] = '\0';
+}
+
+/* A device of characters: NAME, by which others name it. */
+static void add_device(struct words *w, const char *name, unsigned number,
+                       struct host_place wire, struct host_place log)
+{
+    add(w, "-chardev");
+    if (wire.fd >= 0) {
+        (void)fcntl(wire.fd, F_SETFD, 0);
+        add(w, "socket,id=%s%u,fd=%d", name, number, wire.fd);
+    } else if (wire.path != NULL) {
+        add(w, "socket,id=%s%u,server=on,wait=off", name, number);
+        add_file(w, "path", wire);
+    } else {
+        add(w, "null,id=%s%u", name, number);
+    }
+    if (is_given(log)) {
+        char *text = w->text[w->count - 1];
+        add_file(w, "logfile", log);
+        strncat(text, ",logappend=on", ARGUMENT_BYTES - strlen(text) - 1);
+    }
+}
+
+static void add_flash(struct words *w, struct host_place flash)
+{
+    if (is_given(flash)) {
+        strcat(w->text[w->count - 1], ",memory-backend=ram");
+        add(w, "-object");
+        add(w, "memory-backend-file,id=ram,share=on,size=%d", HOST_FLASH_BYTES);
+        add_file(w, "mem-path", flash);
+    }
+}
+
+/* The one of the processors that are allowed, in turn. */
+static void stay_on_one(unsigned turn)
+{
+    cpu_set_t allowed, one;
+    CPU_ZERO(&one);
+    if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) {
+        return;
+    }
+    turn %= (unsigned)CPU_COUNT(&allowed);
+    for (size_t i = 0; i < CPU_SETSIZE; i++) {
+        if (CPU_ISSET(i, &allowed) && turn-- == 0) {
+            CPU_SET(i, &one);
+            (void)sched_setaffinity(0, sizeof one, &one);
+            return;
+        }
+    }
+}
+
+void host_emulator_become(const struct host_emulator *emulator, unsigned turn)
+{
+    static struct words words;
+    static const struct host_place none = {-1, NULL};
+    const struct host_emulator *e = emulator;
+    struct words *w = &words;
+    (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
+    (void)setpgid(0, 0); /* an interrupt from the terminal is the host's */
+    if (e->errors >= 0) {
+        (void)dup2(e->errors, STDERR_FILENO);
+    }
+    add(w, "%s", e->bare->program);
+    add(w, "-M");
+    add(w, "%s", e->bare->machine);
+    add_flash(w, e->flash);
+    add(w, "-kernel");
+    add(w, "%s", e->image);
+    add(w, "-display");
+    add(w, "none");
+    add(w, "-nic");
+    add(w, "none");
+    for (unsigned i = 0; i < e->bare->uarts; i++) {
+        add_device(w, "uart", i, e->uart[i].wire, e->uart[i].log);
+        add(w, "-serial");
+        add(w, "chardev:uart%u", i);
+    }
+    if (is_given(e->qmp)) {
+        add_device(w, "monitor", 0, e->qmp, none);
+        add(w, "-mon");
+        add(w, "chardev=monitor0,mode=control");
+    } else {
+        add(w, "-monitor");
+        add(w, "none");
+    }
+    stay_on_one(turn);
+    execve(e->program, w->argv, environ);
+}

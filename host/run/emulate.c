@@ -1,0 +1,397 @@
+#include "emulate.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "host/base/options.h"
+#include "host/base/parse.h"
+#include "host/base/progress.h"
+#include "host/files/output.h"
+#include "host/machines/board_emulated.h"
+#include "transport/drivers/tcp_address.h"
+
+enum { KEY_BOARD = 256, KEY_NODES, KEY_LINUX, KEY_OPEN, LOOK_US = 20000 };
+
+static const struct argp_option options_of_emulate[] = {
+    {"board", KEY_BOARD, "NAME", 0, "mps2-an500, mps2-an385 or raspi3b", 0},
+    {"nodes", KEY_NODES, "N", 0, "Nodes of the cube", 0},
+    {"linux", KEY_LINUX, "N,N", 0,
+     "These nodes are no boards, but processes that each run on the cube "
+     "starts "
+     "for itself",
+     0},
+    {"open", KEY_OPEN, NULL, 0,
+     "Joins no boards: between node 1 and node 3 each listens at its end, "
+     "FILE.d/1-3.socket and FILE.d/3-1.socket, for what is put between them",
+     0},
+    {"output", 'o', "FILE", 0,
+     "The cube file to write. Sockets, consoles and flash chips are in FILE.d",
+     0},
+    {0}};
+
+struct emulate {
+    const struct host_board *board;
+    unsigned nodes;
+    uint64_t linux_nodes; /* a bit for each */
+    const char *list;     /* of them, as given; NULL: there are none */
+    bool open;            /* boards are not joined */
+    const char *file;
+    char directory[PATH_MAX];
+    int locked; /* the directory, open */
+    struct host_error *error;
+};
+
+/* --- the arguments ---------------------------------------------------------
+ */
+
+static void parse_board(struct emulate *e, const char *value)
+{
+    char allowed[120] = "";
+    e->board = NULL;
+    for (unsigned i = 0; host_board_name(i) != NULL; i++) {
+        const struct host_board *board = host_board_row(i);
+        if (board->bare == NULL) {
+            continue;
+        }
+        size_t used = strlen(allowed);
+        snprintf(allowed + used, sizeof allowed - used, "%s%s",
+                 used == 0 ? "" : ", ", board->name);
+        if (strcmp(value, board->name) == 0) {
+            e->board = board;
+            return;
+        }
+    }
+    host_fail(e->error, HOST_USAGE,
+              "--board %s: no board that is emulated; allowed: %s", value,
+              allowed);
+}
+
+/* "2,3" */
+static void parse_linux(struct emulate *e, const char *value)
+{
+    const char *at = value;
+    char *end = NULL;
+    e->list = value;
+    e->linux_nodes = 0;
+    do {
+        unsigned long node = strtoul(at, &end, 10);
+        bool good = *at >= '0' && *at <= '9' && node < HOST_EMULATED_MAX &&
+                    (*end == ',' || *end == '\0');
+        if (!good) {
+            host_fail(e->error, HOST_USAGE,
+                      "--linux %s: no list of nodes; give their numbers, as in "
+                      "2,3",
+                      value);
+            return;
+        }
+        e->linux_nodes |= UINT64_C(1) << node;
+        at = end + 1;
+    } while (*end == ',');
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct emulate *e = state->input;
+    switch (key) {
+    case KEY_BOARD:
+        parse_board(e, value);
+        return 0;
+    case KEY_NODES:
+        (void)host_parse_nodes(value, HOST_EMULATED_MAX, "", &e->nodes,
+                               e->error);
+        return 0;
+    case KEY_LINUX:
+        parse_linux(e, value);
+        return 0;
+    case KEY_OPEN:
+        e->open = true;
+        return 0;
+    case 'o':
+        e->file = value;
+        return 0;
+    case ARGP_KEY_ARG:
+        host_fail(e->error, HOST_USAGE,
+                  "%s: one argument too many; give --board, --nodes and -o",
+                  value);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int check(const struct emulate *e)
+{
+    uint64_t all = (UINT64_C(1) << e->nodes) - 1;
+    if (e->board == NULL || e->nodes == 0 || e->file == NULL ||
+        *e->file == '\0' || strcmp(e->file, "-") == 0) {
+        return host_fail(e->error, HOST_USAGE,
+                         "emulate: --board, --nodes or -o FILE is missing; "
+                         "give all three");
+    }
+    unsigned most = host_bare_nodes_max(e->board->bare);
+    if (e->nodes > most) {
+        return host_fail(e->error, HOST_USAGE,
+                         "--nodes %u: %s has UARTs for a cube of %u; give %u "
+                         "or fewer",
+                         e->nodes, e->board->name, most, most);
+    }
+    if ((e->linux_nodes & ~all) != 0 || e->linux_nodes == all) {
+        return host_fail(e->error, HOST_USAGE,
+                         "--linux %s: not some of nodes 0 to %u; leave a board "
+                         "to emulate",
+                         e->list, e->nodes - 1);
+    }
+    return 0;
+}
+
+/* --- what it leaves --------------------------------------------------------
+ */
+
+/* The directory beside the file, for one program at a time. */
+static int take_directory(struct emulate *e)
+{
+    struct tcp_address longest;
+    char path[PATH_MAX + 32];
+    int size = snprintf(e->directory, sizeof e->directory, "%s.d", e->file);
+    snprintf(path, sizeof path, "%s/console15.socket", e->directory);
+    if (size >= (int)sizeof e->directory ||
+        tcp_address_set_path(&longest, path) != 0) {
+        return host_fail(e->error, HOST_USAGE,
+                         "-o %s: too long a path for the sockets beside it; "
+                         "give a shorter one, or go to its folder",
+                         e->file);
+    }
+    if (mkdir(e->directory, 0700) != 0 && errno != EEXIST) {
+        return host_fail(e->error, HOST_INPUT, "%s: %s; give another -o",
+                         e->directory, strerror(errno));
+    }
+    e->locked = open(e->directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (e->locked < 0 || flock(e->locked, LOCK_EX | LOCK_NB) != 0) {
+        return host_fail(
+            e->error, HOST_INPUT,
+            "%s: %s; end what uses it, or give another -o", e->directory,
+            errno == EWOULDBLOCK ? "another incode emulate has its boards there"
+                                 : strerror(errno));
+    }
+    return 0;
+}
+
+#define FIRST_LINE "# Boards that incode emulate runs"
+
+/* What a person has written is neither replaced nor, in the end, removed. */
+static int check_file(const struct emulate *e)
+{
+    char text[sizeof FIRST_LINE] = "";
+    FILE *file = fopen(e->file, "re");
+    if (file == NULL) {
+        return 0;
+    }
+    size_t size = fread(text, 1, sizeof text - 1, file);
+    (void)fclose(file);
+    return size == 0 || strcmp(text, FIRST_LINE) == 0
+               ? 0
+               : host_fail(e->error, HOST_INPUT,
+                           "%s: not a file that incode emulate has written; "
+                           "give another -o",
+                           e->file);
+}
+
+static bool is_linux(const struct emulate *e, unsigned node)
+{
+    return (e->linux_nodes >> node & 1) != 0;
+}
+
+/* A link that somebody else than two boards has an end of.  A board listens. */
+static void put_link(struct host_output *out, const char *folder, unsigned node,
+                     int to, const char *name)
+{
+    char line[PATH_MAX + 100], other[16] = "\"host\"";
+    if (to >= 0) {
+        snprintf(other, sizeof other, "%d", to);
+    }
+    snprintf(line, sizeof line,
+             "%s    { node = %u; to = %s; unix = \"%s/%s\"; }",
+             to < 0 ? "" : ",\n", node, other, folder, name);
+    host_output_text(out, line);
+}
+
+static void put_links(struct host_output *out, const struct emulate *e,
+                      const char *folder)
+{
+    char name[32];
+    host_output_text(out, "links = (\n");
+    put_link(out, folder, 0, -1, "host.socket");
+    for (unsigned i = 0; i < e->nodes; i++) {
+        for (unsigned d = 0; 1u << d < e->nodes; d++) {
+            unsigned other = i ^ 1u << d;
+            bool mine = is_linux(e, i) ? is_linux(e, other) && i < other
+                                       : is_linux(e, other);
+            if (mine) {
+                host_emulated_wire(i, 1 + d, name);
+                put_link(out, folder, i, (int)other, name);
+            }
+        }
+    }
+    host_output_text(out, "\n);\n");
+}
+
+/* Names in it are beside it. */
+static int write_file(const struct emulate *e)
+{
+    struct host_output out;
+    char text[400];
+    unsigned dimension = (unsigned)__builtin_ctz(e->nodes);
+    const char *slash = strrchr(e->directory, '/');
+    const char *folder = slash == NULL ? e->directory : slash + 1;
+    if (host_output_open(&out, e->file, e->error) != 0) {
+        return e->error->code;
+    }
+    snprintf(text, sizeof text,
+             FIRST_LINE ": it removes this file when it "
+                        "ends.\ndimension = %u;\nboard = \"%s\";\n",
+             dimension, e->board->name);
+    host_output_text(&out, text);
+    if (e->list != NULL) {
+        host_output_text(&out, "nodes = (");
+        for (unsigned i = 0, count = 0; i < e->nodes; i++) {
+            if (is_linux(e, i)) {
+                snprintf(text, sizeof text,
+                         "%s\n    { node = %u; board = \"linux\"; }",
+                         count++ == 0 ? "" : ",", i);
+                host_output_text(&out, text);
+            }
+        }
+        snprintf(text, sizeof text, "\n);\nstart = [%s];\n", e->list);
+        host_output_text(&out, text);
+    }
+    put_links(&out, e, folder);
+    (void)host_output_close(&out, 1, e->error);
+    return host_output_commit(e->error);
+}
+
+/* --- its run ---------------------------------------------------------------
+ */
+
+static volatile sig_atomic_t ended;
+
+static void end(int signal)
+{
+    (void)signal;
+    ended = 1;
+}
+
+/* A shell that runs no terminal has SIGINT ignored by what it puts behind it:
+ * that is how such boards end, all the same.  SIGHUP stays as nohup has it. */
+static void expect_end(void)
+{
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    const struct sigaction action = {.sa_handler = end};
+    struct sigaction before;
+    for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++) {
+        bool kept = signals[i] == SIGHUP &&
+                    sigaction(SIGHUP, NULL, &before) == 0 &&
+                    before.sa_handler == SIG_IGN;
+        if (!kept) {
+            (void)sigaction(signals[i], &action, NULL);
+        }
+    }
+}
+
+static int start(const struct emulate *e, struct host_started *started)
+{
+    struct host_cluster_options options = {.nodes = e->nodes,
+                                           .memory = HOST_BOARD_MEMORY,
+                                           .link = host_link_named("uart"),
+                                           .left_out = e->linux_nodes,
+                                           .directory = e->directory,
+                                           .open = e->open};
+    return e->board->start(e->board, &options, started, e->error);
+}
+
+/* Sockets lead nowhere any more; a folder that nothing was put to is not kept.
+ */
+static void remove_leftovers(const struct emulate *e)
+{
+    char path[PATH_MAX + 64], name[32];
+    for (unsigned i = 0; i < e->nodes; i++) {
+        for (unsigned u = 0; u < HOST_UARTS_MAX; u++) {
+            host_emulated_wire(i, u, name);
+            snprintf(path, sizeof path, "%s/%s", e->directory, name);
+            (void)unlink(path);
+        }
+        snprintf(path, sizeof path, "%s/qmp%u.socket", e->directory, i);
+        (void)unlink(path);
+    }
+    (void)rmdir(e->directory);
+}
+
+/* Until a signal, or a board that cannot be kept running. */
+static int keep(const struct emulate *e, struct host_machine *machine)
+{
+    const struct timespec look = {.tv_nsec = 1000L * LOOK_US};
+    unsigned restarts = 0;
+    int status = 0;
+    while (status == 0 && !ended) {
+        (void)nanosleep(&look, NULL);
+        status = machine->check(machine->context, e->error);
+        if (machine->restarts(machine->context) != restarts) {
+            restarts = machine->restarts(machine->context);
+            host_note("emulate: a board's process ended, and is started again");
+        }
+    }
+    return status;
+}
+
+int host_emulate(int argc, char **argv, struct host_error *error)
+{
+    static const struct argp argp = {
+        options_of_emulate,
+        parse,
+        "",
+        "Starts emulated boards without an operating system, wired as a cube, "
+        "and writes the cube file that leads to them. They stay until this is "
+        "interrupted, which removes the file.\v"
+        "The boards' flash chips stay in FILE.d: who starts them again on the "
+        "same FILE has turned them all off and on.\n\n"
+        "Example:\n"
+        "  incode emulate --board mps2-an500 --nodes 4 -o lab.cube &\n"
+        "  incode run points.xyz --cube lab.cube",
+        NULL,
+        NULL,
+        NULL};
+    static struct emulate e = {.locked = -1};
+    struct host_started started = {0};
+    e.error = error;
+    if (host_options_parse(&argp, argc, argv, 0, &e, error) != 0 ||
+        check(&e) != 0 || check_file(&e) != 0 || take_directory(&e) != 0) {
+        return error->code;
+    }
+    expect_end();
+    if (start(&e, &started) != 0) {
+        remove_leftovers(&e);
+        return error->code;
+    }
+    struct host_machine *machine = &started.machine;
+    int status = write_file(&e);
+    expect_end();
+    if (status == 0) {
+        printf("%u nodes of %s: incode run POINTS --cube %s\n", e.nodes,
+               e.board->name, e.file);
+        (void)fflush(stdout);
+        status = keep(&e, machine);
+        (void)unlink(e.file);
+    }
+    machine->stop(machine->context);
+    remove_leftovers(&e);
+    return status;
+}

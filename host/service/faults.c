@@ -1,0 +1,92 @@
+#include "faults.h"
+
+#include <string.h>
+
+void host_faults_begin(struct host_service *service)
+{
+    service->fault.told = false;
+    for (unsigned i = 0; i < service->machine->nodes; i++) {
+        service->node[i].vouches = HOST_VOUCHES;
+    }
+}
+
+/* What to do about a fault that a node reports, by a word of its text; NULL: a
+ * loss may explain it. */
+static const char *advice(const char *text)
+{
+    static const char *const known[][2] = {
+        {"memory", "give the nodes more memory"},
+        {"protocol version", "run the same version of the program everywhere"},
+        {"role", "run the same version of the program everywhere"}};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        if (strstr(text, known[i][0]) != NULL) {
+            return known[i][1];
+        }
+    }
+    return NULL;
+}
+
+static int fail(const struct host_service *s, struct host_error *error)
+{
+    const char *next = advice(s->fault.text);
+    return host_fail(
+        error, HOST_CUBE, "node %u: %s; %s", s->fault.node, s->fault.text,
+        next == NULL ? "please report this with the points" : next);
+}
+
+int host_faults_take(struct host_service *service,
+                     const struct cube_message *message,
+                     struct host_error *error)
+{
+    struct host_service *s = service;
+    size_t size = message->size < NODE_FAULT_TEXT_MAX ? message->size
+                                                      : NODE_FAULT_TEXT_MAX;
+    if (s->fault.told) {
+        return 0; /* the first is enough */
+    }
+    memcpy(s->fault.text, message->data, size);
+    s->fault.text[size] = '\0';
+    s->fault.node = message->source;
+    if (!s->started || advice(s->fault.text) != NULL) {
+        return fail(s, error);
+    }
+    s->fault.told = true;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (!s->work.lost[i]) {
+            s->node[i].vouches = HOST_DOUBTED;
+            s->node[i].ping_due = true;
+        }
+    }
+    return 0;
+}
+
+void host_faults_pinged(struct host_service *service, unsigned node,
+                        uint32_t count)
+{
+    struct host_node *n = &service->node[node];
+    if (n->vouches == HOST_DOUBTED) {
+        n->vouches = HOST_ASKED;
+        n->asked = count;
+    }
+}
+
+/* Who has left has no part in it. */
+static bool all_vouch(const struct host_service *s)
+{
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (s->node[i].vouches != HOST_VOUCHES && !s->node[i].left) {
+            return false;
+        }
+    }
+    return true;
+}
+
+int host_faults_answered(struct host_service *service, unsigned node,
+                         uint32_t count, struct host_error *error)
+{
+    struct host_node *n = &service->node[node];
+    if (n->vouches == HOST_ASKED && (int32_t)(count - n->asked) >= 0) {
+        n->vouches = HOST_VOUCHES;
+    }
+    return service->fault.told && all_vouch(service) ? fail(service, error) : 0;
+}

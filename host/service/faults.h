@@ -1,0 +1,38 @@
+/* What nodes report as faults, and whether to believe them.  Part of service.h.
+ *
+ * Where a node between two others starts again, what was on its way is lost,
+ * and what comes after the gap looks false to the one behind it.  So a fault
+ * counts only once every living node has answered a ping that was sent after
+ * the fault had come, and none has told of a loss: a loss begins a new
+ * generation, in which all begin anew.  What no loss explains counts at once.
+ *
+ * Memory: none of its own.  Work: one pass over the nodes a fault.
+ *
+ *     if (message.type == NODE_FAULT)
+ *         status = host_faults_take(&service, &message, &error);
+ *     host_faults_pinged(&service, 3, ping.sent);
+ *     status = host_faults_answered(&service, 3, pong.pinged, &error);
+ */
+#ifndef HOST_FAULTS_H
+#define HOST_FAULTS_H
+
+#include "service.h"
+
+/* A generation begins: what was said before counts no more. */
+void host_faults_begin(struct host_service *service);
+
+/* NODE_FAULT: HOST_CUBE, if it counts at once; else 0. */
+int host_faults_take(struct host_service *service,
+                     const struct cube_message *message,
+                     struct host_error *error);
+
+/* A ping has gone to a node: what it told as the count of messages sent. */
+void host_faults_pinged(struct host_service *service, unsigned node,
+                        uint32_t count);
+
+/* A node has answered the ping of that count, and has missed nothing:
+ * HOST_CUBE, if a fault counts now; else 0. */
+int host_faults_answered(struct host_service *service, unsigned node,
+                         uint32_t count, struct host_error *error);
+
+#endif
