@@ -56,7 +56,8 @@ node_drivers := $(filter-out $(host_drivers),$(drivers))
 # A folder a board.  Its program is incode-node-NAME, that of linux incode-node;
 # mpi's is no static one.
 board        := $(wildcard boards/*.c)
-boards       := $(filter-out mpi,$(patsubst boards/%/,%,$(wildcard boards/*/)))
+boards       := $(filter-out mpi,$(patsubst boards/%/main.c,%,$(wildcard \
+	boards/*/main.c)))
 # Host and node as ranks of Open MPI: no other program is linked with it.
 host_mpi     := host/main_mpi.c $(wildcard host/*/mpi/*.c)
 host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
@@ -80,7 +81,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all ncube unit points planted bare fuzzers run check test test-full \
+.PHONY: all ncube unit points planted bare arithmetic fuzzers run check test test-full \
 	bench firmware fuzz lint install uninstall clean help deps deps-run deps-test \
 	deps-bench deps-full FORCE
 
@@ -117,8 +118,8 @@ $(BUILD)/%.a: $(BUILD)/lists
 # An archive keeps nothing of a file that is gone.
 $(BUILD)/lists: FORCE
 	@mkdir -p $(@D)
-	@echo '$(core_objects) $(host_objects) $(ncube)' | cmp -s - $@ || \
-		echo '$(core_objects) $(host_objects) $(ncube)' > $@
+	@echo '$(core_objects) $(host_objects) $(ncube) $(bare_shared)' | cmp -s - $@ || \
+		echo '$(core_objects) $(host_objects) $(ncube) $(bare_shared)' > $@
 
 # Objects depend on the flags that they were compiled with.
 $(BUILD)/flags: FORCE
@@ -170,6 +171,18 @@ $(BUILD)/include/sodium.h:
 	@ln -sfn /usr/include/sodium $(@D)/sodium
 	@ln -sfn /usr/include/sodium.h $@
 
+# What bare boards share, for tests on this machine; its own memory functions
+# and root under other names.
+bare_shared := $(filter-out %/program.c %/memory.c %/sqrt.c,$(wildcard \
+	boards/bare/*.c))
+own_libc    := $(obj)/boards/bare/memory.o $(obj)/boards/bare/sqrt.o
+$(BUILD)/libbare.a: $(bare_shared:%.c=$(obj)/%.o)
+$(addprefix $(BUILD)/tests/,$(patsubst %.c,%,$(notdir $(wildcard \
+	tests/unit/boards/*.c)))): $(BUILD)/libbare.a
+$(BUILD)/tests/test_own_libc: $(own_libc)
+$(own_libc): private HOSTED += -fno-builtin -fno-tree-loop-distribute-patterns \
+	$(foreach f,memcpy memmove memset memcmp sqrt,-D$(f)=own_$(f))
+
 # A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
 $(BUILD)/tests/test_ncube: $(BUILD)/libncube.a
@@ -177,8 +190,8 @@ $(foreach t,$(unit),$(eval $(BUILD)/tests/$(notdir $(t:.c=)): $(obj)/$(t:.c=.o))
 $(filter-out %/test_mpi,$(unit_tests)): $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@
-	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(HOST_LIBS) -lcmocka \
-		-lgmp -o $@
+	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) \
+		-Wl,--end-group $(HOST_LIBS) -lcmocka -lgmp -o $@
 
 fuzzers: $(fuzzers)
 $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
@@ -217,6 +230,8 @@ $(planted_programs): $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 tools := $(patsubst tests/system/%.c,$(BUILD)/tests/%,$(wildcard \
 	tests/system/*.c))
 points: $(tools)
+relay := $(patsubst %.c,$(obj)/%.o,$(wildcard tests/system/relay/*.c))
+$(BUILD)/tests/relay $(BUILD)/tests/test_relay: $(relay)
 $(tools): $(BUILD)/tests/%: $(obj)/tests/system/%.o
 	@mkdir -p $(@D)
 	$(say) LINK $@
@@ -244,22 +259,101 @@ $(peers): $(BUILD)/peers/%: tests/bench/%.cpp tests/bench/peer.hpp
 	$(say) CXX $<
 	$(Q)$(CXX) -std=c++17 -O3 -march=$(ARCH) $(peer) -o $@
 
-# The freestanding rooms for bare processors, as archives.
-bare      = -std=c11 -I. $(WARNINGS) -Werror -Os -ffreestanding -ffp-contract=off \
-	-fno-math-errno -ffunction-sections -fdata-sections
-cortex_m3 = -mcpu=cortex-m3 -mthumb -mfloat-abi=soft
-cortex_m7 = -mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16
-bare_m3  := $(freestanding:%.c=$(BUILD)/cortex-m3/%.o)
-bare_m7  := $(freestanding:%.c=$(BUILD)/cortex-m7/%.o)
-bare: $(bare_m3) $(bare_m7)
-$(BUILD)/cortex-m3/%.o: %.c
+# What counts an emulated board's instructions for `incode bench boards`.
+$(BUILD)/peers/instructions.so: tests/bench/instructions.c
 	@mkdir -p $(@D)
-	$(say) CC $<
-	$(Q)arm-none-eabi-gcc $(cortex_m3) $(bare) -MMD -MP -c $< -o $@
-$(BUILD)/cortex-m7/%.o: %.c
+	$(say) CC $@
+	$(Q)$(CC) $(HOSTED) -shared -fPIC $< -o $@
+
+# Bare boards: those folders that have a board.mk, which gives the compiler's
+# prefix, the processor's flags (machine) and the sources beside the board's own
+# and those of boards/bare.  An image is a main's objects and all of these; what
+# it does not need, the linker leaves out.
+bare_boards := $(patsubst boards/%/board.mk,%,$(wildcard boards/*/board.mk))
+bare_rest   := boards/bare/sqrt.c boards/bare/program.c
+# With -ffreestanding alone each memcpy of a few bytes is a call.  What serves
+# interrupts is to be short.
+BARE_OPT    ?= -O3
+BARE = -std=c11 -I. $(WARNINGS) -Werror $(BARE_OPT) -g -ffreestanding -fbuiltin \
+	$(FLOATING) -ffunction-sections -fdata-sections -fstack-usage \
+	-fcallgraph-info=su
+images := $(bare_boards:%=$(BUILD)/firmware/%.img)
+# Tests on a board: other mains with its start-up code.  That of
+# tests/boards/NAME.c is firmware/tests/BOARD-NAME.img; bare_with_NAME: sources
+# that it needs beside.
+bare_mains := $(patsubst tests/boards/%.c,%,$(wildcard tests/boards/*.c))
+trials := $(foreach b,$(bare_boards),$(bare_mains:%=$(BUILD)/firmware/tests/$(b)-%.img))
+bare: $(images) $(trials)
+
+# The cases of arithmetic, on boards and here.
+arithmetic := $(filter-out %/native.c,$(wildcard tests/arithmetic/*.c))
+bare_with_arithmetic := $(arithmetic)
+
+# bare_board BOARD: bare_BOARD is its objects without a main.
+define bare_board
+include boards/$(1)/board.mk
+bare_cc_$(1) := $$(prefix)gcc $$(machine)
+bare_copy_$(1) := $$(prefix)objcopy
+bare_$(1) := $$(patsubst %,$(BUILD)/firmware/$(1)/%.o,$$(basename \
+	$$(freestanding) $$(filter-out $$(bare_rest),$$(wildcard \
+	boards/bare/*.c)) $$(wildcard boards/$(1)/*.[cS]) $$(sources)))
+$(BUILD)/firmware/$(1)/%.o: %.c $(BUILD)/firmware/flags
+	@mkdir -p $$(@D)
+	$$(say) CC $$@
+	$$(Q)$$(bare_cc_$(1)) $$(BARE) -MMD -MP -c $$< -o $$@
+$(BUILD)/firmware/$(1)/%.o: %.S $(BUILD)/firmware/flags
+	@mkdir -p $$(@D)
+	$$(say) AS $$@
+	$$(Q)$$(bare_cc_$(1)) -I. -g -MMD -MP -c $$< -o $$@
+$(BUILD)/firmware/$(1)/boards/%.o: private BARE_OPT = -O2
+$(BUILD)/firmware/$(1)/boards/bare/memory.o: private BARE += \
+	-fno-tree-loop-distribute-patterns
+$(BUILD)/firmware/$(1).elf: \
+	$(BUILD)/firmware/$(1)/boards/bare/program.o
+$(BUILD)/firmware/$(1).elf: $$(bare_$(1)) \
+		boards/$(1)/board.ld boards/bare/start.ld
+	$$(say) LINK $$@
+	$$(Q)$$(call bare_link,$(1))
+$(BUILD)/firmware/$(1).img: $(BUILD)/firmware/$(1).elf
+	$$(Q)$$(bare_copy_$(1)) -O binary $$< $$@
+endef
+
+# bare_main BOARD NAME
+define bare_main
+$(BUILD)/firmware/tests/$(1)-$(2).elf: $$(patsubst \
+		%.c,$(BUILD)/firmware/$(1)/%.o,tests/boards/$(2).c $$(bare_with_$(2))) \
+		$$(bare_$(1)) boards/$(1)/board.ld boards/bare/start.ld
+	@mkdir -p $$(@D)
+	$$(say) LINK $$@
+	$$(Q)$$(call bare_link,$(1))
+$(BUILD)/firmware/tests/$(1)-$(2).img: $(BUILD)/firmware/tests/$(1)-$(2).elf
+	$$(Q)$$(bare_copy_$(1)) -O binary $$< $$@
+endef
+bare_link = $(bare_cc_$(1)) -nostdlib -nostartfiles -Wl,--gc-sections \
+	-Wl,--build-id=none \
+	-Wl,--fatal-warnings -Wl,-Map=$(@:.elf=.map) -T boards/$(1)/board.ld -L boards/bare \
+	$(filter %.o,$^) -lgcc -o $@
+$(foreach b,$(bare_boards),$(eval $(call bare_board,$(b))))
+$(foreach b,$(bare_boards),$(foreach m,$(bare_mains), \
+	$(eval $(call bare_main,$(b),$(m)))))
+$(BUILD)/firmware/flags: FORCE
 	@mkdir -p $(@D)
-	$(say) CC $<
-	$(Q)arm-none-eabi-gcc $(cortex_m7) $(bare) -MMD -MP -c $< -o $@
+	@echo '$(BARE)' | cmp -s - $@ || echo '$(BARE)' > $@
+
+# The cases of arithmetic here, and where it is known to be wrong.
+$(BUILD)/tests/arithmetic: $(arithmetic:%.c=$(obj)/%.o) \
+		$(obj)/tests/arithmetic/native.o $(BUILD)/libcore.a
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
+$(BUILD)/tests/arithmetic-%: $(arithmetic) tests/arithmetic/native.c \
+		$(wildcard tests/arithmetic/*.h incode/predicates/*)
+	@mkdir -p $(@D)
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $(planted) $(filter %.c,$^) -lm -o $@
+$(BUILD)/tests/arithmetic-fused: planted = -ffp-contract=fast
+$(BUILD)/tests/arithmetic-extended: planted = -mfpmath=387
+arithmetic: $(BUILD)/tests/arithmetic $(BUILD)/tests/arithmetic-fused \
+	$(BUILD)/tests/arithmetic-extended
 
 # --- what users call -------------------------------------------------------
 
@@ -294,7 +388,7 @@ bench: deps-bench
 	@$(MAKE) --no-print-directory all
 	@$(BUILD)/incode bench peers $(SETS)
 
-# The rooms that bare boards will share, compiled for their processors.
+# The images of bare boards, what of a node's memory they take, and their checks.
 firmware: deps-test
 	@$(MAKE) --no-print-directory bare
 	@BUILD='$(BUILD)' bash tests/firmware
@@ -311,6 +405,9 @@ lint: deps-test
 bin        = $(DESTDIR)$(PREFIX)/bin
 man        = $(DESTDIR)$(PREFIX)/share/man/man1
 completion = $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+# Images of boards that make firmware has made.
+lib        = $(DESTDIR)$(PREFIX)/lib/incode
+made_images = $(wildcard $(images))
 man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
 pages     := $(man_pages) $(BUILD)/pages/incode.bash
 $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
@@ -323,9 +420,12 @@ install: all $(pages)
 	install $(programs) '$(bin)'
 	install -m 644 $(man_pages) '$(man)'
 	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode'
+	$(if $(made_images),install -d '$(lib)' && \
+		install -m 644 $(made_images) '$(lib)')
 	ln -sf incode '$(completion)/incode-node'
 
 uninstall:
+	rm -f $(patsubst %,'$(lib)/%.img',$(bare_boards))
 	rm -f $(patsubst %,'$(bin)/%',$(notdir $(programs))) \
 		$(patsubst %,'$(man)/%',$(notdir $(man_pages))) \
 		'$(completion)/incode' '$(completion)/incode-node'
@@ -346,15 +446,16 @@ help:
 	@echo '                         chroot (hours)'
 	@echo 'make bench [SETS=DIRS]   ratios against CGAL, TetGen and Qhull, and'
 	@echo '                         what they are held to (half an hour)'
-	@echo 'make firmware            compile the freestanding rooms for'
-	@echo '                         Cortex-M3 and M7, print their sizes'
+	@echo 'make firmware            build/firmware/BOARD.img for each bare board,'
+	@echo '                         its memory map and checks'
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
 	@echo 'make lint                the order of rooms, format, examples, sizes,'
 	@echo '                         warnings as errors, analysers'
 	@echo 'make ncube               build/libncube.a: the calls of the nCUBE, for'
 	@echo '                         porting programs that were written for them'
 	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, their man pages'
-	@echo '                         and completion to DIR/share'
+	@echo '                         and completion to DIR/share, firmware of boards to'
+	@echo '                         DIR/lib/incode, if it is made'
 	@echo 'make uninstall           remove them (with the same PREFIX)'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
@@ -366,11 +467,11 @@ run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev libpng-d
 	libopenmpi-dev openmpi-bin
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps \
-	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi
+	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi \
+	qemu-system-arm gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev
-full_packages  = $(test_packages) $(bench_packages) debootstrap cpio \
-	qemu-system-arm gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+full_packages  = $(test_packages) $(bench_packages) debootstrap cpio
 
 deps: deps-test
 deps-run:

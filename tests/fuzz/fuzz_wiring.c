@@ -57,10 +57,19 @@ static void learn(const uint8_t *data, size_t size)
     struct link_pipe pipe = {&from, NULL, receive};
     struct learner learner;
     struct learned learned;
-    learner_init(&learner, &pipe, 1);
+    bool ports = size % 2 == 0, known = true;
+    uint64_t now_us = 0;
     while (from.size > 0) {
-        if (learner_poll(&learner, &learned)) {
+        if (known && ports) {
+            learner_init_ports(&learner, &pipe, 0, true);
+        } else if (known) {
+            learner_init(&learner, &pipe, 1);
+        }
+        learner_ask(&learner, now_us += LEARN_ASK_US / 3);
+        known = learner_poll(&learner, &learned);
+        if (known) {
             demand(learned.self < 1u << learned.dimension);
+            demand(!ports || learned.dimension == 0);
         }
     }
 }

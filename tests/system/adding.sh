@@ -110,13 +110,14 @@ cat > "$tree/host/machines/board_toy.c" <<'END'
 /* Processes of a program of their own, incode-node-toy. */
 #include "boards.h"
 
-static int start(const struct host_cluster_options *options,
+static int start(const struct host_board *board,
+                 const struct host_cluster_options *options,
                  struct host_started *started, struct host_error *error)
 {
     static struct host_cluster cluster;
     static char program[4096];
     struct host_cluster_options mine = *options;
-    if (host_cluster_program(options->program, "incode-node-toy", program,
+    if (host_cluster_program(options->program, board->program, program,
                              sizeof program, error) != 0) {
         return error->code;
     }
@@ -155,7 +156,7 @@ int main(void)
 }
 END
 sed -i 's/ROW(plot3d)$/ROW(plot3d) ROW(toy) ROW(toypoints)/' "$tree/host/formats/formats.c"
-sed -i 's/ROW(linux)$/ROW(linux) ROW(toy)/' "$tree/host/machines/boards.c"
+sed -i 's/ROW(linux)/ROW(linux) ROW(toy)/' "$tree/host/machines/boards.c"
 
 # The flags of what is copied, whatever they were: only what has changed is
 # built, and without optimisation.

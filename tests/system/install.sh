@@ -18,6 +18,16 @@ check 'install/one version' "$(cat "$scratch/version" "$scratch/version.node")" 
     test "$(cat "$scratch/version.node")" = "incode-node $(cut -d ' ' -f 2 \
         < "$scratch/version")"
 
+# The firmware of boards, where the installed program finds it.
+if [ -e "$BUILD/firmware/mps2-an500.img" ] &&
+    command -v qemu-system-arm > "$scratch/where"; then
+    "$INCODE" gen uniform 100 -o "$scratch/100.npy"
+    succeeds 'install/firmware' "$root/opt/incode/bin/incode" run -q \
+        "$scratch/100.npy" --board mps2-an500 --nodes 2
+else
+    skip install/firmware 'no firmware is made here, or qemu-system-arm missing'
+fi
+
 # complete PROGRAM WORD...: what completes the last word.
 # shellcheck disable=SC1091
 . "$completion/incode"

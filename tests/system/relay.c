@@ -1,54 +1,26 @@
-/* A bad network for the system tests: relays TCP connections on loopback, and
- * changes, deletes and delays bytes and closes connections, by chance from a
- * seed.  At its end by SIGTERM it prints how often each was done.
+/* Bad wires for the system tests, by chance from a seed; at its end by SIGTERM
+ * it prints what it has done to them.
  *
  *     relay SEED BYTES_A_FAULT MS_A_CLOSE DELAY_MS FROM:TO...
  *
- * FROM, TO: ports; 0 for BYTES_A_FAULT or MS_A_CLOSE: never.
+ * relays TCP connections on loopback (relay/network.h).  FROM, TO: ports; 0 for
+ * BYTES_A_FAULT or MS_A_CLOSE: never.
+ *
+ *     relay uart [NAME=VALUE...] PATH,PATH...
+ *
+ * stands between UARTs that are sockets with paths (relay/uart.h).  NAME: seed,
+ * baud, fifo, flip, drop, burst; the last three: one in so many bytes.  @PATH:
+ * a socket that the relay makes; else one that it calls.
  */
-#include <arpa/inet.h>
 #include <errno.h>
-#include <fcntl.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
-#include <poll.h>
 #include <signal.h>
-#include <stdbool.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <time.h>
-#include <unistd.h>
 
-enum { WIRES_MAX = 64, PAIRS_MAX = 128, CHUNKS = 64, CHUNK_BYTES = 2048 };
-
-struct chunk {
-    uint64_t due_us;
-    size_t begin, end;
-    uint8_t bytes[CHUNK_BYTES];
-};
-
-/* One direction: what has come and is not due, or has no room. */
-struct lane {
-    struct chunk *chunk;
-    unsigned first, count;
-};
-
-struct pair {
-    int fd[2]; /* -1: unused */
-    struct lane lane[2];
-};
-
-static struct {
-    uint64_t random, bytes_a_fault, close_us, delay_us, next_close_us;
-    unsigned wires;
-    int listener[WIRES_MAX];
-    uint16_t to[WIRES_MAX];
-    struct pair pair[PAIRS_MAX];
-    unsigned long flips, deletions, closes, connections;
-} relay;
+#include "relay/chance.h"
+#include "relay/network.h"
+#include "relay/uart.h"
 
 static volatile sig_atomic_t ended;
 
@@ -58,232 +30,101 @@ static void end(int number)
     ended = 1;
 }
 
-static uint64_t draw(void)
+static int complain(const char *text)
 {
-    relay.random = relay.random * 6364136223846793005u + 1442695040888963407u;
-    return relay.random >> 33;
+    fprintf(stderr, "relay: %s: %s\n", text, strerror(errno));
+    return 1;
 }
 
-static uint64_t now_us(void)
+static int relay_network(int argc, char **argv)
 {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
+    struct network_settings settings = {
+        strtoull(argv[1], NULL, 10), strtoull(argv[2], NULL, 10),
+        strtoull(argv[3], NULL, 10), strtoull(argv[4], NULL, 10)};
+    if (!network_open(&settings)) {
+        return complain(argv[0]);
+    }
+    for (int i = 5; i < argc; i++) {
+        if (!network_add(argv[i])) {
+            return complain(argv[i]);
+        }
+    }
+    network_run(&ended);
+    network_print();
+    return 0;
 }
 
-static struct sockaddr_in loopback(uint16_t port)
-{
-    struct sockaddr_in a;
-    memset(&a, 0, sizeof a);
-    a.sin_family = AF_INET;
-    a.sin_port = htons(port);
-    a.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    return a;
-}
+/* --- UARTs ---------------------------------------------------------------- */
 
-static bool add_wire(const char *text)
+static bool set_uart(struct uart_settings *settings, const char *text)
 {
-    unsigned from, to;
-    int on = 1;
-    if (relay.wires == WIRES_MAX || sscanf(text, "%u:%u", &from, &to) != 2) {
+    unsigned long long value = 0;
+    char name[8];
+    if (sscanf(text, "%7[a-z]=%llu", name, &value) != 2 || value > UINT32_MAX) {
         return false;
     }
-    struct sockaddr_in here = loopback((uint16_t)from);
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
-    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (bind(fd, (struct sockaddr *)&here, sizeof here) != 0 ||
-        listen(fd, 16) != 0) {
-        return false;
+    struct {
+        const char *name;
+        uint32_t *value;
+    } row[] = {{"baud", &settings->baud},
+               {"fifo", &settings->fifo},
+               {"flip", &settings->flip_bytes},
+               {"drop", &settings->drop_bytes},
+               {"burst", &settings->burst_bytes}};
+    if (strcmp(name, "seed") == 0) {
+        settings->seed = value;
+        return true;
     }
-    relay.listener[relay.wires] = fd;
-    relay.to[relay.wires++] = (uint16_t)to;
-    return true;
-}
-
-static void close_pair(struct pair *p)
-{
-    for (unsigned i = 0; i < 2; i++) {
-        close(p->fd[i]);
-        p->fd[i] = -1;
-        p->lane[i].count = 0;
-    }
-}
-
-static void take_connection(unsigned wire)
-{
-    int on = 1;
-    int fd = accept4(relay.listener[wire], NULL, NULL, SOCK_NONBLOCK);
-    struct sockaddr_in there = loopback(relay.to[wire]);
-    if (fd < 0) {
-        return;
-    }
-    int other = socket(AF_INET, SOCK_STREAM, 0);
-    for (unsigned i = 0; i < PAIRS_MAX; i++) {
-        struct pair *p = &relay.pair[i];
-        if (p->fd[0] < 0 &&
-            connect(other, (struct sockaddr *)&there, sizeof there) == 0) {
-            (void)fcntl(other, F_SETFL, O_NONBLOCK);
-            (void)setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-            (void)setsockopt(other, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-            p->fd[0] = fd;
-            p->fd[1] = other;
-            relay.connections++;
-            return;
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        if (strcmp(name, row[i].name) == 0) {
+            *row[i].value = (uint32_t)value;
+            return true;
         }
     }
-    close(fd);
-    close(other);
+    return false;
 }
 
-/* Changes a bit or deletes some bytes, by chance. */
-static void damage(struct chunk *c)
+static void print_uarts(const struct uart_counts *c)
 {
-    size_t size = c->end;
-    if (relay.bytes_a_fault == 0 || draw() % relay.bytes_a_fault >= size) {
-        return;
-    }
-    if (draw() % 2 == 0) {
-        c->bytes[draw() % size] ^= (uint8_t)(1u << draw() % 8);
-        relay.flips++;
-    } else {
-        c->end -= 1 + draw() % size;
-        relay.deletions++;
-    }
+    printf("%llu bytes, %llu flips, %llu drops, %llu bursts of %llu bytes, "
+           "%llu overruns, %llu unheard, %llu connections\n",
+           (unsigned long long)c->bytes, (unsigned long long)c->flips,
+           (unsigned long long)c->drops, (unsigned long long)c->bursts,
+           (unsigned long long)c->burst_bytes, (unsigned long long)c->overruns,
+           (unsigned long long)c->unheard, (unsigned long long)c->connections);
 }
 
-/* False: the connection is over. */
-static bool take(struct pair *p, unsigned from)
+static int relay_uarts(char **argv)
 {
-    struct lane *lane = &p->lane[from];
-    struct chunk *c = &lane->chunk[(lane->first + lane->count) % CHUNKS];
-    ssize_t got = read(p->fd[from], c->bytes, CHUNK_BYTES);
-    if (got <= 0) {
-        return got < 0 && errno == EAGAIN;
+    static struct uart_wires wires;
+    struct uart_settings settings = {.seed = 1, .baud = 115200};
+    for (; *argv != NULL && set_uart(&settings, *argv); argv++) {
     }
-    c->begin = 0;
-    c->end = (size_t)got;
-    damage(c);
-    c->due_us = now_us();
-    if (relay.delay_us > 0) {
-        c->due_us += draw() % relay.delay_us;
+    if (settings.baud == 0 || !uart_wires_init(&wires, &settings)) {
+        return complain("uart");
     }
-    lane->count++;
-    return true;
-}
-
-/* In order: a late chunk holds up the next.  False as above. */
-static bool give(struct pair *p, unsigned from)
-{
-    struct lane *lane = &p->lane[from];
-    while (lane->count > 0 && lane->chunk[lane->first].due_us <= now_us()) {
-        struct chunk *c = &lane->chunk[lane->first];
-        if (c->begin < c->end) {
-            ssize_t put = send(p->fd[1 - from], c->bytes + c->begin,
-                               c->end - c->begin, MSG_NOSIGNAL);
-            if (put < 0) {
-                return errno == EAGAIN;
-            }
-            c->begin += (size_t)put;
-        }
-        if (c->begin == c->end) {
-            lane->first = (lane->first + 1) % CHUNKS;
-            lane->count--;
+    for (; *argv != NULL; argv++) {
+        if (!uart_wires_add(&wires, *argv)) {
+            return complain(*argv);
         }
     }
-    return true;
-}
-
-static void serve(struct pair *p)
-{
-    for (unsigned from = 0; from < 2 && p->fd[0] >= 0; from++) {
-        bool open = give(p, from);
-        if (open && p->lane[from].count < CHUNKS) {
-            open = take(p, from) && give(p, from);
-        }
-        if (!open) {
-            close_pair(p);
-        }
-    }
-}
-
-static void close_one(void)
-{
-    unsigned i = (unsigned)(draw() % PAIRS_MAX);
-    for (unsigned k = 0; k < PAIRS_MAX; k++) {
-        struct pair *p = &relay.pair[(i + k) % PAIRS_MAX];
-        if (p->fd[0] >= 0) {
-            close_pair(p);
-            relay.closes++;
-            return;
-        }
-    }
-}
-
-static void run(void)
-{
-    static struct pollfd fds[WIRES_MAX + 2 * PAIRS_MAX];
     while (!ended) {
-        nfds_t used = 0;
-        int wait_ms = 50;
-        for (unsigned i = 0; i < relay.wires; i++) {
-            fds[used++] = (struct pollfd){relay.listener[i], POLLIN, 0};
-        }
-        for (unsigned i = 0; i < 2 * PAIRS_MAX; i++) {
-            const struct pair *p = &relay.pair[i / 2];
-            const struct lane *lane = &p->lane[i % 2];
-            if (p->fd[0] >= 0 && lane->count > 0) {
-                wait_ms = 1;
-            }
-            if (p->fd[0] >= 0 && lane->count < CHUNKS) {
-                fds[used++] = (struct pollfd){p->fd[i % 2], POLLIN, 0};
-            }
-        }
-        (void)poll(fds, used, wait_ms);
-        for (unsigned i = 0; i < relay.wires; i++) {
-            if (fds[i].revents != 0) {
-                take_connection(i);
-            }
-        }
-        for (unsigned i = 0; i < PAIRS_MAX; i++) {
-            serve(&relay.pair[i]);
-        }
-        if (relay.close_us > 0 && now_us() >= relay.next_close_us) {
-            close_one();
-            relay.next_close_us = now_us() + draw() % (2 * relay.close_us);
-        }
+        uart_wires_wait(&wires, uart_wires_carry(&wires, chance_now_us()));
     }
+    uart_wires_close(&wires);
+    print_uarts(&wires.counts);
+    return 0;
 }
 
 int main(int argc, char **argv)
 {
-    if (argc < 6) {
+    bool uarts = argc >= 3 && strcmp(argv[1], "uart") == 0;
+    if (!uarts && argc < 6) {
         fprintf(stderr, "usage: relay SEED BYTES_A_FAULT MS_A_CLOSE DELAY_MS "
-                        "FROM:TO...\n");
+                        "FROM:TO...\n"
+                        "       relay uart [NAME=VALUE...] PATH,PATH...\n");
         return 2;
     }
     (void)signal(SIGTERM, end);
-    relay.random = strtoull(argv[1], NULL, 10) * 2 + 1;
-    relay.bytes_a_fault = strtoull(argv[2], NULL, 10);
-    relay.close_us = 1000 * strtoull(argv[3], NULL, 10);
-    relay.delay_us = 1000 * strtoull(argv[4], NULL, 10);
-    for (unsigned i = 0; i < PAIRS_MAX; i++) {
-        struct pair *p = &relay.pair[i];
-        p->fd[0] = p->fd[1] = -1;
-        for (unsigned k = 0; k < 2; k++) {
-            p->lane[k].chunk = calloc(CHUNKS, sizeof *p->lane[k].chunk);
-            if (p->lane[k].chunk == NULL) {
-                return 1;
-            }
-        }
-    }
-    for (int i = 5; i < argc; i++) {
-        if (!add_wire(argv[i])) {
-            fprintf(stderr, "relay: %s: %s\n", argv[i], strerror(errno));
-            return 1;
-        }
-    }
-    run();
-    printf("%lu flips, %lu deletions, %lu closes, %lu connections\n",
-           relay.flips, relay.deletions, relay.closes, relay.connections);
-    return 0;
+    return uarts ? relay_uarts(argv + 2) : relay_network(argc, argv);
 }

@@ -254,7 +254,7 @@ static void each_wrong_apex_is_found(void **unused)
 
 static bool positive(const struct fixture *f, const uint32_t t[4])
 {
-    struct incode_tally tally = {0, 0};
+    struct incode_tally tally = {0};
     const double *xyz = f->points.xyz;
     return incode_orient3d(&tally, xyz + 3 * t[0], xyz + 3 * t[1],
                            xyz + 3 * t[2], xyz + 3 * t[3]) > 0;

@@ -121,7 +121,8 @@ static void test_refused(void **unused)
         {"--link=wet-string", "no such name; allowed: tcp, "},
         {"--link=a-name-longer-than-any-other-name-that-there-is",
          "no such name; allowed: tcp"},
-        {"--board=mps2-an500", "not in this version; allowed: linux"},
+        {"--board=mps2", "no such name; "},
+        {"--board-kill=100", "--board-kill: goes with emulated boards"},
         {"--cluster=1", "2 to 1024"},
         {"--cluster=4", "--cluster: goes with"},
         {"--builders=0", "1 to 1023"},
@@ -230,13 +231,51 @@ static void test_rows(void **unused)
         assert_ptr_equal(o.board, host_board_row(i));
         assert_non_null(strstr(refusal.text, words[1]));
     }
-    /* A part of what other versions know, or all of it, is none of it. */
+    /* A part of one, or two of them, is none. */
     static const char *const parts[] = {"", "mps2", "an500,mps2", "500"};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
         words[1] = parts[i];
         assert_int_equal(parse(words, &o, &error), HOST_USAGE);
         assert_non_null(strstr(error.text, "no such name"));
     }
+}
+
+/* What a bare board has settles what else may be asked for. */
+static void test_bare_boards(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *words[4], *said;
+    } wrong[] = {
+        {{"--nodes=32", "--board=mps2-an500"}, "give 16 or fewer"},
+        {{"--nodes=4", "--board=raspi3b"}, "a cube of 2; give 2 or fewer"},
+        {{"--memory=8M", "--board=mps2-an385"}, "mps2-an385 has 4M"},
+        {{"--link=tcp", "--board=mps2-an385"}, "--link: "},
+        {{"--link=mpi", "--board=mps2-an385"}, "--link: "},
+        {{"--window=4", "--board=mps2-an385"}, "--window: "},
+        {{"--node-program=x", "--board=raspi3b"}, "--node-program: "}};
+    static const char *const right[] = {"a.xyz",           "--board=mps2-an500",
+                                        "--nodes=16",      "--memory=4M",
+                                        "--board-stop=9",  "--board-reset=70",
+                                        "--board-kill=80", NULL};
+    struct host_run_options o;
+    struct host_error error;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        const char *words[] = {"a.xyz", wrong[i].words[0], wrong[i].words[1],
+                               NULL};
+        assert_int_equal(parse(words, &o, &error), HOST_USAGE);
+        assert_non_null(strstr(error.text, wrong[i].said));
+    }
+    const char *words[8];
+    memcpy(words, right, sizeof right);
+    assert_int_equal(parse(words, &o, &error), HOST_USAGE); /* 9 is too few */
+    words[4] = "--board-stop=60";
+    assert_int_equal(parse(words, &o, &error), 0);
+    assert_string_equal(o.link->name, "uart");
+    assert_int_equal(o.nodes, 16);
+    assert_int_equal(o.trouble.every_us[HOST_TROUBLE_RESET], 70000);
+    assert_int_equal(o.trouble.every_us[HOST_TROUBLE_STOP], 60000);
+    assert_int_equal(o.trouble.every_us[HOST_TROUBLE_KILL], 80000);
 }
 
 /* What `incode run` prints with this word, blanks squeezed. */
@@ -299,10 +338,11 @@ static void test_strategies(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults), cmocka_unit_test(test_options),
-        cmocka_unit_test(test_linda),    cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_in_vain),  cmocka_unit_test(test_names),
-        cmocka_unit_test(test_rows),     cmocka_unit_test(test_strategies),
+        cmocka_unit_test(test_defaults),   cmocka_unit_test(test_options),
+        cmocka_unit_test(test_linda),      cmocka_unit_test(test_bare_boards),
+        cmocka_unit_test(test_refused),    cmocka_unit_test(test_in_vain),
+        cmocka_unit_test(test_names),      cmocka_unit_test(test_rows),
+        cmocka_unit_test(test_strategies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

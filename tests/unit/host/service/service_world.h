@@ -56,6 +56,7 @@ static struct {
     bool sequential;     /* how it runs */
     bool sick;           /* node 0 starts again whenever it has work */
     uint64_t patience_s; /* 0: 8 */
+    struct host_sharing sharing;
     uint64_t stopped_us; /* when a run that failed ended its nodes */
     void (*stop)(void *context);
     /* What the user was told, and when. */
@@ -256,6 +257,7 @@ static inline int run(const struct host_strategy *strategy,
     options.patience_s = world.patience_s == 0 ? 8 : world.patience_s;
     options.memory = MEMORY;
     options.strategy = strategy;
+    options.sharing = world.sharing;
     memset(&result, 0, sizeof result);
     memset(error, 0, sizeof *error);
     result.nodes = NODES;

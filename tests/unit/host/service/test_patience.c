@@ -84,6 +84,49 @@ static void test_idle_holder(void **unused)
     assert_int_equal(told_us("node 0"), UINT64_MAX);
 }
 
+/* Whatever a strategy has it do, the node that never works is the one that is
+ * named, and no other: not who waits for it, nor who waits for that one. */
+static void idles_in(const struct host_strategy *strategy, unsigned node,
+                     unsigned builders)
+{
+    char name[16];
+    prepare();
+    world.patience_s = 2;
+    world.sharing.builders = builders;
+    world.events[0] = (struct event){IDLE, 0.0, node, 0};
+    survives(strategy);
+    snprintf(name, sizeof name, "node %u ", node);
+    for (unsigned t = 0; t < world.told_count; t++) {
+        if (strstr(world.told[t].line, "has done nothing") != NULL &&
+            strncmp(world.told[t].line, name, strlen(name)) != 0) {
+            show_told();
+            fail_msg("%s, %u builders: node %u is the idle one", strategy->name,
+                     builders, node);
+        }
+    }
+}
+
+static void test_idle_in_each_strategy(void **unused)
+{
+    static const struct host_sharing usual;
+    const struct host_strategy *row;
+    (void)unused;
+    for (unsigned k = 0; (row = host_strategy_row(k)) != NULL; k++) {
+        struct host_error error = {0};
+        bool builds = row == &host_master_slaves || row == &host_linda;
+        if (host_strategy_check(row, NODES, &usual, INCODE_FACE_OWN,
+                                INCODE_BUILD_AUTO, &error) != 0) {
+            continue;
+        }
+        for (unsigned i = 0; i < NODES; i++) {
+            idles_in(row, i, 0);
+            if (builds) {
+                idles_in(row, i, 3);
+            }
+        }
+    }
+}
+
 /* --- nodes that do not answer ----------------------------------------------
  */
 
@@ -241,6 +284,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_idle),
         cmocka_unit_test(test_idle_holder),
+        cmocka_unit_test(test_idle_in_each_strategy),
         cmocka_unit_test(test_silent),
         cmocka_unit_test(test_back),
         cmocka_unit_test(test_silent_gateway),

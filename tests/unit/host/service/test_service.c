@@ -53,6 +53,17 @@ static void test_restarts(void **unused)
     survives(&host_spatial);
 }
 
+/* While the pages go to all, those behind the gap must blame nobody. */
+static void test_restarts_at_first(void **unused)
+{
+    (void)unused;
+    for (unsigned when = 1; when <= 15; when++) {
+        for (unsigned node = 0; node < 4; node++) {
+            survives_restart(node, 0.004 * when, &host_exchange);
+        }
+    }
+}
+
 /* Any mixture of them; SERVICE_ROUNDS for more than a few. */
 static void test_mixtures(void **unused)
 {
@@ -360,6 +371,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_restarts),
+        cmocka_unit_test(test_restarts_at_first),
         cmocka_unit_test(test_mixtures),
         cmocka_unit_test(test_stopped),
         cmocka_unit_test(test_gone),

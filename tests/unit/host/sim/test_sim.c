@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "host/base/parallel.h"
+#include "host/service/service.h"
 #include "host/service/strategies/strategies.h"
 #include "host/sim/sim.h"
 #include "tests/unit/emulated.h"
@@ -130,6 +131,18 @@ static void each_node_restarts_at_each_frame(void **unused)
     assert_true(4 * restarts > 3 * runs);
 }
 
+/* Seed 151: nodes of an exchange that are done lend pages to those who are not,
+ * also such as the shuffle keeps back, and nobody's patience ends. */
+static void who_is_done_lends_on(void **unused)
+{
+    struct host_sim_plan plan;
+    (void)unused;
+    host_sim_plan_draw(&plan, 151, 0);
+    assert_string_equal(plan.strategy->name, "exchange");
+    assert_true(plan.shuffle_seed != 0);
+    assert_true(run(&plan).time_us < HOST_PATIENCE_US / 2);
+}
+
 static int one_thread(void **unused)
 {
     (void)unused;
@@ -141,6 +154,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_same_seed_is_the_same_run),
+        cmocka_unit_test(who_is_done_lends_on),
         cmocka_unit_test(each_frame_meets_each_fate),
         cmocka_unit_test(each_node_restarts_at_each_frame),
     };
