@@ -35,6 +35,7 @@
 
 enum {
     CUBE_DIMENSION_MAX = 10,
+    CUBE_NODES_MAX = 1 << CUBE_DIMENSION_MAX,
     CUBE_LINKS_MAX = CUBE_DIMENSION_MAX + 1, /* node 0 has the host's too */
     CUBE_PAYLOAD_MAX = 1600,
     CUBE_DEAD_MAX = 16,     /* dead links and nodes that are remembered */

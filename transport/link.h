@@ -151,7 +151,8 @@ struct link_config {
 
     /* Microseconds after which a frame that was not acknowledged is sent again:
      * at least, and at most.  Defaults: 100,000 and 1,000,000; a slow wire
-     * wants more.  The first is no larger than the second. */
+     * wants more.  The first is no larger than the second.  Round trips that
+     * are measured to take longer are waited for, up to 8 times the second. */
     uint32_t timeout_min_us;
     uint32_t timeout_max_us;
 

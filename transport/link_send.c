@@ -4,7 +4,10 @@
 
 #include "check.h"
 
-enum { BACKOFF_MAX = 5 };
+enum {
+    BACKOFF_MAX = 5,
+    MEASURED_MAX = 8 /* times timeout_max_us, of round trips that take longer */
+};
 
 static unsigned in_flight(const struct link *link)
 {
@@ -14,9 +17,10 @@ static unsigned in_flight(const struct link *link)
 uint32_t link_timeout_us(const struct link *link)
 {
     const struct link_config *c = &link->config;
-    uint64_t us = link->statistics.timeout_us;
-    us <<= link->send.backoff;
-    return us < c->timeout_max_us ? (uint32_t)us : c->timeout_max_us;
+    uint32_t measured = link->statistics.timeout_us;
+    uint64_t us = (uint64_t)measured << link->send.backoff;
+    uint32_t most = measured > c->timeout_max_us ? measured : c->timeout_max_us;
+    return us < most ? (uint32_t)us : most;
 }
 
 /* --- what acknowledgements say ------------------------------------------- */
@@ -41,9 +45,9 @@ static void measure(struct link *link, uint32_t rtt)
     if (timeout < link->config.timeout_min_us) {
         timeout = link->config.timeout_min_us;
     }
-    s->timeout_us = timeout < link->config.timeout_max_us
-                        ? (uint32_t)timeout
-                        : link->config.timeout_max_us;
+    uint64_t most = (uint64_t)MEASURED_MAX * link->config.timeout_max_us;
+    most = most < UINT32_MAX ? most : UINT32_MAX;
+    s->timeout_us = (uint32_t)(timeout < most ? timeout : most);
 }
 
 /* What one acknowledgement told of the frames on their way. */
