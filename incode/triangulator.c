@@ -561,6 +561,17 @@ void incode_triangulator_statistics(const struct incode_triangulator *t,
            sizeof s->candidates_histogram);
 }
 
+void incode_triangulator_gauge(const struct incode_triangulator *t,
+                               struct incode_gauge *gauge)
+{
+    const struct incode_pager *pager = &t->maker.pager;
+    const struct incode_afl *afl = &t->front.afl;
+    gauge->pages = pager->frame_count;
+    gauge->held = pager->frames_used;
+    gauge->faces = t->by_points ? 0 : afl->capacity;
+    gauge->open = t->by_points ? 0 : afl->count;
+}
+
 const struct incode_map *
 incode_triangulator_map(const struct incode_triangulator *t)
 {

@@ -129,6 +129,13 @@ struct incode_statistics {
                                           octaves */
 };
 
+/* How full it is now. */
+struct incode_gauge {
+    uint32_t pages, held; /* that there is room for, and that are there */
+    uint32_t faces, open; /* likewise, of the active face list; point by point
+                             it has none */
+};
+
 struct incode_triangulator; /* opaque: lives at the start of the arena */
 
 /* Smallest arena that works for this setup, bytes.  It is the same for every
@@ -216,6 +223,8 @@ void incode_triangulator_allow(struct incode_triangulator *t, uint32_t units);
 uint64_t incode_triangulator_spent(const struct incode_triangulator *t);
 
 /* Counts of all jobs since init. */
+void incode_triangulator_gauge(const struct incode_triangulator *t,
+                               struct incode_gauge *gauge);
 void incode_triangulator_statistics(const struct incode_triangulator *t,
                                     struct incode_statistics *s);
 

@@ -59,6 +59,15 @@ struct node_gauges {
                           2^32 - 1 */
 };
 
+/* Why a node ends: what board.reset gets. */
+enum node_reset {
+    NODE_RESET_OVER = 0,   /* the run is over */
+    NODE_RESET_AGAIN = 16, /* it was told to begin anew */
+    NODE_RESET_STAY        /* and a loader not to start an image */
+};
+
+struct node_who; /* questions.h */
+
 struct node_board {
     void *context;
     struct node_identity identity;
@@ -81,8 +90,16 @@ struct node_board {
     uint32_t (*refused)(void *context);
     /* NULL: there is nothing to tell. */
     void (*gauges)(void *context, struct node_gauges *gauges);
-    /* The node's end: a fresh start, or where there is a system, an exit with
-     * this status. */
+    /* What the board is, over what a process of Linux is, and zeros elsewhere;
+     * NULL: it is one. */
+    void (*who)(void *context, struct node_who *who);
+    /* What the board has to say of its starts and faults: text, lines ended by
+     * \n, at most `size` bytes; how many.  NULL: nothing. */
+    size_t (*log)(void *context, char *text, size_t size);
+    /* Bytes that link d had no room for since the start.  NULL: not known. */
+    uint32_t (*lost)(void *context, unsigned d);
+    /* The node's end, for the reason of enum node_reset: a fresh start, or
+     * where there is a system, an exit with this status. */
     void (*reset)(void *context, int status);
     void *arena;        /* aligned to NODE_ALIGNMENT bytes: arena.h */
     size_t arena_bytes; /* with fixed_bytes, below 4 GiB */

@@ -22,7 +22,7 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 10,             /* both ends must agree */
+    NODE_PROTOCOL = 11,             /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
     NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got, */
     NODE_PAGES_LENT_MAX = 8,        /* and of another node of an exchange */
@@ -47,6 +47,14 @@ enum node_message_type {
     NODE_REGIONS,     /* struct node_regions_message, then first bricks */
     NODE_OUT,         /* struct incode_job: to be put into the tuple space */
     NODE_PAGE_TO_ALL, /* as NODE_PAGE, to all, who have not asked for it */
+    NODE_QUESTION,    /* struct node_question_message: questions.h */
+    NODE_RESTART,     /* struct node_restart_message */
+    /* From the host to a board's loader: loader/messages.h.  The node program
+     * passes them over. */
+    NODE_IMAGE_BEGIN,
+    NODE_IMAGE_BLOCK,
+    NODE_IMAGE_ASK,
+    NODE_IMAGE_DO,
     /* To the host. */
     NODE_READY = 32,   /* struct node_ready_message */
     NODE_PAGE_REQUEST, /* uint32 page numbers; also to a node */
@@ -59,6 +67,8 @@ enum node_message_type {
     NODE_TAKEN,           /* struct node_taken_message */
     NODE_PAGE_PASSED,     /* uint32 node, then numbers of the pages that it has
                              asked the sender for, who has them not */
+    NODE_ANSWER,          /* struct node_answer_head, then what was asked for */
+    NODE_IMAGE_STATE,     /* of a loader: loader/messages.h */
     /* From a face manager to a builder, and back: incode/list.h. */
     NODE_LIST = 64, /* struct incode_list, as much as is in use */
     NODE_ANSWERS,   /* struct incode_answers, likewise */
@@ -70,7 +80,10 @@ enum node_message_type {
     NODE_WAVE_ANSWER, /* struct node_wave_answer_message */
     NODE_LOAN_ASK,    /* nothing: has nothing to do */
     NODE_LOAN,        /* struct incode_loan, as much as is in use */
-    NODE_LOAN_FOUND   /* struct node_found_message, likewise */
+    NODE_LOAN_FOUND,  /* struct node_found_message, likewise */
+    /* From a node to another, in whatever role, and back at once: a trace. */
+    NODE_ECHO = 96, /* struct node_echo_message */
+    NODE_ECHOED
 };
 
 /* What a node does in a generation of the wiring: a row of roles/roles.c. */

@@ -2,10 +2,13 @@
 
 #include <string.h>
 
+#include "answers.h"
 #include "arena.h"
+#include "configure.h"
 #include "incode/predicates/check.h"
 #include "looks.h"
 #include "node/roles/roles.h"
+#include "setup.h"
 #include "totals.h"
 #include "transport/wiring.h"
 
@@ -30,35 +33,11 @@ struct node {
     struct node_fault fault;
     bool fault_sent;
     struct node_looks looks;
+    struct node_answers answers;
     uint32_t work; /* steps and messages of roles: what a pong tells of it */
     struct node_pace pace;
     uint64_t now_us, stop_us;
 };
-
-/* Frames a window, where the identity leaves it open: an eighth of a small
- * memory at most goes to windows. */
-static uint16_t window_for(size_t bytes)
-{
-    return bytes >= 2u << 20 ? 8 : bytes >= 1u << 20 ? 4 : 2;
-}
-
-/* The cube as this node's identity and memory make it. */
-static struct cube_config configure(const struct node_identity *identity,
-                                    size_t memory)
-{
-    struct cube_config config;
-    memset(&config, 0, sizeof config);
-    config.self = identity->self;
-    config.dimension = identity->dimension;
-    config.window =
-        identity->window != 0 ? identity->window : window_for(memory);
-    config.epoch = identity->epoch;
-    config.host_port = identity->host_port;
-    config.host_ports = identity->host_ports;
-    config.dead_us = identity->dead_us;
-    cube_for_serial(&config, identity->serial_baud);
-    return config;
-}
 
 /* Stands in for the links of a node that is only measured. */
 static int nowhere(void *context, const uint8_t *bytes, size_t size)
@@ -77,7 +56,7 @@ static int nothing(void *context, uint8_t *bytes, size_t size)
 size_t node_arena_needed(const struct node_identity *identity, size_t memory,
                          const struct node_setup_message *setup)
 {
-    struct cube_config config = configure(identity, memory);
+    struct cube_config config = node_configure(identity, memory);
     const struct node_role *role = node_role_named(setup->role);
     INCODE_ASSERT(role != NULL);
     for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
@@ -92,8 +71,8 @@ struct node *node_start(const struct node_board *board, const char **why)
 {
     uint8_t *memory = board->arena;
     size_t own = node_aligned(sizeof(struct node));
-    struct cube_config config =
-        configure(&board->identity, board->arena_bytes + board->fixed_bytes);
+    struct cube_config config = node_configure(
+        &board->identity, board->arena_bytes + board->fixed_bytes);
     memcpy(config.pipes, board->pipes, sizeof config.pipes);
     INCODE_ASSERT((uintptr_t)board->arena % NODE_ALIGNMENT == 0);
     *why = incode_arithmetic_fault();
@@ -125,8 +104,15 @@ struct node *node_start(const struct node_board *board, const char **why)
     node->counted.cube = node->cube;
     node->counted.self = board->identity.self;
     node->counted.pause = node_looks_pause(&node->looks);
+    node_answers_init(&node->answers, board, &node->counted);
     node_pace_init(&node->pace, board->now_us, board->context);
     return node;
+}
+
+/* Of its memory, but for its role's. */
+static size_t own_bytes(const struct node *n)
+{
+    return n->board->fixed_bytes + node_aligned(sizeof *n) + n->cube_bytes;
 }
 
 /* Adds what the role has done. */
@@ -135,8 +121,7 @@ static void role_totals(const struct node *n, struct node_finished_message *sum)
     struct node_finished_message totals;
     memset(&totals, 0, sizeof totals);
     n->role->totals(n->role_arena, &totals, n->now_us);
-    totals.memory_high_water +=
-        n->board->fixed_bytes + node_aligned(sizeof *n) + n->cube_bytes;
+    totals.memory_high_water += own_bytes(n);
     node_totals_add(sum, &totals);
 }
 
@@ -149,45 +134,6 @@ static void end_role(struct node *n)
     }
 }
 
-static bool read_setup(struct node *n, const struct cube_message *message,
-                       struct node_setup_message *setup)
-{
-    uint32_t protocol = NODE_PROTOCOL;
-    if (message->size >= sizeof protocol) {
-        memcpy(&protocol, message->data, sizeof protocol);
-    }
-    if (protocol != NODE_PROTOCOL) {
-        node_fault_set(&n->fault, "protocol version #, expected #", protocol,
-                       NODE_PROTOCOL);
-        return false;
-    }
-    if (message->size != sizeof *setup) {
-        node_fault_set(&n->fault, "setup in # bytes, expected #", message->size,
-                       sizeof *setup);
-        return false;
-    }
-    memcpy(setup, message->data, sizeof *setup);
-    uint32_t nodes = 1u << n->board->identity.dimension;
-    if (setup->nodes != nodes) {
-        node_fault_set(&n->fault, "invalid setup: # nodes, expected #",
-                       setup->nodes, nodes);
-        return false;
-    }
-    for (unsigned i = 0; i < sizeof setup->reserved; i++) {
-        if (setup->reserved[i] != 0) {
-            node_fault_set(&n->fault, "invalid setup: reserved byte # is #", i,
-                           setup->reserved[i]);
-            return false;
-        }
-    }
-    if (setup->reserved2 != 0) {
-        node_fault_set(&n->fault, "invalid setup: what is reserved is #",
-                       setup->reserved2, 0);
-        return false;
-    }
-    return true;
-}
-
 /* Whatever went before, the setup begins anew. */
 static void take_setup(struct node *n, const struct cube_message *message)
 {
@@ -195,7 +141,8 @@ static void take_setup(struct node *n, const struct cube_message *message)
     end_role(n);
     n->fault.size = 0;
     n->fault_sent = false;
-    if (!read_setup(n, message, &setup)) {
+    if (!node_setup_read(&setup, message, 1u << n->board->identity.dimension,
+                         &n->fault)) {
         return;
     }
     const struct node_role *role = node_role_named(setup.role);
@@ -234,7 +181,8 @@ static bool is_expected(struct node *n, const struct cube_message *message)
                      type == NODE_CREDIT || type == NODE_UNSPILL ||
                      type == NODE_REPORT || type == NODE_STOP ||
                      type == NODE_PING || type == NODE_REGIONS ||
-                     type == NODE_OUT || type == NODE_PAGE_TO_ALL;
+                     type == NODE_OUT || type == NODE_PAGE_TO_ALL ||
+                     type == NODE_QUESTION || type == NODE_RESTART;
     if (host_only && message->source != CUBE_HOST) {
         node_fault_set(&n->fault,
                        "message of type # from node #, expected the host", type,
@@ -249,8 +197,21 @@ static bool is_expected(struct node *n, const struct cube_message *message)
     return true;
 }
 
+/* What is for a board's loader, which this one may have had before. */
+static bool is_for_loader(const struct cube_message *message)
+{
+    return message->type >= NODE_IMAGE_BEGIN && message->type <= NODE_IMAGE_DO;
+}
+
 static void serve_message(struct node *n, const struct cube_message *message)
 {
+    if (node_answers_is_for(message)) {
+        node_answers_take(&n->answers, message, n->now_us);
+        return;
+    }
+    if (is_for_loader(message)) {
+        return;
+    }
     switch (message->type) {
     case NODE_SETUP:
         take_setup(n, message);
@@ -292,7 +253,9 @@ static void fill_map(const struct node *n, struct node_map *map)
     map->cube = (uint32_t)n->cube_bytes;
     map->window = n->window;
     map->node = (uint32_t)node_aligned(sizeof *n);
-    n->role->map(n->role_arena, map);
+    if (n->role != NULL) {
+        n->role->map(n->role_arena, map);
+    }
 }
 
 static bool send_ready(struct node *n)
@@ -364,6 +327,70 @@ static void follow_wiring(struct node *n)
     n->fault.size = 0;
     n->fault_sent = false;
     n->counted.received = n->counted.sent = 0;
+    node_answers_forget(&n->answers);
+}
+
+/* --- what it tells who asks ------------------------------------------------
+ */
+
+static void tell_who(void *context, struct node_who *who)
+{
+    const struct node *n = context;
+    who->role = n->role == NULL ? 0 : n->role_number;
+}
+
+static void tell_top(void *context, struct node_top *top)
+{
+    const struct node *n = context;
+    struct node_finished_message totals;
+    struct incode_gauge gauge = {0};
+    node_account(n, &totals);
+    if (n->role != NULL) {
+        top->role = n->role_number;
+        n->role->gauge(n->role_arena, &gauge);
+    }
+    top->work = n->work;
+    top->used = totals.memory_high_water > 0
+                    ? (uint32_t)totals.memory_high_water
+                    : (uint32_t)own_bytes(n);
+    top->pages = gauge.pages;
+    top->held = gauge.held;
+    top->faces = gauge.faces;
+    top->open = gauge.open;
+    top->built = totals.statistics.tetrahedra_built;
+}
+
+static bool tell_memory(void *context, struct node_ready_message *ready)
+{
+    const struct node *n = context;
+    fill_map(n, &ready->map);
+    ready->role = n->role == NULL ? 0 : n->role_number;
+    return true;
+}
+
+static void tell_totals(void *context, struct node_finished_message *totals)
+{
+    const struct node *n = context;
+    node_account(n, totals);
+    node_looks_totals(&n->looks, totals);
+}
+
+static size_t tell_log(void *context, char *text, size_t size)
+{
+    const struct node *n = context;
+    if (!node_fault_is_set(&n->fault) || n->fault.size + 1 > size) {
+        return 0;
+    }
+    memcpy(text, n->fault.text, n->fault.size);
+    text[n->fault.size] = '\n';
+    return n->fault.size + 1;
+}
+
+static unsigned send_answers(struct node *n)
+{
+    const struct node_teller teller = {n,           tell_who,    tell_top,
+                                       tell_memory, tell_totals, tell_log};
+    return node_answers_send(&n->answers, &teller, n->now_us);
 }
 
 /* Tells the host what is wrong, once.  The node goes on to pass messages of
@@ -421,6 +448,7 @@ static bool is_sound(const struct node *n)
 static bool may_take(struct node *n, const struct cube_message *message)
 {
     return !is_sound(n) || n->role->may_take == NULL ||
+           node_answers_is_for(message) ||
            n->role->may_take(n->role_arena, message);
 }
 
@@ -477,7 +505,8 @@ enum node_event node_send(struct node *node, unsigned moved)
         moved += send_role(node);
         moved += node_fault_is_set(&node->fault); /* to be told at once */
     }
-    if (may_stop(node)) {
+    moved += send_answers(node);
+    if (may_stop(node) || node_reset_why(node) != NODE_RESET_OVER) {
         return NODE_STOPPED;
     }
     if (moved > 0) {
@@ -485,6 +514,11 @@ enum node_event node_send(struct node *node, unsigned moved)
     }
     node_looks_idle(&node->looks);
     return NODE_IDLE;
+}
+
+enum node_reset node_reset_why(const struct node *node)
+{
+    return node_answers_restart(&node->answers, node->now_us);
 }
 
 enum node_event node_step(struct node *node)
@@ -501,6 +535,17 @@ uint64_t node_wait_us(const struct node *node)
         due = FAREWELL_US;
     }
     return due < IDLE_MAX_US ? due : IDLE_MAX_US;
+}
+
+unsigned node_links(const struct node *node,
+                    struct node_link_state state[CUBE_LINKS_MAX])
+{
+    return node_answers_links(&node->answers, state);
+}
+
+bool node_has_met(const struct node *node)
+{
+    return node_looks_seen(&node->looks) != 0;
 }
 
 uint32_t node_held(const struct node *node)
@@ -521,7 +566,7 @@ const struct cube_statistics *node_messages(const struct node *node)
     return cube_statistics(node->cube);
 }
 
-void node_run(struct node *node)
+enum node_reset node_run(struct node *node)
 {
     const struct node_board *board = node->board;
     enum node_event event;
@@ -530,4 +575,5 @@ void node_run(struct node *node)
             board->idle(board->context, node_wait_us(node));
         }
     }
+    return node_reset_why(node);
 }

@@ -17,11 +17,12 @@
 
 #include "board.h"
 #include "message.h"
+#include "questions.h"
 
 enum node_event {
     NODE_BUSY,   /* call again at once */
     NODE_IDLE,   /* call again when bytes come or node_wait_us is over */
-    NODE_STOPPED /* the host has ended the run */
+    NODE_STOPPED /* the host has ended the run, or has this node restart */
 };
 
 struct node; /* opaque: lives at the start of the arena */
@@ -50,6 +51,13 @@ enum node_event node_send(struct node *node, unsigned moved);
 /* Microseconds until node_step must be called even if no byte comes. */
 uint64_t node_wait_us(const struct node *node);
 
+/* State of its links, for a board's own console: of how many. */
+unsigned node_links(const struct node *node,
+                    struct node_link_state state[CUBE_LINKS_MAX]);
+
+/* Whether any link has been up since its start. */
+bool node_has_met(const struct node *node);
+
 /* Slots of the role's queues that are in use: 0 when no job is open. */
 uint32_t node_held(const struct node *node);
 
@@ -60,7 +68,10 @@ void node_account(const struct node *node,
                   struct node_finished_message *totals);
 const struct cube_statistics *node_messages(const struct node *node);
 
-/* Steps and sleeps until the host ends the run. */
-void node_run(struct node *node);
+/* Why it is stopped, for board.reset. */
+enum node_reset node_reset_why(const struct node *node);
+
+/* Steps and sleeps until the host ends the run, or has it restart. */
+enum node_reset node_run(struct node *node);
 
 #endif

@@ -127,6 +127,12 @@ static void builder_map(const void *self, struct node_map *map)
     map->tables[2].count = b->lists.inbox.slot_count;
 }
 
+static void builder_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct builder *b = self;
+    node_tetra_builder_gauge(&b->tetra, gauge);
+}
+
 const struct node_role node_builder_role = {
     .name = "builder",
     .tables = {{"maker, its local points, lists at work", NULL},
@@ -142,5 +148,6 @@ const struct node_role node_builder_role = {
     .awaited = builder_awaited,
     .held = builder_held,
     .totals = builder_totals,
+    .gauge = builder_gauge,
     .map = builder_map,
 };

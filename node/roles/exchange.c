@@ -305,6 +305,12 @@ static void exchange_map(const void *self, struct node_map *map)
     map->tables[2].bytes -= (uint32_t)(shares + lending + loans);
 }
 
+static void exchange_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct exchange *e = self;
+    incode_triangulator_gauge(e->triangulation.triangulator, gauge);
+}
+
 const struct node_role node_exchange_role = {
     .name = "exchange",
     .tables = {{"tetrahedra on their way to other nodes", "batches"},
@@ -322,5 +328,6 @@ const struct node_role node_exchange_role = {
     .owing = exchange_owing,
     .held = exchange_held,
     .totals = exchange_totals,
+    .gauge = exchange_gauge,
     .map = exchange_map,
 };

@@ -204,6 +204,13 @@ void node_face_manager_totals(const struct node_face_manager *f,
         f->outlet_bytes + totals->statistics.memory_high_water;
 }
 
+void node_face_manager_gauge(const struct node_face_manager *f,
+                             struct incode_gauge *gauge)
+{
+    gauge->faces = f->manager.front.afl.capacity;
+    gauge->open = f->manager.front.afl.count;
+}
+
 void node_face_manager_map(const struct node_face_manager *f,
                            struct node_map *map)
 {

@@ -67,6 +67,8 @@ void node_face_manager_map(const struct node_face_manager *f,
                            struct node_map *map);
 
 /* All but the bytes of the carrier and the role's own memory. */
+void node_face_manager_gauge(const struct node_face_manager *f,
+                             struct incode_gauge *gauge);
 void node_face_manager_totals(const struct node_face_manager *f,
                               struct node_finished_message *totals,
                               uint64_t now_us);

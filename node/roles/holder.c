@@ -281,6 +281,13 @@ static void holder_map(const void *self, struct node_map *map)
     map->tables[1].count = h->frame_count;
 }
 
+static void holder_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct holder *h = self;
+    gauge->pages = h->frame_count;
+    gauge->held = h->frames_used;
+}
+
 const struct node_role node_holder_role = {
     .name = "holder",
     .tables = {{"queue of requests", "pages"},
@@ -295,5 +302,6 @@ const struct node_role node_holder_role = {
     .awaited = holder_awaited,
     .held = holder_held,
     .totals = holder_totals,
+    .gauge = holder_gauge,
     .map = holder_map,
 };

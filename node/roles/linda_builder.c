@@ -135,6 +135,12 @@ static void linda_builder_map(const void *self, struct node_map *map)
     map->tables[2].bytes = (uint32_t)b->share_bytes;
 }
 
+static void linda_builder_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct linda_builder *b = self;
+    node_tetra_builder_gauge(&b->tetra, gauge);
+}
+
 const struct node_role node_linda_builder_role = {
     .name = "linda builder",
     .tables = {{"maker, its local points, lists at work", NULL},
@@ -150,5 +156,6 @@ const struct node_role node_linda_builder_role = {
     .awaited = linda_builder_awaited,
     .held = linda_builder_held,
     .totals = linda_builder_totals,
+    .gauge = linda_builder_gauge,
     .map = linda_builder_map,
 };

@@ -154,6 +154,12 @@ static void linda_manager_map(const void *self, struct node_map *map)
     map->tables[3].bytes = (uint32_t)m->share_bytes;
 }
 
+static void linda_manager_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct linda_manager *m = self;
+    node_face_manager_gauge(&m->faces, gauge);
+}
+
 const struct node_role node_linda_manager_role = {
     .name = "linda manager",
     .tables = {{"results and spilled faces on their way out", NULL},
@@ -171,5 +177,6 @@ const struct node_role node_linda_manager_role = {
     .owing = linda_manager_owing,
     .held = linda_manager_held,
     .totals = linda_manager_totals,
+    .gauge = linda_manager_gauge,
     .map = linda_manager_map,
 };

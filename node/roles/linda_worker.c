@@ -214,6 +214,12 @@ static void linda_worker_map(const void *self, struct node_map *map)
         (uint32_t)(node_aligned(sizeof *w) + w->share_bytes);
 }
 
+static void linda_worker_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct linda_worker *w = self;
+    node_worker_role.gauge(w->worker, gauge);
+}
+
 const struct node_role node_linda_worker_role = {
     .name = "linda worker",
     .tables = {{"results and spilled faces on their way out", NULL},
@@ -233,5 +239,6 @@ const struct node_role node_linda_worker_role = {
     .owing = linda_worker_owing,
     .held = linda_worker_held,
     .totals = linda_worker_totals,
+    .gauge = linda_worker_gauge,
     .map = linda_worker_map,
 };

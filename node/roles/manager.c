@@ -173,6 +173,12 @@ static void manager_map(const void *self, struct node_map *map)
     map->tables[3].count = m->lists.inbox.slot_count;
 }
 
+static void manager_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct manager *m = self;
+    node_face_manager_gauge(&m->faces, gauge);
+}
+
 const struct node_role node_manager_role = {
     .name = "manager",
     .tables = {{"results and spilled faces on their way out", NULL},
@@ -190,5 +196,6 @@ const struct node_role node_manager_role = {
     .owing = manager_owing,
     .held = manager_held,
     .totals = manager_totals,
+    .gauge = manager_gauge,
     .map = manager_map,
 };

@@ -87,6 +87,9 @@ struct node_role {
     void (*totals)(const void *self, struct node_finished_message *totals,
                    uint64_t now_us);
 
+    /* How full its tables are now; what it has not, stays. */
+    void (*gauge)(const void *self, struct incode_gauge *gauge);
+
     /* Fills in `tables` and `pages` of the memory map. */
     void (*map)(const void *self, struct node_map *map);
 };

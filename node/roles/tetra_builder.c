@@ -151,6 +151,13 @@ void node_tetra_builder_totals(const struct node_tetra_builder *t,
     totals->memory_high_water = totals->statistics.memory_high_water;
 }
 
+void node_tetra_builder_gauge(const struct node_tetra_builder *t,
+                              struct incode_gauge *gauge)
+{
+    gauge->pages = t->builder.maker.pager.frame_count;
+    gauge->held = t->builder.maker.pager.frames_used;
+}
+
 void node_tetra_builder_map(const struct node_tetra_builder *t,
                             struct node_map *map)
 {

@@ -56,6 +56,8 @@ void node_tetra_builder_map(const struct node_tetra_builder *t,
                             struct node_map *map);
 
 /* All but the bytes of the carrier, the role's own memory, and its time. */
+void node_tetra_builder_gauge(const struct node_tetra_builder *t,
+                              struct incode_gauge *gauge);
 void node_tetra_builder_totals(const struct node_tetra_builder *t,
                                struct node_finished_message *totals);
 

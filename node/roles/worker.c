@@ -92,6 +92,12 @@ static void worker_map(const void *self, struct node_map *map)
     node_triangulation_map(&w->triangulation, map, 0);
 }
 
+static void worker_gauge(const void *self, struct incode_gauge *gauge)
+{
+    const struct worker *w = self;
+    incode_triangulator_gauge(w->triangulation.triangulator, gauge);
+}
+
 const struct node_role node_worker_role = {
     .name = "worker",
     .tables = {NODE_TRIANGULATION_NAMES},
@@ -105,5 +111,6 @@ const struct node_role node_worker_role = {
     .awaited = worker_awaited,
     .held = worker_held,
     .totals = worker_totals,
+    .gauge = worker_gauge,
     .map = worker_map,
 };

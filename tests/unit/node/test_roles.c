@@ -358,15 +358,15 @@ static void setups_of_other_versions(void **unused)
         uint64_t more;
     } later = {setup, 0};
     (void)unused;
-    assert_int_equal(NODE_PROTOCOL, 10);
+    assert_int_equal(NODE_PROTOCOL, 11);
     setup.protocol = later.setup.protocol = 6;
     refuses(NODE_SETUP, &setup, sizeof setup,
-            "protocol version 6, expected 10");
+            "protocol version 6, expected 11");
     refuses(NODE_SETUP, &later, sizeof later,
-            "protocol version 6, expected 10");
-    refuses(NODE_SETUP, &later, 4, "protocol version 6, expected 10");
+            "protocol version 6, expected 11");
+    refuses(NODE_SETUP, &later, 4, "protocol version 6, expected 11");
     refuses(NODE_SETUP, &later, 3, "setup in 3 bytes, expected 232");
-    later.setup.protocol = 10;
+    later.setup.protocol = 11;
     refuses(NODE_SETUP, &later, 236, "setup in 236 bytes, expected 232");
 }
 
