@@ -1,0 +1,49 @@
+/* The boot loader of a bare board as a node of its cube: it passes on what is
+ * for others, says who it is, and takes an image (messages.h) into the slot
+ * that is not in use.  It never starts one: a board whose loader has been on
+ * its links restarts, so that an epoch is used once.
+ *
+ * Memory: the board's arena: struct loader, and the windows of the links.
+ * Work: a step moves the links' frames, and does one piece of what is under
+ * way: erases a sector, programs a block, hashes a slice, or proves a
+ * signature.  While the flash is busy, what comes for it is left unread.
+ *
+ *     struct loader *loader = loader_start(&board, &slots, &why);
+ *     while ((event = loader_step(loader)) != NODE_STOPPED)
+ *         if (event == NODE_IDLE)
+ *             board.idle(board.context, loader_wait_us(loader));
+ *     board.reset(board.context, loader_reset_why(loader));
+ */
+#ifndef NODE_LOADER_LOADER_H
+#define NODE_LOADER_LOADER_H
+
+#include "node/board.h"
+#include "node/node.h"
+#include "slots.h"
+
+struct loader; /* opaque: lives at the start of the arena */
+
+/* Bytes of arena that a loader of this identity needs, whose board has
+ * `memory` in all; 0: the identity breaks a limit of the cube. */
+size_t loader_arena_needed(const struct node_identity *identity, size_t memory);
+
+/* The board as for node_start: its `who` fills in board, loader, serial number
+ * and boot number; kind, version, digest and number are the loader's to say.
+ * loader_slots_choose has been called.  NULL: the arena does not suffice, or
+ * the identity breaks a limit of the cube: *why. */
+struct loader *loader_start(const struct node_board *board,
+                            struct loader_slots *slots, const char **why);
+
+/* NODE_STOPPED: the board is to restart, for the reason of loader_reset_why:
+ * NODE_RESET_STAY: not to start an image; else it may. */
+enum node_event loader_step(struct loader *loader);
+enum node_reset loader_reset_why(const struct loader *loader);
+
+/* State of its links, for the board's own console: of how many. */
+unsigned loader_links(const struct loader *loader,
+                      struct node_link_state state[CUBE_LINKS_MAX]);
+
+/* Microseconds until loader_step must be called even if no byte comes. */
+uint64_t loader_wait_us(const struct loader *loader);
+
+#endif

@@ -1,0 +1,117 @@
+/* Two slots for images in a board's flash, one of them in use, and which of
+ * them the next start is of.  An image that was brought is on trial: a start of
+ * it that ends in a fault, or the third that confirms nothing, falls back to
+ * the other.  What is confirmed is left only when it is good no more.
+ *
+ * Of the flash, sectors 0 and 1 are boots.h's, 2 and 3 hold this state, 4 the
+ * board's serial number; slots begin at sector 16, where there are 64, else at
+ * sector 5, and take half of the rest each, 1 MB at most.  A slot is the image
+ * byte for byte, its header's page written last; the last sectors of a slot are
+ * the journal of what is coming (incoming.h).
+ *
+ * Memory: struct loader_slots; a hash of LOADER_HASH_BYTES on the stack.
+ * Work: loader_slots_choose reads the image that it chooses once for its
+ * digest, and proves its signature; the others program one record.
+ *
+ *     loader_slots_open(&slots, &rules);
+ *     unsigned slot = loader_slots_choose(&slots, ended_badly);
+ *     if (slot < LOADER_SLOTS && loader_slots_try(&slots))
+ *         flash->read(flash->context, loader_slots_code(&slots, slot),
+ *                     to, slots.image[slot].bytes); // loader_look_copy
+ */
+#ifndef NODE_LOADER_SLOTS_H
+#define NODE_LOADER_SLOTS_H
+
+#include "flash.h"
+#include "image.h"
+
+enum {
+    LOADER_SLOTS = 2, /* and for none */
+    LOADER_TRIES = 3, /* starts of an image on trial */
+    LOADER_SERIAL_BYTES = 8,
+    LOADER_SLICE_BYTES = 1024 /* that are hashed at a time */
+};
+
+/* What the board takes, and from whom. */
+struct loader_rules {
+    const struct loader_flash *flash;
+    const struct loader_suite *suite;
+    const uint8_t *key; /* LOADER_PUBLIC_BYTES */
+    const char *board;  /* as --board names it */
+    uint32_t address;   /* that images are linked for, */
+    uint32_t room;      /* and bytes of code that fit there */
+    /* Called while loader_slots_choose, or loader_look_copy, has long work, so
+     * that a watchdog waits.  NULL: nobody does. */
+    void (*alive)(void);
+};
+
+/* What a record in the flash says; all zeros: there was none. */
+struct loader_state {
+    uint32_t floor; /* the lowest number that is taken */
+    uint8_t slot;   /* in use; LOADER_SLOTS: none is */
+    uint8_t trial;  /* it has confirmed nothing so far, */
+    uint8_t tries;  /* and was started so many times */
+};
+
+struct loader_slots {
+    const struct loader_rules *rules;
+    struct loader_state state;
+    /* Of each slot, once it was looked at: what keeps it from being started,
+     * and its header. */
+    bool known[LOADER_SLOTS];
+    enum loader_fault fault[LOADER_SLOTS];
+    struct loader_image image[LOADER_SLOTS];
+};
+
+void loader_slots_open(struct loader_slots *slots,
+                       const struct loader_rules *rules);
+
+static inline void loader_slots_alive(const struct loader_slots *slots)
+{
+    if (slots->rules->alive != NULL) {
+        slots->rules->alive();
+    }
+}
+
+/* The slot of the next start; LOADER_SLOTS: none is good.  ended_badly: the
+ * last start was of an image, and ended in a fault or by the watchdog; it falls
+ * back then, if it is on trial.  To be called once a start, before all else. */
+unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly);
+
+/* What a loader with these rules has against a header, its signature apart; the
+ * header is in *image then, but with LOADER_NO_IMAGE. */
+enum loader_fault loader_slots_suits(const struct loader_slots *slots,
+                                     const uint8_t header[LOADER_HEADER_BYTES],
+                                     struct loader_image *image);
+
+/* The next start is of this one, or of none.  False: the flash does not take
+ * the record. */
+bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial);
+
+/* Counts a start of the slot in use, if it is on trial, right before the jump.
+ * False: the flash does not take the record; it must not be started. */
+bool loader_slots_try(struct loader_slots *slots);
+
+/* Of the image that runs, from this slot: it has come up.  It needs nothing
+ * else of the loader.  Nothing is written where it is so already.  False: the
+ * flash does not take the record. */
+bool loader_slots_confirm(const struct loader_flash *flash, unsigned slot);
+
+/* Where its code is in the flash. */
+uint32_t loader_slots_code(const struct loader_slots *slots, unsigned slot);
+
+/* Puts an image, checked by the caller, into slot 0 of a flash that no board
+ * is using, and makes it the one in use: for who makes boards' chips.  False:
+ * it does not fit. */
+bool loader_slots_install(const struct loader_flash *flash,
+                          const uint8_t *image, uint32_t bytes);
+
+/* The board's serial number; false: it has none, and it is zeros.  It is given
+ * once, and whatever is told later changes nothing; false: the flash does not
+ * take it. */
+bool loader_slots_serial(const struct loader_flash *flash,
+                         uint8_t serial[LOADER_SERIAL_BYTES]);
+bool loader_slots_name(const struct loader_flash *flash,
+                       const uint8_t serial[LOADER_SERIAL_BYTES]);
+
+#endif

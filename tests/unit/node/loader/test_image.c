@@ -1,0 +1,142 @@
+/* The header of an image: what it says comes back, any damage is found, and who
+ * has signed it is told apart. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "node/loader/image.h"
+
+static struct loader_image sample(void)
+{
+    struct loader_image image = {.bytes = 1234567,
+                                 .address = 0x10000,
+                                 .number = 0x01020304,
+                                 .flags = LOADER_NO_WAY_BACK,
+                                 .board = "mps2-an500",
+                                 .version = "0.1.0"};
+    memset(image.digest, 0xd1, sizeof image.digest);
+    memset(image.key, 0x4e, sizeof image.key);
+    memset(image.signature, 0x51, sizeof image.signature);
+    return image;
+}
+
+static void what_is_packed_comes_back(void **unused)
+{
+    struct loader_image image = sample(), back;
+    uint8_t bytes[LOADER_HEADER_BYTES], again[LOADER_HEADER_BYTES];
+    (void)unused;
+    loader_image_pack(&image, bytes);
+    assert_memory_equal(bytes, "incodeI1", 8);
+    assert_int_equal(bytes[16], 4); /* the low byte first */
+    assert_int_equal(loader_image_unpack(&back, bytes), LOADER_GOOD);
+    assert_int_equal(back.bytes, image.bytes);
+    assert_int_equal(back.address, image.address);
+    assert_int_equal(back.number, image.number);
+    assert_int_equal(back.flags, image.flags);
+    assert_string_equal(back.board, "mps2-an500");
+    assert_string_equal(back.version, "0.1.0");
+    assert_memory_equal(back.digest, image.digest, sizeof back.digest);
+    assert_memory_equal(back.key, image.key, sizeof back.key);
+    assert_memory_equal(back.signature, image.signature, sizeof back.signature);
+    loader_image_pack(&back, again);
+    assert_memory_equal(bytes, again, sizeof bytes);
+}
+
+/* The longest texts have no zero at their end. */
+static void texts_fill_their_fields(void **unused)
+{
+    struct loader_image image = sample(), back;
+    uint8_t bytes[LOADER_HEADER_BYTES];
+    (void)unused;
+    memset(image.board, 'b', LOADER_BOARD_BYTES);
+    memset(image.version, 'v', LOADER_VERSION_BYTES);
+    loader_image_pack(&image, bytes);
+    assert_int_equal(loader_image_unpack(&back, bytes), LOADER_GOOD);
+    assert_int_equal(strlen(back.board), LOADER_BOARD_BYTES);
+    assert_int_equal(strlen(back.version), LOADER_VERSION_BYTES);
+}
+
+static void every_false_bit_is_found(void **unused)
+{
+    struct loader_image image = sample();
+    uint8_t bytes[LOADER_HEADER_BYTES];
+    (void)unused;
+    loader_image_pack(&image, bytes);
+    for (unsigned bit = 0; bit < 8 * sizeof bytes; bit++) {
+        bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
+        assert_int_equal(loader_image_unpack(&image, bytes), LOADER_NO_IMAGE);
+        bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
+    }
+    memset(bytes, 0xff, sizeof bytes); /* an erased page */
+    assert_int_equal(loader_image_unpack(&image, bytes), LOADER_NO_IMAGE);
+    memset(bytes, 0, sizeof bytes);
+    assert_int_equal(loader_image_unpack(&image, bytes), LOADER_NO_IMAGE);
+}
+
+/* Stands for Ed25519: what it is asked, and its word. */
+static struct {
+    unsigned asked;
+    size_t size;
+    bool word;
+} judge;
+
+static bool good(const uint8_t signature[LOADER_SIGNATURE_BYTES],
+                 const uint8_t *bytes, size_t size,
+                 const uint8_t key[LOADER_PUBLIC_BYTES])
+{
+    judge.asked++;
+    judge.size = size;
+    assert_int_equal(signature[0], 0x51);
+    assert_int_equal(bytes[0], 'i');
+    assert_int_equal(key[0], 0x4e);
+    return judge.word;
+}
+
+static void a_signer_is_known_by_key_and_signature(void **unused)
+{
+    static const struct loader_suite suite = {.good = good};
+    struct loader_image image = sample();
+    uint8_t bytes[LOADER_HEADER_BYTES], key[LOADER_PUBLIC_BYTES];
+    (void)unused;
+    memcpy(key, image.key, sizeof key);
+    loader_image_pack(&image, bytes);
+    judge.word = true;
+    assert_int_equal(loader_image_signed(bytes, &suite, key), LOADER_GOOD);
+    assert_int_equal(judge.size, LOADER_SIGNED_BYTES);
+    judge.word = false;
+    assert_int_equal(loader_image_signed(bytes, &suite, key),
+                     LOADER_WRONG_SIGNATURE);
+    key[LOADER_PUBLIC_BYTES - 1] ^= 1;
+    assert_int_equal(loader_image_signed(bytes, &suite, key), LOADER_WRONG_KEY);
+    memset(image.key, 0, sizeof image.key);
+    loader_image_pack(&image, bytes);
+    assert_int_equal(loader_image_signed(bytes, &suite, key), LOADER_UNSIGNED);
+    memset(key, 0, sizeof key); /* nobody's key is nobody's signature */
+    assert_int_equal(loader_image_signed(bytes, &suite, key), LOADER_UNSIGNED);
+    assert_int_equal(judge.asked, 2);
+}
+
+static void every_fault_has_its_text(void **unused)
+{
+    (void)unused;
+    assert_null(loader_fault_text(LOADER_GOOD));
+    for (unsigned i = LOADER_GOOD + 1; i <= LOADER_FAULTS; i++) {
+        assert_non_null(loader_fault_text((enum loader_fault)i));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_packed_comes_back),
+        cmocka_unit_test(texts_fill_their_fields),
+        cmocka_unit_test(every_false_bit_is_found),
+        cmocka_unit_test(a_signer_is_known_by_key_and_signature),
+        cmocka_unit_test(every_fault_has_its_text),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
