@@ -17,13 +17,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "flash.h"
+#include "node/loader/flash.h"
 #include "uart.h"
 
 /* Of the linker script, which asserts it. */
 enum {
     BARE_STACK_BYTES = 49152,
-    BARE_NOINIT_BYTES = 256 /* memory that a restart leaves as it is */
+    /* Memory that a restart leaves as it is. */
+    BARE_REASON_BYTES = 256,
+    BARE_HANDOVER_BYTES = 256
 };
 
 /* --- what a board gives --------------------------------------------------- */
@@ -35,7 +37,9 @@ struct board_facts {
     unsigned ports;
     uint32_t baud;
     size_t data_bytes; /* of its data memory: .noinit included, at most 4 MiB */
-    const struct bare_flash *flash; /* NULL: it has none */
+    const struct loader_flash *flash; /* NULL: it has none */
+    /* Where its loader copies an image to, and runs it; 0: it has no loader. */
+    uint32_t image_at, image_bytes;
 };
 
 extern const struct board_facts board_facts;
@@ -71,9 +75,13 @@ void board_feed(void);
  * have been given goes first, as far as they still can. */
 _Noreturn void board_restart(void);
 
+/* Of a board that has a loader: runs the image that lies at this address, as
+ * after power on, but that the guard goes on. */
+_Noreturn void board_launch(uint32_t address);
+
 /* --- what all share ------------------------------------------------------- */
 
-/* The node program, from start to restart. */
+/* The node program, or the loader, from start to restart. */
 _Noreturn void bare_main(void);
 
 #endif

@@ -10,9 +10,9 @@
 
 enum { MAGIC = 0x42415245 };
 
-static struct bare_reason kept __attribute__((section(".noinit")));
+static struct bare_reason kept __attribute__((section(".noinit.reason")));
 
-static_assert(sizeof kept <= BARE_NOINIT_BYTES, "more than start.ld has");
+static_assert(sizeof kept <= BARE_REASON_BYTES, "more than start.ld has");
 
 static uint32_t sum(void)
 {
@@ -21,7 +21,7 @@ static uint32_t sum(void)
 
 struct bare_reason bare_reason_take(void)
 {
-    if (kept.magic != MAGIC || kept.crc != sum() || kept.kind > BARE_HUNG) {
+    if (kept.magic != MAGIC || kept.crc != sum() || kept.kind > BARE_BOOT) {
         memset(&kept, 0, sizeof kept);
         kept.magic = MAGIC;
         kept.kind = BARE_POWER_ON;
@@ -29,6 +29,13 @@ struct bare_reason bare_reason_take(void)
     kept.starts++;
     struct bare_reason reason = kept;
     bare_reason_keep(BARE_OUTSIDE, NULL);
+    return reason;
+}
+
+struct bare_reason bare_reason_taken(enum bare_reason_kind kind)
+{
+    struct bare_reason reason = kept;
+    reason.kind = kind <= BARE_BOOT ? kind : BARE_OUTSIDE;
     return reason;
 }
 
@@ -49,6 +56,11 @@ const char *bare_reason_name(enum bare_reason_kind kind)
                                         [BARE_OUTSIDE] = "reset from outside",
                                         [BARE_RUN_OVER] = "the run is over",
                                         [BARE_FAULT] = "a fault",
-                                        [BARE_HUNG] = "the program hung"};
+                                        [BARE_HUNG] = "the program hung",
+                                        [BARE_ASKED] = "the host's order",
+                                        [BARE_STAY] = "the host's order to "
+                                                      "stay in the loader",
+                                        [BARE_BOOT] = "the loader's start of "
+                                                      "an image"};
     return names[kind];
 }

@@ -1,5 +1,6 @@
 /* Why a board was restarted, as it was known before: kept in memory that a
- * restart leaves alone, and a loss of power does not.
+ * restart leaves alone, and a loss of power does not.  A loader and the images
+ * that it starts agree on its layout and place, of whatever version they are.
  *
  * Memory: struct bare_reason, in .noinit.  Work: a CRC over it.
  *
@@ -17,7 +18,10 @@ enum bare_reason_kind {
     BARE_OUTSIDE, /* somebody else has reset it: a button, a debugger */
     BARE_RUN_OVER,
     BARE_FAULT,
-    BARE_HUNG /* the guard has */
+    BARE_HUNG,  /* the guard has */
+    BARE_ASKED, /* the host has asked for it, */
+    BARE_STAY,  /* and that the loader start no image */
+    BARE_BOOT   /* the loader has: it starts an image */
 };
 
 enum { BARE_REASON_TEXT = 192 };
@@ -34,6 +38,10 @@ struct bare_reason {
 /* For a start: the reason of this one.  From now on it would be BARE_OUTSIDE.
  */
 struct bare_reason bare_reason_take(void);
+
+/* For a program that a loader has started, which has taken it; a kind that only
+ * a later loader knows is BARE_OUTSIDE. */
+struct bare_reason bare_reason_taken(enum bare_reason_kind kind);
 
 /* Before a restart; text: of a fault, or NULL. */
 void bare_reason_keep(enum bare_reason_kind kind, const char *text);

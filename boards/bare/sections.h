@@ -12,8 +12,9 @@
 #include <stdint.h>
 
 extern const uint8_t bare_code[], bare_code_end[];
-extern uint32_t bare_node_stack[];               /* BARE_STACK_BYTES */
-extern uint32_t bare_handler_stack_end[];        /* behind the former */
+extern const uint8_t bare_code_room[];    /* where the next program may begin */
+extern uint32_t bare_node_stack[];        /* BARE_STACK_BYTES */
+extern uint32_t bare_handler_stack_end[]; /* behind the former */
 extern uint8_t bare_tables[], bare_tables_end[]; /* .data and .bss */
 extern uint8_t bare_arena[], bare_arena_end[];
 

@@ -119,3 +119,35 @@ function board_unlock
     msr primask, r0
     isb
     bx lr
+
+/* Runs the image whose vectors lie at r0: as after a reset, caches written back
+ * and off, nothing protected, no interrupt on or due. */
+function board_launch
+    cpsid i
+    mov r4, r0
+    bl board_processor_stop
+    movs r0, #0
+    ldr r1, =0xE000ED94            /* MPU: CTRL */
+    str r0, [r1]
+    ldr r1, =0xE000E010            /* SysTick */
+    str r0, [r1]
+    mvns r0, r0
+    ldr r1, =0xE000E180            /* interrupts 0 .. 31: off, */
+    str r0, [r1]
+    ldr r1, =0xE000E280            /* and not due, */
+    str r0, [r1]
+    ldr r1, =0xE000ED04            /* ICSR: nor a tick */
+    mov r0, #0x02000000
+    str r0, [r1]
+    ldr r1, =0xE000ED08            /* VTOR */
+    str r4, [r1]
+    dsb
+    isb
+    ldr r0, [r4]
+    msr msp, r0
+    movs r0, #0
+    msr control, r0
+    isb
+    ldr r0, [r4, #4]
+    bx r0
+    .ltorg

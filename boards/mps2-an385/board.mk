@@ -9,3 +9,5 @@ emulator = qemu-system-arm -M mps2-an385,memory-backend=ram -object \
 # that an interrupt comes upon.
 fault = cmsdk_fault
 exception_bytes = 36
+# Where its loader runs images, behind itself.
+image_at = 0x10000

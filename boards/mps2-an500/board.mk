@@ -9,3 +9,5 @@ emulator = qemu-system-arm -M mps2-an500,memory-backend=ram -object \
 # that an interrupt comes upon.
 fault = cmsdk_fault
 exception_bytes = 108
+# Where its loader runs images, behind itself.
+image_at = 0x10000

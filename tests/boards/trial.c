@@ -2,7 +2,7 @@
  * a board's start-up code.  Each letter that comes over the console is an order
  * (tests/boards/trial). */
 #include "boards/bare/bare.h"
-#include "boards/bare/boots.h"
+#include "node/loader/boots.h"
 #include "boards/bare/console.h"
 #include "boards/bare/fault_text.h"
 #include "boards/bare/reason.h"
@@ -127,7 +127,7 @@ _Noreturn void bare_main(void)
     board_unlock(0);
     struct bare_reason reason = bare_reason_take();
     if (board_facts.flash != NULL) {
-        (void)bare_boots_next(board_facts.flash, &boot);
+        (void)loader_boots_next(board_facts.flash, &boot);
     }
     say(bare_reason_name(reason.kind), ", boot ", boot, "");
     for (;;) {

@@ -7,10 +7,10 @@
 
 #include <cmocka.h>
 
-#include "boards/bare/boots.h"
-#include "boards/bare/flash_ram.h"
+#include "node/loader/boots.h"
+#include "node/loader/flash_ram.h"
 
-enum { BYTES = FLASH_RAM_SECTOR * FLASH_RAM_SECTORS };
+enum { SECTORS = 4, BYTES = LOADER_RAM_SECTOR * SECTORS };
 
 /* Half of a byte's bits that were to change have. */
 static uint8_t half_done(uint8_t from, uint8_t to)
@@ -43,7 +43,7 @@ static bool program(void *context, uint32_t at, const void *bytes, size_t size)
 {
     const uint8_t *in = bytes;
     (void)context;
-    assert_true(size <= FLASH_RAM_PAGE - at % FLASH_RAM_PAGE);
+    assert_true(size <= LOADER_RAM_PAGE - at % LOADER_RAM_PAGE);
     for (size_t i = 0; i < size; i++) {
         assert_int_equal(chip.bytes[at + i] & in[i], in[i]);
         change(at + i, (uint8_t)(chip.worn ? 0 : in[i]));
@@ -54,15 +54,16 @@ static bool program(void *context, uint32_t at, const void *bytes, size_t size)
 static bool erase(void *context, uint32_t sector)
 {
     (void)context;
-    for (size_t i = 0; i < FLASH_RAM_SECTOR; i++) {
-        change(sector * FLASH_RAM_SECTOR + i, 0xff);
+    for (size_t i = 0; i < LOADER_RAM_SECTOR; i++) {
+        change(sector * LOADER_RAM_SECTOR + i, 0xff);
     }
     return true;
 }
 
-static const struct bare_flash flash = {
-    chip.bytes,     FLASH_RAM_SECTOR, FLASH_RAM_PAGE, FLASH_RAM_SECTORS,
-    flash_ram_read, program,          erase};
+static const struct loader_flash flash = {
+    chip.bytes, LOADER_RAM_SECTOR, LOADER_RAM_PAGE,
+    SECTORS,    loader_ram_read,   program,
+    erase};
 
 /* 0: power was lost before the number was told. */
 static uint32_t start(long until_loss)
@@ -70,7 +71,7 @@ static uint32_t start(long until_loss)
     uint32_t boot = 0;
     chip.until_loss = until_loss;
     if (setjmp(chip.lost) == 0) {
-        assert_true(bare_boots_next(&flash, &boot));
+        assert_true(loader_boots_next(&flash, &boot));
         assert_true(boot > 0);
         return boot;
     }
@@ -127,7 +128,7 @@ static void test_boots_outlive_every_loss(void **state)
 static void test_boots_pass_over_what_settles(void **state)
 {
     (void)state;
-    for (long loss = 0; loss < BARE_BOOT_BYTES; loss++) {
+    for (long loss = 0; loss < LOADER_BOOT_BYTES; loss++) {
         memset(chip.bytes, 0xff, BYTES);
         assert_int_equal(start(-1), 1);
         assert_int_equal(start(-1), 2);
@@ -135,12 +136,12 @@ static void test_boots_pass_over_what_settles(void **state)
         memcpy(whole, chip.bytes, BYTES);
         uint32_t settled = start(-1);
         memcpy(whole, chip.bytes, BYTES);
-        memset(chip.bytes + 2 * BARE_BOOT_BYTES, 0xff, BARE_BOOT_BYTES);
+        memset(chip.bytes + 2 * LOADER_BOOT_BYTES, 0xff, LOADER_BOOT_BYTES);
         assert_int_equal(start(loss), 0);
         uint32_t next = start(-1);
         assert_true(next >= settled);
-        memcpy(chip.bytes + 2 * BARE_BOOT_BYTES, whole + 2 * BARE_BOOT_BYTES,
-               BARE_BOOT_BYTES);
+        memcpy(chip.bytes + 2 * LOADER_BOOT_BYTES,
+               whole + 2 * LOADER_BOOT_BYTES, LOADER_BOOT_BYTES);
         assert_true(start(-1) > next);
     }
 }
@@ -167,38 +168,40 @@ static void test_boots_tell_of_a_worn_flash(void **state)
     assert_int_equal(start(-1), 1);
     chip.worn = true;
     chip.until_loss = -1;
-    assert_false(bare_boots_next(&flash, &boot));
+    assert_false(loader_boots_next(&flash, &boot));
     chip.worn = false;
     assert_true(start(-1) > 1);
 }
 
 static void test_flash_ram_has_a_flash_s_rules(void **state)
 {
-    static uint8_t memory[BYTES];
-    const struct bare_flash ram = FLASH_RAM(memory);
+    enum { ALL = LOADER_RAM_SECTOR * LOADER_RAM_SECTORS };
+    static uint8_t memory[ALL];
+    const struct loader_flash ram = LOADER_RAM(memory);
     uint8_t out[4], in[4] = {0x0f, 0xf0, 0x55, 0xff};
-    uint8_t wide[FLASH_RAM_PAGE + 1] = {0};
+    uint8_t wide[LOADER_RAM_PAGE + 1] = {0};
     (void)state;
     assert_true(ram.erase(ram.context, 1));
-    assert_int_equal(memory[FLASH_RAM_SECTOR - 1], 0);
-    assert_int_equal(memory[2 * FLASH_RAM_SECTOR - 1], 0xff);
-    assert_int_equal(memory[2 * FLASH_RAM_SECTOR], 0);
-    assert_true(ram.program(ram.context, FLASH_RAM_SECTOR + 8, in, 4));
-    ram.read(ram.context, FLASH_RAM_SECTOR + 8, out, 4);
+    assert_int_equal(memory[LOADER_RAM_SECTOR - 1], 0);
+    assert_int_equal(memory[2 * LOADER_RAM_SECTOR - 1], 0xff);
+    assert_int_equal(memory[2 * LOADER_RAM_SECTOR], 0);
+    assert_true(ram.program(ram.context, LOADER_RAM_SECTOR + 8, in, 4));
+    ram.read(ram.context, LOADER_RAM_SECTOR + 8, out, 4);
     assert_memory_equal(in, out, 4);
     in[0] = 0x07; /* a bit more is cleared, */
-    assert_true(ram.program(ram.context, FLASH_RAM_SECTOR + 8, in, 4));
+    assert_true(ram.program(ram.context, LOADER_RAM_SECTOR + 8, in, 4));
     in[0] = 0x0f; /* and none is set */
-    assert_false(ram.program(ram.context, FLASH_RAM_SECTOR + 8, in, 4));
-    ram.read(ram.context, FLASH_RAM_SECTOR + 8, out, 4);
+    assert_false(ram.program(ram.context, LOADER_RAM_SECTOR + 8, in, 4));
+    ram.read(ram.context, LOADER_RAM_SECTOR + 8, out, 4);
     assert_int_equal(out[0], 0x07);
-    assert_false(ram.program(ram.context, FLASH_RAM_SECTOR, wide, sizeof wide));
     assert_false(
-        ram.program(ram.context, FLASH_RAM_SECTOR + FLASH_RAM_PAGE - 2, in, 4));
-    assert_int_equal(memory[FLASH_RAM_SECTOR], 0xff);
-    assert_false(ram.program(ram.context, BYTES, in, 1));
-    assert_false(ram.erase(ram.context, FLASH_RAM_SECTORS));
-    ram.read(ram.context, BYTES - 1, out, 2);
+        ram.program(ram.context, LOADER_RAM_SECTOR, wide, sizeof wide));
+    assert_false(ram.program(ram.context,
+                             LOADER_RAM_SECTOR + LOADER_RAM_PAGE - 2, in, 4));
+    assert_int_equal(memory[LOADER_RAM_SECTOR], 0xff);
+    assert_false(ram.program(ram.context, ALL, in, 1));
+    assert_false(ram.erase(ram.context, LOADER_RAM_SECTORS));
+    ram.read(ram.context, ALL - 1, out, 2);
     assert_int_equal(out[1], 0xff);
 }
 
