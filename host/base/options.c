@@ -10,7 +10,7 @@
 
 enum {
     KEY_ANSWER = 1,
-    KEY_LONG = 256,
+    KEY_LONG = 256, /* and beyond: getopt takes names of one key for one */
     SHORT_MAX = 2 * HOST_OPTIONS_MAX + 8,
     NAMES_MAX = 160
 };
@@ -44,8 +44,8 @@ static void fill(struct table *t, const struct argp_option *options,
         }
         assert(i < HOST_OPTIONS_MAX - 1);
         if (o->name != NULL) {
-            t->name[n++] =
-                (struct option){o->name, o->arg != NULL, NULL, KEY_LONG};
+            t->name[n++] = (struct option){o->name, o->arg != NULL, NULL,
+                                           KEY_LONG + (int)i};
         }
         if (o->key > ' ' && o->key < 0x7f) {
             t->letters[letters++] = (char)o->key;
@@ -121,7 +121,7 @@ static int refuse_letter(const struct table *t, const char *command,
 static int refuse(const struct table *t, char **argv, struct host_error *error)
 {
     const char *word = argv[optind - 1], *next = argv[optind];
-    if (optopt == 0 || optopt == KEY_LONG || optopt == KEY_ANSWER) {
+    if (optopt == 0 || optopt >= KEY_LONG || optopt == KEY_ANSWER) {
         return refuse_long(t, argv[0], word, optopt != 0, error);
     }
     /* Before the last letter of a word, it is still at that word. */

@@ -107,8 +107,9 @@ int host_parse_bytes(const char *text, uint64_t *bytes)
     return 0;
 }
 
-int host_parse_nodes(const char *text, unsigned most, const char *more,
-                     unsigned *nodes, struct host_error *error)
+int host_parse_nodes(const char *option, const char *text, unsigned most,
+                     const char *more, unsigned *nodes,
+                     struct host_error *error)
 {
     char allowed[ALLOWED_MAX] = "1";
     uint64_t n = 0;
@@ -121,7 +122,8 @@ int host_parse_nodes(const char *text, unsigned most, const char *more,
         size_t used = strlen(allowed);
         snprintf(allowed + used, sizeof allowed - used, ", %u", k);
     }
-    return host_fail(error, HOST_USAGE, "--nodes %s: %s; allowed: %s%s", text,
+    return host_fail(error, HOST_USAGE, "%s %s: %s; allowed: %s%s", option,
+                     text,
                      !number    ? "not a number"
                      : n > most ? "more nodes than there can be here"
                                 : "not a power of two, as a cube has nodes",

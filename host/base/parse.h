@@ -26,9 +26,10 @@ int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
  * *bytes stays as it is. */
 int host_parse_bytes(const char *text, uint64_t *bytes);
 
-/* The value of --nodes: a power of two, up to `most`, which is one.  `more`:
- * what else to do for more nodes, or "". */
-int host_parse_nodes(const char *text, unsigned most, const char *more,
-                     unsigned *nodes, struct host_error *error);
+/* The value of `option`, as --nodes: a power of two, up to `most`, which is
+ * one.  `more`: what else to do for more nodes, or "". */
+int host_parse_nodes(const char *option, const char *text, unsigned most,
+                     const char *more, unsigned *nodes,
+                     struct host_error *error);
 
 #endif

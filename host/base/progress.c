@@ -16,8 +16,11 @@ enum {
     BAR_MAX = 40,
     BAR_MIN = 6,
     WIDTH = 80,
+    HEIGHT = 24,
     TEXT = 256,
-    TEXT_MAX = 2048
+    TEXT_MAX = 2048,
+    ROWS_MAX = 64,
+    GONE_BYTES = 24
 };
 
 static struct {
@@ -27,6 +30,9 @@ static struct {
     uint64_t added;
     char text[TEXT]; /* as it stands */
     volatile sig_atomic_t shown;
+    unsigned rows; /* of a table; 0: there is the line */
+    char row[ROWS_MAX][TEXT];
+    char gone[GONE_BYTES]; /* what takes away what is shown */
 } line;
 
 /* All at once, so that no other process writes in between. */
@@ -50,13 +56,43 @@ static unsigned columns(void)
     return all < TEXT / 2 ? all - 1 : TEXT / 2;
 }
 
+/* What takes so many rows away is there before they are. */
+static void show(const char *text, size_t bytes, unsigned rows)
+{
+    if (rows > 1) {
+        snprintf(line.gone, sizeof line.gone, "\033[%uA\r\033[J", rows - 1);
+    } else {
+        snprintf(line.gone, sizeof line.gone, "\r\033[K");
+    }
+    line.shown = 1;
+    put(text, bytes);
+}
+
+/* Over what stands there, which flickers less than taking it away. */
+static void draw_rows(void)
+{
+    char text[ROWS_MAX * (TEXT + 8)];
+    int n = 0, width = (int)columns();
+    if (line.shown && line.rows > 1) {
+        n = snprintf(text, sizeof text, "\033[%uA", line.rows - 1);
+    }
+    for (unsigned i = 0; i < line.rows; i++) {
+        n += snprintf(text + n, sizeof text - (size_t)n, "%s\r%.*s\033[K",
+                      i == 0 ? "" : "\n", width, line.row[i]);
+    }
+    show(text, (size_t)n, line.rows);
+}
+
 static void draw(void)
 {
     char text[TEXT + 16];
+    if (line.rows > 0) {
+        draw_rows();
+        return;
+    }
     int n =
         snprintf(text, sizeof text, "\r%.*s\033[K", (int)columns(), line.text);
-    line.shown = 1;
-    put(text, (size_t)n);
+    show(text, (size_t)n, 1);
 }
 
 void host_progress_begin(bool wanted)
@@ -104,11 +140,12 @@ static struct tails tails_of(double part, double amount, double seconds)
     return t;
 }
 
+static const char hashes[] = "########################################";
+
 /* As much as fits: the phase and the percentage before all, then the time that
  * is left, a bar, the rate and the amount. */
 static void compose(double part, bool has_total, struct tails tails)
 {
-    static const char hashes[] = "########################################";
     char head[TEXT / 4];
     unsigned width = columns(), tail = 0;
     int n = snprintf(head, sizeof head, "%.32s", line.what);
@@ -158,12 +195,58 @@ void host_progress_add(uint64_t amount)
     host_progress_show(0, 0, line.added);
 }
 
+unsigned host_progress_rows_max(void)
+{
+    struct winsize size;
+    if (!line.wanted) {
+        return 0;
+    }
+    bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row;
+    unsigned all = known ? size.ws_row : HEIGHT;
+    return all <= 2 ? 1 : all - 2 < ROWS_MAX ? all - 2 : ROWS_MAX;
+}
+
+void host_progress_rows(unsigned rows)
+{
+    host_progress_erase();
+    line.rows = rows < ROWS_MAX ? rows : ROWS_MAX;
+    memset(line.row, 0, sizeof line.row);
+    line.next_us = 0;
+}
+
+void host_progress_row(unsigned row, const char *head, double part,
+                       const char *tail)
+{
+    char bar[BAR_MAX + 16] = "";
+    unsigned width = columns();
+    if (row >= line.rows) {
+        return;
+    }
+    unsigned used = (unsigned)(strlen(head) + strlen(tail)) + 10;
+    if (part >= 0.0 && used + BAR_MIN <= width) {
+        unsigned cells = width - used < BAR_MAX ? width - used : BAR_MAX;
+        int full = (int)((part < 1.0 ? part : 1.0) * cells);
+        snprintf(bar, sizeof bar, " [%.*s%*s] %3d %%", full, hashes,
+                 (int)cells - full, "", (int)(100.0 * part));
+    }
+    snprintf(line.row[row], sizeof line.row[row], "%.64s%s %.100s", head, bar,
+             tail);
+}
+
+void host_progress_draw(void)
+{
+    uint64_t now = host_now_us();
+    if (line.wanted && line.rows > 0 && now >= line.next_us) {
+        line.next_us = now + EVERY_US;
+        draw();
+    }
+}
+
 void host_progress_erase(void)
 {
-    static const char gone[] = "\r\033[K";
     if (line.shown) {
         line.shown = 0;
-        put(gone, sizeof gone - 1);
+        put(line.gone, strlen(line.gone));
     }
 }
 
@@ -171,6 +254,14 @@ void host_progress_end(void)
 {
     host_progress_erase();
     line.wanted = false;
+    line.rows = 0;
+}
+
+static void (*show_note)(const char *text);
+
+void host_note_to(void (*take)(const char *text))
+{
+    show_note = take;
 }
 
 void host_note(const char *format, ...)
@@ -183,6 +274,10 @@ void host_note(const char *format, ...)
     (void)vsnprintf(raw, sizeof raw, format, list);
     va_end(list);
     host_text_printable(text + head, sizeof text - head - 1, raw);
+    if (show_note != NULL) {
+        show_note(text + head);
+        return;
+    }
     strcat(text, "\n");
     host_progress_erase();
     put(text, strlen(text));

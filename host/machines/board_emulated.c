@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "chip.h"
 #include "console.h"
 #include "emulator.h"
 #include "host/base/clock.h"
@@ -77,8 +78,10 @@ static int refuse_file(const char *path, struct host_error *error)
                      path, strerror(errno), HOST_FLASH_BYTES >> 20);
 }
 
-/* A chip that is new, unless a file has one. */
-static int make_flash(struct board *board, bool named, struct host_error *error)
+/* A chip that is new, unless a file has one, with the board's image; empty: as
+ * it is. */
+static int make_flash(struct board *board, bool named, bool empty,
+                      struct host_error *error)
 {
     struct stat about;
     board->flash = named ? open(board->chip, O_RDWR | O_CREAT | O_CLOEXEC, 0600)
@@ -96,7 +99,9 @@ static int make_flash(struct board *board, bool named, struct host_error *error)
         return error->code;
     }
     board->emulator.flash.fd = board->flash;
-    return 0;
+    return empty
+               ? 0
+               : host_chip_install(board->flash, board->emulator.image, error);
 }
 
 /* What UART 0 says where no frames go over it. */
@@ -169,7 +174,7 @@ static int make_board(struct cube *cube, const struct host_bare *bare,
     if (node != 0 && make_log(board, named, error) != 0) {
         return error->code;
     }
-    return bare->flash ? make_flash(board, named, error) : 0;
+    return bare->flash ? make_flash(board, named, options->empty, error) : 0;
 }
 
 static void close_boards(struct cube *cube)
@@ -244,7 +249,7 @@ static void tell_errors(const struct cube *cube)
         said = strncmp(line, "qemu", 4) == 0 ? line : said;
     }
     for (unsigned i = 0; i < cube->cluster.nodes && *image == '\0'; i++) {
-        image = cube->board[i].emulator.image;
+        image = cube->board[i].emulator.kernel;
     }
     if (said != NULL) {
         host_note("%s; is %s whole? make firmware makes it", said, image);
@@ -359,6 +364,7 @@ static const struct host_bare an500 = {.machine = "mps2-an500",
                                        .program = "qemu-system-arm",
                                        .package = "qemu-system-arm",
                                        .image = "mps2-an500.img",
+                                       .loader = "loader/mps2-an500.img",
                                        .uarts = 5,
                                        .flash = true,
                                        .serial_baud = 115200,
@@ -375,6 +381,7 @@ static const struct host_bare an385 = {.machine = "mps2-an385",
                                        .program = "qemu-system-arm",
                                        .package = "qemu-system-arm",
                                        .image = "mps2-an385.img",
+                                       .loader = "loader/mps2-an385.img",
                                        .uarts = 5,
                                        .flash = true,
                                        .serial_baud = 115200,

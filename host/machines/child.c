@@ -9,12 +9,14 @@
 #include <unistd.h>
 
 #include "host/base/clock.h"
+#include "node/board.h"
 
 /* Ends with the reason in `report`, which a program that begins closes. */
 static _Noreturn void become(const struct host_child *child, pid_t host,
                              int report)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    (void)setpgid(0, 0);     /* an interrupt from the terminal is the host's */
     if (getppid() == host) { /* else it ended before it could be watched */
         int null = open("/dev/null", O_RDWR | O_CLOEXEC);
         dup2(null, STDIN_FILENO);
@@ -125,12 +127,14 @@ int host_child_check(struct host_process *process, unsigned node, unsigned link,
     int status = process->status;
     bool killed = WIFSIGNALED(status) &&
                   (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM);
+    bool told = WIFEXITED(status) && (WEXITSTATUS(status) == NODE_RESET_AGAIN ||
+                                      WEXITSTATUS(status) == NODE_RESET_STAY);
     if (now - process->deaths_us > HOST_DEATHS_US) {
         process->deaths = process->faults;
         process->deaths_us = now;
     }
     process->deaths++;
-    process->faults += !killed;
+    process->faults += !killed && !told;
     return process->faults < HOST_FAULTS_MAX &&
                    process->deaths < HOST_DEATHS_MAX
                ? 0

@@ -47,6 +47,7 @@ struct host_cluster_options {
     const char *directory; /* of emulated boards: what is to stay, or to be
                               reached from outside; NULL: nothing */
     bool open;             /* there, all wires between boards: not joined */
+    bool empty;            /* boards have their loaders, and no image */
     uint32_t serial_baud;  /* see machine.h */
     struct host_trouble trouble; /* for tests, of emulated boards */
 };

@@ -27,7 +27,8 @@ static const struct host_board *take_board(const struct host_cube_file *file,
 static int read_node(struct host_cube_file *file, const config_setting_t *group,
                      bool named[HOST_NODES_MAX], struct host_error *error)
 {
-    static const char *const names[] = {"node", "board", NULL};
+    static const char *const names[] = {"node", "board",  "reset", "boot",
+                                        "ssh",  "folder", NULL};
     int node = -1;
     if (!config_setting_is_group(group)) {
         return host_cube_wrong(file, group, error,
@@ -38,10 +39,10 @@ static int read_node(struct host_cube_file *file, const config_setting_t *group,
         return error->code;
     }
     if (!host_cube_take_number(group, "node", 0, (int)file->nodes - 1, &node) ||
-        node < 0 || board == NULL) {
+        node < 0 || config_setting_length(group) < 2) {
         return host_cube_wrong(file, group, error,
                                "nodes: an entry without a node of this cube, "
-                               "or without its board; write { node = 1; board "
+                               "or with nothing of it; write { node = 1; board "
                                "= \"mps2-an500\"; }");
     }
     if (named[node]) {
@@ -49,8 +50,13 @@ static int read_node(struct host_cube_file *file, const config_setting_t *group,
                                "nodes: a node twice; name each once");
     }
     named[node] = true;
-    file->board_of[node] = take_board(file, board, error);
-    return error->code;
+    if (board != NULL) {
+        file->board_of[node] = take_board(file, board, error);
+    }
+    return error->code != 0 ? error->code
+           : host_cube_read_ssh(file, group, (unsigned)node, error) != 0
+               ? error->code
+               : host_cube_read_pins(file, group, (unsigned)node, error);
 }
 
 int host_cube_read_boards(struct host_cube_file *file,
@@ -71,9 +77,9 @@ int host_cube_read_boards(struct host_cube_file *file,
                                "nodes: no list; write nodes = ( { node = 1; "
                                "board = \"mps2-an500\"; }, .. );");
     }
-    for (int i = 0;
-         list != NULL && error->code == 0 && i < config_setting_length(list);
-         i++) {
+    int entries = list == NULL ? 0 : config_setting_length(list);
+    (void)host_cube_make_pins(file, (unsigned)entries, error);
+    for (int i = 0; error->code == 0 && i < entries; i++) {
         (void)read_node(file, config_setting_get_elem(list, (unsigned)i), named,
                         error);
     }

@@ -164,7 +164,8 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
         }
     }
     return host_cube_check_wires(file, links, error) != 0 ||
-                   host_cube_check_boards(file, root, error) != 0
+                   host_cube_check_boards(file, root, error) != 0 ||
+                   host_cube_check_ssh(file, error) != 0
                ? error->code
                : host_cube_check_ends(file, error);
 }
@@ -263,6 +264,10 @@ int host_cube_file_read(struct host_cube_file *file, const char *path,
 void host_cube_file_free(struct host_cube_file *file)
 {
     free(file->wire);
+    free(file->pin);
+    free(file->ssh);
     file->wire = NULL;
+    file->pin = NULL;
+    file->ssh = NULL;
     secure_wipe(file->key, sizeof file->key);
 }

@@ -2,8 +2,8 @@
  * the format, boards/linux/ an example for each kind of wire.  Links between
  * two bare boards go from UART to UART, and may be left out.
  *
- * Memory: about 600 bytes a wire.  Work: one pass over the file, and a look-up
- * for each host name.
+ * Memory: about 600 bytes a wire, 160 a reset or boot line.  Work: one pass
+ * over the file, and a look-up for each host name.
  *
  *     if (host_cube_file_read(&file, "lab.cube", &error) != 0)
  *         return error.code;
@@ -19,18 +19,51 @@
 #include "transport/drivers/serial_port.h"
 #include "transport/drivers/tcp_wire.h"
 
-enum { HOST_NODE_OPTIONS_MAX = 64, HOST_NODE_OPTION_BYTES = 256 };
+enum {
+    HOST_NODE_OPTIONS_MAX = 64,
+    HOST_NODE_OPTION_BYTES = 256,
+    HOST_PIN_NAME_MAX = 64, /* the kernel's have 31 */
+    HOST_SSH_MAX = 128
+};
 
 /* From a node to another, or to the host: CUBE_HOST. */
 struct host_cube_wire {
     uint16_t node, to;
-    unsigned line; /* of the file */
+    unsigned line; /* of the file; 0: no file names it */
     bool serial;   /* else a socket: `node` listens, `to` calls */
     bool insecure; /* over TCP without a key */
     struct tcp_address at, via;
     char device[2][SERIAL_NAME_MAX]; /* at either end */
     uint32_t baud;
     bool rts_cts;
+    bool dtr_low, rts_low; /* of the host's port while it is open */
+};
+
+enum host_line_kind {
+    HOST_LINE_RESET, /* active: the board is held in reset */
+    HOST_LINE_BOOT,  /* active at the end of a reset: its loader waits */
+    HOST_LINES
+};
+
+/* A line to a node's board: one of a GPIO chip, or DTR or RTS of the host's own
+ * serial port, active where it is raised. */
+struct host_cube_pin {
+    uint16_t node;
+    enum host_line_kind kind;
+    unsigned line; /* of the file */
+    int wire;      /* whose port's: the host's 0 or 1; -1: a chip's */
+    bool rts;      /* of a port: not DTR */
+    char chip[HOST_PIN_NAME_MAX]; /* label, or device */
+    char name[HOST_PIN_NAME_MAX]; /* ""; it is known by its offset */
+    unsigned offset;
+    bool active_low, open_drain;
+};
+
+/* A board with Linux that the host logs in to. */
+struct host_cube_ssh {
+    char to[HOST_SSH_MAX];     /* as ssh takes it; "": there is none */
+    char folder[HOST_SSH_MAX]; /* on the board; "": the usual one */
+    unsigned line;             /* of the file */
 };
 
 struct host_cube_file {
@@ -47,6 +80,9 @@ struct host_cube_file {
     uint32_t serial_baud; /* of the slowest serial wire or UART; 0: none */
     struct host_cube_wire *wire;
     unsigned wires;
+    struct host_cube_pin *pin;
+    unsigned pins;
+    struct host_cube_ssh *ssh;  /* of each node; NULL: of none */
     bool local[HOST_NODES_MAX]; /* the host starts this node itself */
 };
 
@@ -67,8 +103,18 @@ static inline bool host_cube_is_bare(const struct host_cube_file *file,
            file->board_of[node]->bare != NULL;
 }
 
+/* NULL: the node has none. */
+const struct host_cube_ssh *host_cube_ssh(const struct host_cube_file *file,
+                                          unsigned node);
+
 /* What its wires are, as statistics name it. */
 const struct host_link *host_cube_link(const struct host_cube_file *file);
+
+/* The node's line of that kind; NULL: it has none. */
+const struct host_cube_pin *host_cube_pin(const struct host_cube_file *file,
+                                          unsigned node,
+                                          enum host_line_kind kind);
+const char *host_line_name(enum host_line_kind kind); /* "reset" */
 
 /* "FILE:LINE: the wire between node 0 and the host" */
 void host_cube_name_wire(const struct host_cube_file *file,

@@ -44,27 +44,22 @@ static bool write_all(int fd, const char *text, size_t size)
 }
 
 /* False: errno says why. */
-static bool fill(int fd)
+static bool fill(int fd, const char *text, size_t size, mode_t mode)
 {
-    char text[TEXT_BYTES];
-    bool good = fchmod(fd, 0600) == 0 && draw_digits(text) &&
-                write_all(fd, text, sizeof text) && fsync(fd) == 0;
-    int reason = errno;
-    secure_wipe(text, sizeof text);
-    errno = reason;
-    return good;
+    return fchmod(fd, mode) == 0 && write_all(fd, text, size) && fsync(fd) == 0;
 }
 
-int host_key_make(const char *path, struct host_error *error)
+int host_key_write(const char *path, const char *text, size_t size, mode_t mode,
+                   struct host_error *error)
 {
-    int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode & 0600);
     if (fd < 0 && errno == EEXIST) {
         return host_fail(error, HOST_INPUT,
                          "%s: is there already, and may be a key in use; give "
                          "another name",
                          path);
     }
-    bool good = fd >= 0 && fill(fd);
+    bool good = fd >= 0 && fill(fd, text, size, mode);
     int reason = errno;
     if (fd >= 0 && close(fd) != 0 && good) {
         reason = errno;
@@ -79,4 +74,17 @@ int host_key_make(const char *path, struct host_error *error)
     return host_fail(error, HOST_INPUT,
                      "%s: %s; give a name where a file can be written", path,
                      strerror(reason));
+}
+
+int host_key_make(const char *path, struct host_error *error)
+{
+    char text[TEXT_BYTES];
+    int status =
+        draw_digits(text)
+            ? host_key_write(path, text, sizeof text, 0600, error)
+            : host_fail(error, HOST_BROKEN,
+                        "%s: %s; the kernel gives no random numbers, try again",
+                        path, strerror(errno));
+    secure_wipe(text, sizeof text);
+    return status;
 }

@@ -1,5 +1,6 @@
 /* What the parts of the cube file's reader share: its settings as libconfig has
- * them (cube_values.c), and its links (cube_wires.c).
+ * them (cube_values.c), its links (cube_wires.c), its boards (cube_boards.c)
+ * and the lines to them (cube_pins.c).
  *
  * Memory: none.  Work: that of the setting; all wires, where wires are
  * compared.
@@ -64,6 +65,20 @@ int host_cube_check_boards(struct host_cube_file *file,
                            const config_setting_t *root,
                            struct host_error *error);
 
+/* Makes room for the pins of so many entries of `nodes`: 0, or HOST_BROKEN. */
+int host_cube_make_pins(struct host_cube_file *file, unsigned entries,
+                        struct host_error *error);
+
+/* Adds the reset and boot line of an entry of `nodes`. */
+int host_cube_read_pins(struct host_cube_file *file,
+                        const config_setting_t *group, unsigned node,
+                        struct host_error *error);
+
+/* Adds what DTR and RTS of a wire's port do, and sets what they are beside. */
+int host_cube_read_modem(struct host_cube_file *file,
+                         const config_setting_t *group,
+                         struct host_cube_wire *wire, struct host_error *error);
+
 /* Adds the wire of a group to file->wire, which has room for it. */
 int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
                         struct host_error *error);
@@ -81,5 +96,13 @@ int host_cube_check_ends(const struct host_cube_file *file,
 const struct host_cube_wire *
 host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
                   unsigned *count);
+
+/* Of an entry of `nodes`: `ssh` and `folder`; of the whole file: that nobody
+ * else starts such a node. */
+int host_cube_read_ssh(struct host_cube_file *file,
+                       const config_setting_t *group, unsigned node,
+                       struct host_error *error);
+int host_cube_check_ssh(const struct host_cube_file *file,
+                        struct host_error *error);
 
 #endif

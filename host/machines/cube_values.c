@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "host/base/parse.h"
+#include "resolve.h"
 
 int host_cube_wrong(const struct host_cube_file *file,
                     const config_setting_t *where, struct host_error *error,
@@ -65,33 +65,12 @@ int host_cube_resolve(const struct host_cube_file *file,
                       const config_setting_t *where,
                       struct tcp_address *address, struct host_error *error)
 {
-    struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *found = NULL;
     const char *text = config_setting_get_string(where);
-    char host[256];
-    const char *colon = text == NULL ? NULL : strrchr(text, ':');
-    uint64_t port = 0;
-    if (text != NULL && tcp_address_parse(address, text) == 0) {
-        return 0;
-    }
-    if (colon == NULL || (size_t)(colon - text) >= sizeof host ||
-        host_parse_number(colon + 1, 1, 65535, &port) != 0) {
-        return host_cube_wrong(file, where, error,
-                               "not a host with a port; write \"name:7001\", "
-                               "\"10.0.0.7:7001\" or \"[2001:db8::7]:7001\"");
-    }
-    snprintf(host, sizeof host, "%.*s", (int)(colon - text), text);
-    int status = getaddrinfo(host, colon + 1, &hints, &found);
-    if (status != 0) {
-        return host_fail(error, HOST_CUBE,
-                         "%s:%u: host %s: %s; correct the name or give its "
-                         "address",
-                         file->path, config_setting_source_line(where), host,
-                         gai_strerror(status));
-    }
-    memcpy(&address->to, found->ai_addr, found->ai_addrlen);
-    address->size = found->ai_addrlen;
-    freeaddrinfo(found);
-    return 0;
+    char why[400];
+    int code = host_resolve(text == NULL ? "" : text, address, why, sizeof why);
+    return code == 0 ? 0
+                     : host_fail(error, code, "%s:%u: %s", file->path,
+                                 config_setting_source_line(where), why);
 }
 
 int host_cube_beside(const struct host_cube_file *file,

@@ -5,8 +5,7 @@
 
 #include "transport/cube.h"
 
-/* --- one link --------------------------------------------------------------
- */
+/* --- one link ------------------------------------------------------------- */
 
 static int read_device(const struct host_cube_file *file,
                        const config_setting_t *pair, int end,
@@ -24,9 +23,8 @@ static int read_device(const struct host_cube_file *file,
     return 0;
 }
 
-static int read_line(const struct host_cube_file *file,
-                     const config_setting_t *group, struct host_cube_wire *wire,
-                     struct host_error *error)
+static int read_line(struct host_cube_file *file, const config_setting_t *group,
+                     struct host_cube_wire *wire, struct host_error *error)
 {
     const config_setting_t *pair = config_setting_get_member(group, "serial");
     const config_setting_t *flow = config_setting_get_member(group, "rtscts");
@@ -48,7 +46,7 @@ static int read_line(const struct host_cube_file *file,
     return read_device(file, pair, 0, wire->device[0], error) != 0 ||
                    read_device(file, pair, 1, wire->device[1], error) != 0
                ? error->code
-               : 0;
+               : host_cube_read_modem(file, group, wire, error);
 }
 
 /* A wire over TCP is guarded by the cube's key, unless the user says that it
@@ -140,10 +138,9 @@ static int check_beside(const struct host_cube_file *file,
                         const config_setting_t *group, const char *kind,
                         struct host_error *error)
 {
-    static const char *const of[][2] = {{"via", "tcp"},
-                                        {"insecure", "tcp"},
-                                        {"baud", "serial"},
-                                        {"rtscts", "serial"}};
+    static const char *const of[][2] = {
+        {"via", "tcp"},       {"insecure", "tcp"}, {"baud", "serial"},
+        {"rtscts", "serial"}, {"dtr", "serial"},   {"rts", "serial"}};
     for (size_t i = 0; i < sizeof of / sizeof of[0]; i++) {
         const config_setting_t *setting =
             config_setting_get_member(group, of[i][0]);
@@ -162,9 +159,9 @@ static int check_beside(const struct host_cube_file *file,
 int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
                         struct host_error *error)
 {
-    static const char *const names[] = {"node",     "to",     "tcp",  "via",
-                                        "unix",     "serial", "baud", "rtscts",
-                                        "insecure", NULL};
+    static const char *const names[] = {"node", "to",     "tcp",      "via",
+                                        "unix", "serial", "baud",     "rtscts",
+                                        "dtr",  "rts",    "insecure", NULL};
     struct host_cube_wire *wire = &file->wire[file->wires];
     memset(wire, 0, sizeof *wire);
     wire->line = config_setting_source_line(group);
@@ -238,8 +235,7 @@ static unsigned owner(const struct host_cube_file *file, unsigned node)
     return node == CUBE_HOST || file->local[node] ? CUBE_HOST : node;
 }
 
-/* --- all of them -----------------------------------------------------------
- */
+/* --- all of them ---------------------------------------------------------- */
 
 /* Whether both have an end on one machine, as far as that is known. */
 static bool meet(const struct host_cube_file *file,

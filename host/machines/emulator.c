@@ -36,7 +36,7 @@ static int find_program(const struct host_bare *bare, char path[PATH_MAX],
 }
 
 /* Where `make firmware` and `make install` put it. */
-static int find_image(const struct host_bare *bare, char path[PATH_MAX],
+static int find_image(const char *image, char path[PATH_MAX],
                       struct host_error *error)
 {
     static const char *const folders[] = {"firmware", "../lib/incode"};
@@ -50,7 +50,7 @@ static int find_image(const struct host_bare *bare, char path[PATH_MAX],
     }
     *slash = '\0';
     for (size_t i = 0; i < sizeof folders / sizeof folders[0]; i++) {
-        snprintf(path, PATH_MAX, "%s/%s/%s", here, folders[i], bare->image);
+        snprintf(path, PATH_MAX, "%s/%s/%s", here, folders[i], image);
         if (access(path, R_OK) == 0) {
             return 0;
         }
@@ -58,7 +58,7 @@ static int find_image(const struct host_bare *bare, char path[PATH_MAX],
     return host_fail(error, HOST_CUBE,
                      "%s/firmware/%s: %s; make the board's firmware with: make "
                      "firmware",
-                     here, bare->image, strerror(errno));
+                     here, image, strerror(errno));
 }
 
 int host_emulator_find(const struct host_bare *bare,
@@ -70,9 +70,12 @@ int host_emulator_find(const struct host_bare *bare,
     for (unsigned i = 0; i < HOST_UARTS_MAX; i++) {
         emulator->uart[i].wire.fd = emulator->uart[i].log.fd = -1;
     }
-    return find_program(bare, emulator->program, error) != 0
-               ? error->code
-               : find_image(bare, emulator->image, error);
+    if (find_program(bare, emulator->program, error) != 0 ||
+        find_image(bare->image, emulator->image, error) != 0) {
+        return error->code;
+    }
+    return find_image(bare->loader == NULL ? bare->image : bare->loader,
+                      emulator->kernel, error);
 }
 
 int host_emulator_erase(int fd)
@@ -195,7 +198,6 @@ void host_emulator_become(const struct host_emulator *emulator, unsigned turn)
     const struct host_emulator *e = emulator;
     struct words *w = &words;
     (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
-    (void)setpgid(0, 0); /* an interrupt from the terminal is the host's */
     if (e->errors >= 0) {
         (void)dup2(e->errors, STDERR_FILENO);
     }
@@ -204,7 +206,7 @@ void host_emulator_become(const struct host_emulator *emulator, unsigned turn)
     add(w, "%s", e->bare->machine);
     add_flash(w, e->flash);
     add(w, "-kernel");
-    add(w, "%s", e->image);
+    add(w, "%s", e->kernel);
     add(w, "-display");
     add(w, "none");
     add(w, "-nic");

@@ -34,7 +34,8 @@ struct host_bare {
     const char *machine; /* QEMU's name of it */
     const char *program; /* QEMU for its processor, */
     const char *package; /* of the distribution */
-    const char *image;   /* its firmware, a file's name */
+    const char *image;   /* its firmware, a file's name, */
+    const char *loader;  /* and its loader's, which starts it; NULL: none */
     unsigned uarts;
     bool flash;              /* it has a chip */
     uint32_t serial_baud;    /* that its firmware takes its wires for */
@@ -51,6 +52,7 @@ struct host_place {
 struct host_emulator {
     const struct host_bare *bare;
     char program[PATH_MAX], image[PATH_MAX];
+    char kernel[PATH_MAX]; /* what it runs at first: the loader, or the image */
     struct host_place flash; /* the chip's file, of HOST_FLASH_BYTES */
     /* What is at the other end of a UART: a connected socket, or a path at
      * which it listens; and the file that keeps what it sends. */

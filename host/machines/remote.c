@@ -2,8 +2,10 @@
 
 #include <ctype.h>
 #include <errno.h>
+#include <limits.h>
 #include <sodium.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <unistd.h>
@@ -48,8 +50,8 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
     if (wire->serial) {
         struct serial_port_settings s = {.baud = wire->baud,
                                          .rts_cts = wire->rts_cts,
-                                         .dtr = true,
-                                         .rts = true};
+                                         .dtr = !wire->dtr_low,
+                                         .rts = !wire->rts_low};
         memcpy(s.name, wire->device[1], sizeof s.name);
         if (host_port_serial(port, &s, error) != 0) {
             return error->code;
@@ -60,7 +62,7 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
         config.insecure = wire->insecure;
         config.key = wire->insecure ? NULL : file->key;
         config.suite = wire->insecure ? NULL : &secure_sodium;
-        if (wire->insecure) {
+        if (wire->insecure && wire->line != 0) { /* else it was just said */
             char name[160];
             host_cube_name_wire(file, wire, name);
             host_note("%s is insecure: whoever reaches its address can take it "
@@ -76,11 +78,31 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
     return 0;
 }
 
+const struct host_board *host_remote_started(const struct host_cube_file *file)
+{
+    for (unsigned i = 0; i < file->nodes; i++) {
+        if (file->local[i]) {
+            return file->board_of[i];
+        }
+    }
+    return NULL;
+}
+
+int host_remote_program(const struct host_cube_file *file, const char *given,
+                        char *path, size_t size, struct host_error *error)
+{
+    const struct host_board *board = host_remote_started(file);
+    path[0] = '\0';
+    return board == NULL
+               ? 0
+               : host_cluster_program(given, board->program, path, size, error);
+}
+
 int host_remote_start(struct host_remote *remote,
                       const struct host_cube_file *file, const char *program,
                       struct host_error *error)
 {
-    int status = 0;
+    char wire[HOST_WIRE_NAME];
     if (sodium_init() < 0) { /* the fastest code for this processor */
         return host_fail(error, HOST_BROKEN,
                          "libsodium does not start; install it anew");
@@ -88,15 +110,17 @@ int host_remote_start(struct host_remote *remote,
     memset(remote, 0, sizeof *remote);
     remote->file = file;
     remote->program = program;
+    host_remote_wire(file, wire);
+    host_offer_begin(&remote->offer, wire);
+    int status = host_remote_free(file, 0, error);
     for (unsigned i = 0; i < file->nodes && status == 0; i++) {
         if (file->local[i]) {
             status = start_node(remote, i, error);
         }
     }
     for (unsigned k = 0; k < HOST_PORTS_MAX && status == 0; k++) {
-        const struct host_cube_wire *wire = host_cube_host_wire(file, k);
-        if (wire != NULL) {
-            status = open_port(remote, wire, error);
+        if (host_cube_host_wire(file, k) != NULL) {
+            status = open_port(remote, host_cube_host_wire(file, k), error);
         }
     }
     if (status != 0) {
@@ -105,8 +129,77 @@ int host_remote_start(struct host_remote *remote,
     return status;
 }
 
+enum { PATH_BYTES = PATH_MAX + SERIAL_NAME_MAX + 1, LOOK_AGAIN_US = 50000 };
+
+/* What is there, by whatever name it is called; of a socket that is not there
+ * yet, its folder. */
+static void put_path(const char *path, char *name)
+{
+    char folder[PATH_MAX], real[PATH_MAX];
+    const char *slash = strrchr(path, '/');
+    size_t size = slash == NULL ? 0 : (size_t)(slash - path);
+    snprintf(folder, sizeof folder, "%.*s", size == 0 ? 1 : (int)size,
+             slash == NULL ? "." : path);
+    if (realpath(path, real) != NULL) {
+        snprintf(name, PATH_BYTES, "%s", real);
+    } else if (realpath(folder, real) != NULL) {
+        snprintf(name, PATH_BYTES, "%s/%s", real,
+                 slash == NULL ? path : slash + 1);
+    } else {
+        snprintf(name, PATH_BYTES, "%s", path);
+    }
+}
+
+void host_remote_wire(const struct host_cube_file *file,
+                      char name[HOST_WIRE_NAME])
+{
+    const struct host_cube_wire *wire = host_cube_host_wire(file, 0);
+    char path[PATH_BYTES], text[SERIAL_NAME_MAX];
+    const char *socket = wire == NULL ? NULL : tcp_address_path(&wire->via);
+    name[0] = '\0';
+    if (wire == NULL) {
+        return;
+    }
+    if (wire->serial || socket != NULL) {
+        put_path(wire->serial ? wire->device[1] : socket, path);
+        snprintf(name, HOST_WIRE_NAME, "%s:%s",
+                 wire->serial ? "serial" : "unix", path);
+    } else {
+        snprintf(name, HOST_WIRE_NAME, "tcp:%s",
+                 host_cube_wire_name(wire, text, sizeof text));
+    }
+}
+
+int host_remote_free(const struct host_cube_file *file, uint64_t wait_us,
+                     struct host_error *error)
+{
+    char wire[HOST_WIRE_NAME], text[HOST_HOLDER_TEXT];
+    struct host_holder holder;
+    uint64_t begun_us = host_now_us();
+    bool told = false;
+    host_remote_wire(file, wire);
+    const char *name = strchr(wire, ':');
+    while (name != NULL && host_holder_find(&holder, wire)) {
+        (void)host_holder_text(&holder, text, sizeof text);
+        if (host_now_us() - begun_us >= wait_us) {
+            return host_fail(error, HOST_CUBE,
+                             "%s: in use by %s; wait until it has ended, or "
+                             "end it; incode console looks on meanwhile",
+                             name + 1, text);
+        }
+        if (!told) {
+            host_note("%s: in use by %s; waits for its end, %llu s at most",
+                      name + 1, text, (unsigned long long)wait_us / 1000000);
+            told = true;
+        }
+        (void)usleep(LOOK_AGAIN_US);
+    }
+    return 0;
+}
+
 void host_remote_stop(struct host_remote *remote)
 {
+    host_offer_end(&remote->offer);
     for (unsigned i = 0; i < remote->file->nodes; i++) {
         (void)host_child_kill(&remote->process[i]);
         host_child_wait(&remote->process[i]);
@@ -253,12 +346,14 @@ static uint8_t absent_s(const struct host_cube_file *file)
                                              : s);
 }
 
-/* A bare board's console shares its wire. */
+/* A bare board's console shares its wire; what is at one that no file names is
+ * not known. */
 static struct link_pipe pipe_of(struct host_remote *r, unsigned port)
 {
-    unsigned node = host_cube_host_wire(r->file, port)->node;
+    const struct host_cube_wire *wire = host_cube_host_wire(r->file, port);
+    unsigned node = wire->node;
     struct link_pipe pipe = host_port_pipe(&r->port[port]);
-    if (!host_cube_is_bare(r->file, node)) {
+    if (!host_cube_is_bare(r->file, node) && wire->line != 0) {
         return pipe;
     }
     host_console_init(&r->console[port], node, r->file->board_of[node]->name);
@@ -301,5 +396,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     machine.rest = machine_rest;
     machine.ended = machine_ended;
     machine.stop = machine_stop;
+    host_offer_machine(&remote->offer, &machine);
+    machine.onlookers = &remote->offer.onlookers;
     return machine;
 }

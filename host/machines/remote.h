@@ -15,6 +15,7 @@
 #include "child.h"
 #include "console.h"
 #include "cube_file.h"
+#include "host/look/offer.h"
 #include "port.h"
 
 enum { HOST_ABSENT_MIN_S = 3 };
@@ -28,7 +29,17 @@ struct host_remote {
     struct secure_ends ends[HOST_PORTS_MAX];     /* of their wires */
     struct host_process process[HOST_NODES_MAX]; /* of those started here */
     unsigned restarts;
+    struct host_offer offer; /* of a look at it */
 };
+
+/* What the first node of those that the host starts runs on; NULL: there is
+ * none. */
+const struct host_board *host_remote_started(const struct host_cube_file *file);
+
+/* The program of those: the one given, or where that is NULL the board's own,
+ * beside this one.  Empty where there are none. */
+int host_remote_program(const struct host_cube_file *file, const char *given,
+                        char *path, size_t size, struct host_error *error);
 
 /* program: of a node, for those that are started here. */
 int host_remote_start(struct host_remote *remote,
@@ -36,6 +47,16 @@ int host_remote_start(struct host_remote *remote,
                       struct host_error *error);
 
 struct host_machine host_remote_machine(struct host_remote *remote);
+
+/* The name of the host's first wire, by which look.h finds who has it. */
+void host_remote_wire(const struct host_cube_file *file,
+                      char name[HOST_WIRE_NAME]);
+
+/* Waits for the end of the program of this machine that has that wire; beside
+ * it there would be no answers, or mixed ones.  0, or HOST_CUBE: it has it
+ * still. */
+int host_remote_free(const struct host_cube_file *file, uint64_t wait_us,
+                     struct host_error *error);
 
 /* Ends the nodes that were started here, and closes the host's wires. */
 void host_remote_stop(struct host_remote *remote);

@@ -5,12 +5,14 @@
 
 #include "failure_detector.h"
 #include "notices.h"
+#include "onlookers.h"
 
 enum {
     STARTED_HERE_US = 9000000, /* the machine's own nodes need no more */
     TELL_US = 1500000,
     NEWS_US = 1000000, /* in which who is there answers */
     TELL_AGAIN_US = 1000000,
+    WHY_BYTES = 400,
     START_BYTES = 400 /* of a line that an error has room for */
 };
 
@@ -70,6 +72,20 @@ static bool is_with_another(const struct host_service *s, unsigned node)
                LINK_IN_USE;
 }
 
+static void tell_holder(const struct host_service *s, char *text, size_t size)
+{
+    const struct host_onlookers *them = s->machine->onlookers;
+    const char *holder = them == NULL ? NULL : them->holder(them->context);
+    if (holder == NULL) {
+        snprintf(text, size,
+                 "is with another host, or one that has just ended; it is free "
+                 "some seconds after that");
+    } else {
+        snprintf(text, size, "is with %s; it is free some seconds after that",
+                 holder);
+    }
+}
+
 /* Why the node is not heard, as "WHAT" or "WHAT; NEXT". */
 static const char *reason(const struct host_service *s, unsigned node,
                           char *text, size_t size)
@@ -84,9 +100,7 @@ static const char *reason(const struct host_service *s, unsigned node,
                  "node %d meets another key there; give both the same key file",
                  other);
     } else if (is_with_another(s, node)) {
-        snprintf(text, size,
-                 "is with another host, or one that has just ended; it is free "
-                 "some seconds after that");
+        tell_holder(s, text, size);
     } else {
         snprintf(text, size, NO_ANSWER);
     }
@@ -98,7 +112,7 @@ static const char *reason(const struct host_service *s, unsigned node,
 static void describe(const struct host_service *s, char *line, size_t size)
 {
     const struct host_machine *m = s->machine;
-    char why[160], more[80] = "";
+    char why[WHY_BYTES], more[80] = "";
     unsigned node = 0, missing = count_missing(s, &node);
     const char *at = m->address == NULL ? NULL : m->address(m->context, node);
     const char *start =
@@ -145,7 +159,7 @@ static void tell(struct host_service *s, uint64_t now_us)
 static int fail(const struct host_service *s, struct host_error *error)
 {
     const struct host_machine *m = s->machine;
-    char why[160], next[START_BYTES + 40];
+    char why[WHY_BYTES], next[START_BYTES + 40];
     unsigned first = 0, missing = count_missing(s, &first);
     const char *start =
         m->start_line == NULL ? NULL : m->start_line(m->context, first);

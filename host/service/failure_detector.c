@@ -19,11 +19,7 @@ enum {
     PING_AGAIN_US_MIN = 40000, /* is as a rule just after such a loss */
     PROBE_US_MIN = 500000,
     PROBE_US_MAX = 3000000,
-    WIRE_DOWN_US_MAX = 8000000,
-    IN_USE_US_MAX = 5000000,  /* longer than a link keeps to a silent host, */
-    IN_USE_US_LAST = 9000000, /* whether it was told so again or not */
-    IN_USE_TOLD_US = 2000000, /* it is told so more often as long as it is so */
-    IN_USE_REST_US = 1000000
+    WIRE_DOWN_US_MAX = 8000000
 };
 
 unsigned host_detector_wire(const struct host_service *service)
@@ -333,51 +329,17 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
     }
 }
 
-/* Whether another host has the nodes; it may have died just before. */
-static bool in_use(struct host_service *s, uint64_t now_us)
-{
-    const struct link_peer *peer =
-        cube_link_peer(s->cube, host_detector_wire(s));
-    if (peer->refusal != LINK_IN_USE) {
-        s->in_use_us = 0;
-        return false;
-    }
-    if (s->in_use_us == 0) {
-        s->in_use_us = now_us;
-    }
-    if (s->in_use != peer->in_use) {
-        s->in_use_told_us = now_us;
-        if (s->machine->rest != NULL) {
-            s->machine->rest(s->machine->context, IN_USE_REST_US);
-        }
-    }
-    s->in_use = peer->in_use;
-    return true;
-}
-
-/* Whether the other host goes on.  If not, its node says so no more, and lets
- * this one in a moment later. */
-static bool stays_in_use(const struct host_service *s, uint64_t now_us)
-{
-    uint64_t passed = now_us - s->in_use_us;
-    return passed > IN_USE_US_LAST ||
-           (passed > IN_USE_US_MAX &&
-            now_us - s->in_use_told_us <= IN_USE_TOLD_US);
-}
-
 static int check_wire(struct host_service *s, uint64_t now_us,
                       struct host_error *error)
 {
     unsigned wire = host_detector_wire(s);
     enum link_state state = cube_link_state(s->cube, wire);
     uint16_t gateway = cube_wiring(s->cube)->gateway;
-    if (in_use(s, now_us)) {
-        return !stays_in_use(s, now_us)
-                   ? 0
-                   : host_fail(error, HOST_CUBE,
-                               "node %u link %u: the cube is in use by another "
-                               "host; wait until its run is over, or end it",
-                               gateway, s->machine->dimension);
+    enum host_in_use_state use = host_in_use_look(
+        &s->in_use, s->machine, cube_link_peer(s->cube, wire), now_us);
+    if (use != HOST_FREE) {
+        return use == HOST_TAKEN ? 0
+                                 : host_in_use_fail(s->machine, gateway, error);
     }
     /* A wire that was never up is waited for: its node may start late.  What is
      * wrong with one, the wiring will have in a moment. */

@@ -29,9 +29,13 @@ static const char *advice(const char *text)
 static int fail(const struct host_service *s, struct host_error *error)
 {
     const char *next = advice(s->fault.text);
-    return host_fail(
-        error, HOST_CUBE, "node %u: %s; %s", s->fault.node, s->fault.text,
-        next == NULL ? "please report this with the points" : next);
+    if (next == NULL) { /* a loader says itself what to do about it */
+        next = strstr(s->fault.text, "boot loader") != NULL
+                   ? "then run again"
+                   : "please report this with the points";
+    }
+    return host_fail(error, HOST_CUBE, "node %u: %s; %s", s->fault.node,
+                     s->fault.text, next);
 }
 
 int host_faults_take(struct host_service *service,

@@ -76,6 +76,7 @@ int host_generation_begin(struct host_service *service, uint64_t now_us,
 {
     struct host_service *s = service;
     host_detector_begin(s, now_us);
+    host_onlooking_again(&s->onlooking);
     if (check_outdone(s, error) != 0 || check_renewed(s, error) != 0) {
         return error->code;
     }

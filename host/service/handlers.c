@@ -289,9 +289,20 @@ static int take(struct host_service *service,
         return take_finished(service, message, error);
     case NODE_FAULT:
         return host_faults_take(service, message, error);
+    case NODE_ANSWER:
+        return host_onlooking_take(&service->onlooking, service->machine,
+                                   message)
+                   ? 0
+                   : unsound(message, error, "answer to what was not asked");
     default:
         return take_other(service, message, error);
     }
+}
+
+/* What a node says of itself in any state, and is no sign of its work. */
+static bool is_of_itself(uint8_t type)
+{
+    return type == NODE_PONG || type == NODE_ANSWER;
 }
 
 int host_handle(struct host_service *service,
@@ -304,10 +315,11 @@ int host_handle(struct host_service *service,
     if (service->work.lost[message->source] || node->left) {
         return 0; /* it has no part in this generation, or no more */
     }
-    if (message->type != NODE_PONG) {
+    if (!is_of_itself(message->type)) {
         host_idle_progress(service, message->source);
     }
-    bool expected = message->type == NODE_PONG || message->type == NODE_FAULT ||
+    bool expected = is_of_itself(message->type) ||
+                    message->type == NODE_FAULT ||
                     (service->started && !node->setup_due);
     int status = 0;
     if (expected) {

@@ -18,6 +18,8 @@
 #include "host/base/error.h"
 #include "transport/cube.h"
 
+struct host_onlookers;
+
 enum {
     HOST_NODES_MAX = 1024,    /* of any machine: 2^CUBE_DIMENSION_MAX */
     HOST_MEMORY_MAX = 1 << 30 /* bytes of a node that can be asked for */
@@ -72,6 +74,8 @@ struct host_machine {
     /* Leaves the host's wires alone for a time, as another host has them; NULL:
      * there is no other. */
     void (*rest)(void *context, uint64_t rest_us);
+    /* Others who look on at its cube: onlookers.h; NULL: nobody can. */
+    const struct host_onlookers *onlookers;
     /* Whether every node has ended: true as well where nothing tells.  Called
      * at the end, when no node is to be started again. */
     bool (*ended)(void *context);

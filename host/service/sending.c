@@ -199,6 +199,19 @@ static bool serve_work(struct host_service *s, uint16_t to,
     return serve_data(s, to, error);
 }
 
+/* What goes before the first answer may get lost. */
+static bool serve_onlookers(struct host_service *s, uint16_t to)
+{
+    struct node_question_message question;
+    if (!host_onlooking_due(&s->onlooking, to, &question) ||
+        !s->report[to].up ||
+        !send_counted(s, to, NODE_QUESTION, &question, sizeof question)) {
+        return false;
+    }
+    host_onlooking_sent(&s->onlooking, to);
+    return true;
+}
+
 /* A ping and a message of work in turn: on a slow wire the pings of many nodes
  * would leave no room for anything else. */
 static bool serve_node(struct host_service *s, uint16_t to,
@@ -211,6 +224,9 @@ static bool serve_node(struct host_service *s, uint16_t to,
     if (node->ping_due && !node->ping_last) {
         node->ping_last = host_detector_ping(s, to);
         return node->ping_last;
+    }
+    if (serve_onlookers(s, to)) {
+        return true;
     }
     if (serve_work(s, to, error)) {
         node->ping_last = false;

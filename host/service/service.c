@@ -8,12 +8,12 @@
 #include "generations.h"
 #include "handlers.h"
 #include "host/base/progress.h"
+#include "host_cube.h"
 #include "missing_links.h"
 #include "paging.h"
 #include "sending.h"
 
 enum {
-    WINDOW_DEFAULT = 32,
     IDLE_US_MAX = 20000,
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
@@ -23,40 +23,6 @@ enum {
 static uint64_t now_of(const struct host_service *s)
 {
     return s->machine->now_us(s->machine->context);
-}
-
-static int make_cube(struct host_service *s, struct host_error *error)
-{
-    struct cube_config config;
-    memset(&config, 0, sizeof config);
-    config.self = CUBE_HOST;
-    config.dimension = (uint8_t)s->machine->dimension;
-    config.window = (uint16_t)(s->window == 0 ? WINDOW_DEFAULT : s->window);
-    if (config.window > LINK_WINDOW_MAX) {
-        config.window = LINK_WINDOW_MAX;
-    }
-    config.epoch = s->machine->epoch;
-    config.pipes[0] = s->machine->pipe;
-    config.pipes[1] = s->machine->spare;
-    config.spare_node = s->machine->spare_node;
-    config.host_ports = s->machine->host_ports;
-    for (unsigned i = 1; i < config.host_ports; i++) {
-        config.pipes[i] = s->machine->wires[i];
-    }
-    cube_for_serial(&config, s->machine->serial_baud);
-    size_t bytes = cube_arena_bytes(&config);
-    s->cube_memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
-    if (s->cube_memory == NULL) {
-        return host_fail_memory(error, "the wire");
-    }
-    s->cube = cube_init(s->cube_memory, bytes, &config);
-    if (s->cube == NULL) {
-        return host_fail(error, HOST_BROKEN,
-                         "host: the cube of %u nodes does not come up; please "
-                         "report this",
-                         s->machine->nodes);
-    }
-    return 0;
 }
 
 /* Sleeps until the wire has something, or until the cube's next duty. */
@@ -81,6 +47,20 @@ static int read_all(struct host_service *s, unsigned *moved,
     return status;
 }
 
+/* Who looks on asks those nodes alone that have a part in this generation. */
+static void look_out(struct host_service *s, uint64_t now_us)
+{
+    struct host_onlookers_progress progress = {s->ledger.committed,
+                                               s->ledger.bricks, 0};
+    progress.tetrahedra = s->tets == NULL ? 0 : s->tets->count;
+    host_onlooking_look(&s->onlooking, s->machine, now_us, &progress);
+    for (unsigned i = 0; s->onlooking.asked && i < s->machine->nodes; i++) {
+        if (s->work.lost[i]) {
+            host_onlooking_leave_out(&s->onlooking, i);
+        }
+    }
+}
+
 /* One round of the loop: read, serve, and sleep where nothing moved. */
 int host_service_round(struct host_service *service, struct host_error *error)
 {
@@ -97,6 +77,9 @@ int host_service_round(struct host_service *service, struct host_error *error)
     }
     bool pages = s->started && host_sending_pages_wait(s);
     uint64_t begun = pages ? now_of(s) : 0;
+    if (s->machine->onlookers != NULL) {
+        look_out(s, now);
+    }
     moved += host_sending_serve(s, error);
     s->pages_us += pages ? now_of(s) - begun : 0;
     if (error->code != 0 || host_detector_check(s, now, error) != 0) {
@@ -124,7 +107,8 @@ int host_service_open(struct host_service *service, struct host_error *error)
     if (s->node == NULL || s->report == NULL || s->work.lost == NULL) {
         return host_fail_memory(error, "the nodes' queues");
     }
-    if (make_cube(s, error) != 0) {
+    s->cube = host_cube_make(s->machine, s->window, &s->cube_memory, error);
+    if (s->cube == NULL) {
         return error->code;
     }
     s->generations = 1;

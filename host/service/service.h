@@ -23,9 +23,11 @@
 #include "host/mesh/tetrahedra.h"
 #include "host/order/order.h"
 #include "host/service/strategies/strategy.h"
+#include "in_use.h"
 #include "ledger.h"
 #include "machine.h"
 #include "node/message.h"
+#include "onlookers.h"
 #include "spill.h"
 
 enum {
@@ -164,10 +166,9 @@ struct host_service {
     unsigned working;    /* that have a job */
     unsigned turn;       /* the node to be served next */
     unsigned ping_turn;  /* to be pinged next */
+    struct host_onlooking onlooking;
     uint64_t ping_us, check_us, began_us, wire_down_us;
-    uint64_t in_use_us; /* since when another host has the nodes; 0: none */
-    uint64_t in_use_told_us; /* and when they said so last */
-    uint32_t in_use;         /* times that they said so */
+    struct host_in_use in_use;
 };
 
 /* Brings up the cube on the machine's wire, and waits until every node has

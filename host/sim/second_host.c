@@ -107,7 +107,7 @@ void host_second_host_round(void *host)
     h->busy_us = w->now_us + host_sim_draw(&h->random, 1, 2 * h->host_us);
     h->sleep_us = 0;
     int status = host_service_round(&h->service, &error);
-    bool in_use = status == HOST_CUBE && h->service.in_use_us != 0;
+    bool in_use = status == HOST_CUBE && h->service.in_use.since_us != 0;
     unsigned refused = cube_link_peer(h->service.cube, 0)->in_use;
     h->refused_us = refused != h->refused ? w->now_us : h->refused_us;
     h->refused = refused;

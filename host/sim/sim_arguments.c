@@ -74,8 +74,8 @@ static error_t parse_sim_option(int key, char *value, struct argp_state *state)
         }
         return 0;
     case KEY_NODES:
-        (void)host_parse_nodes(value, HOST_NODES_MAX, "", &p->options->nodes,
-                               p->error);
+        (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
+                               &p->options->nodes, p->error);
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;

@@ -16,7 +16,8 @@ enum {
     LONG_US = 50000, /* between two looks of a slow node, once in so many */
     LONG_IN = 32,
     LISTEN_US = 50000, /* as in node/identity.h */
-    PASS_US = 50       /* between two looks of links whose processor is busy */
+    PASS_US = 50,      /* between two looks of links whose processor is busy */
+    RESTART_US = 20000 /* of a node that was told to */
 };
 
 /* --- the nodes in the order of their clocks ------------------------------ */
@@ -364,6 +365,11 @@ static void step(struct host_world *w, unsigned i)
         cost = charged_step(n, &event);
     } else {
         cost += timed_step(n, &event);
+    }
+    if (event == NODE_STOPPED && n->stand_in == NULL &&
+        node_reset_why(n->node) != NODE_RESET_OVER) {
+        host_world_crash(w, i, RESTART_US, false);
+        return;
     }
     if (event == NODE_STOPPED) {
         n->board.reset(n, 0);

@@ -41,6 +41,7 @@ static error_t take(int key, char *value, struct argp_state *state)
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "A group:", 1},
     {"seed", 's', "S", 0, "a value", 1},
+    {"sieve", 302, "S", 0, "another, which begins alike", 1},
     {"window", 300, "N", 0, "no letter", 1},
     {"windows", 301, NULL, 0, "begins like another", 2},
     {"quiet", 'q', NULL, 0, "no value, and the last letter", 2},
@@ -89,6 +90,8 @@ static void test_refused(void **unused)
         {"--hlep", "did you mean --help?"},
         {"--zzzzzzzz", "--zzzzzzzz: no such option of incode try; see incode "
                        "try --help"},
+        {"--s=4", "--s: more than one option of incode try; write --seed or "
+                  "--sieve"},
         {"--win=4", "--win: more than one option of incode try; write --window "
                     "or --windows"},
         {"--quiet=yes", "--quiet=yes: an option of incode try that takes no "

@@ -126,13 +126,14 @@ static void test_nodes(void **unused)
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         unsigned nodes = 7;
-        assert_int_equal(
-            host_parse_nodes(wrong[i].text, 64, ", or fewer", &nodes, &error),
-            HOST_USAGE);
+        assert_int_equal(host_parse_nodes("--nodes", wrong[i].text, 64,
+                                          ", or fewer", &nodes, &error),
+                         HOST_USAGE);
         assert_non_null(strstr(error.text, wrong[i].said));
         assert_int_equal(nodes, 7);
         error.code = 0;
-        assert_int_equal(host_parse_nodes("64", 64, "", &nodes, &error), 0);
+        assert_int_equal(
+            host_parse_nodes("--nodes", "64", 64, "", &nodes, &error), 0);
         assert_int_equal(nodes, 64);
     }
 }

@@ -48,6 +48,11 @@ static void close_screen(void)
     (void)close(screen.master);
 }
 
+static void erase(char *row, unsigned from)
+{
+    memset(row + from, 0, COLUMNS - from);
+}
+
 static void take(char c)
 {
     char *row = screen.text[screen.row];
@@ -56,8 +61,6 @@ static void take(char c)
         screen.drawn++;
     } else if (c == '\n') {
         assert_true(++screen.row < ROWS);
-    } else if (c == '\033') {
-        memset(row + screen.column, 0, COLUMNS - screen.column);
     } else {
         /* The last column is left free: some terminals wrap there. */
         screen.wrapped = screen.wrapped || screen.column + 1 >= screen.columns;
@@ -66,23 +69,43 @@ static void take(char c)
     }
 }
 
-/* Takes what has come; "\033[K" is the one sequence that there is.  A terminal
- * delivers in its own time: a bell of ours rings when all before it is here. */
+/* Rows up; from here to the row's end; and to the screen's. */
+static void obey(char what, unsigned number)
+{
+    if (what == 'A') {
+        assert_true(number > 0 && number <= screen.row);
+        screen.row -= number;
+    } else if (what == 'K' || what == 'J') {
+        erase(screen.text[screen.row], screen.column);
+        for (unsigned i = screen.row + 1; what == 'J' && i < ROWS; i++) {
+            erase(screen.text[i], 0);
+        }
+    } else {
+        fail();
+    }
+}
+
+/* Takes what has come.  A terminal delivers in its own time: a bell of ours
+ * rings when all before it is here. */
 static void look(void)
 {
-    static const char sequence[] = "\033[K";
-    static unsigned in;
+    static unsigned in, number;
     assert_int_equal(write(screen.slave, "\a", 1), 1);
     for (char c = 0; c != '\a';) {
         struct pollfd file = {screen.master, POLLIN, 0};
         assert_true(poll(&file, 1, 60000) > 0);
         assert_int_equal(read(screen.master, &c, 1), 1);
-        if (in > 0 || c == '\033') {
-            assert_int_equal(c, sequence[in]);
-            in = (in + 1) % 3;
-            if (in == 1) {
-                take('\033');
-            }
+        if (c == '\033') {
+            in = 1;
+            number = 0;
+        } else if (in == 1) {
+            assert_int_equal(c, '[');
+            in = 2;
+        } else if (in == 2 && c >= '0' && c <= '9') {
+            number = 10 * number + (unsigned)(c - '0');
+        } else if (in == 2) {
+            obey(c, number);
+            in = 0;
         } else if (c != '\a') {
             take(c);
         }
@@ -188,6 +211,47 @@ static void test_notes(void **unused)
     close_screen();
 }
 
+static void draw_rows(double part)
+{
+    look();
+    for (unsigned before = screen.drawn, i = 0;
+         i < 6000 && screen.drawn == before; i++) {
+        host_progress_row(0, "node 0", part, "takes blocks");
+        host_progress_row(1, "node 1", -1.0, "is not there");
+        host_progress_draw();
+        (void)poll(NULL, 0, 10);
+        look();
+    }
+}
+
+/* A table stays where it is, makes room for notes, and goes away whole. */
+static void test_rows(void **unused)
+{
+    (void)unused;
+    open_screen(60);
+    assert_int_equal(host_progress_rows_max(), 0);
+    host_progress_begin(true);
+    assert_int_equal(host_progress_rows_max(), ROWS - 2);
+    host_progress_rows(2);
+    draw_rows(0.25);
+    draw_rows(0.5);
+    assert_non_null(strstr(screen.text[0], "node 0 [####"));
+    assert_non_null(strstr(screen.text[0], " 50 % takes blocks"));
+    assert_string_equal(screen.text[1], "node 1 is not there");
+    host_note("node %u: %s", 1, "is waited for");
+    look();
+    assert_string_equal(screen.text[0], "incode: node 1: is waited for");
+    assert_memory_equal(screen.text[1], "node 0 [", 8);
+    assert_string_equal(screen.text[2], "node 1 is not there");
+    assert_false(screen.wrapped);
+    host_progress_end();
+    look();
+    assert_string_equal(screen.text[1], "");
+    assert_string_equal(screen.text[2], "");
+    assert_int_equal(screen.row, 1);
+    close_screen();
+}
+
 /* No line where it is not wanted, nor where nobody sees it; notes come. */
 static void test_quiet(void **unused)
 {
@@ -218,7 +282,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fits),   cmocka_unit_test(test_follows_the_width),
         cmocka_unit_test(test_counts), cmocka_unit_test(test_notes),
-        cmocka_unit_test(test_quiet),
+        cmocka_unit_test(test_rows),   cmocka_unit_test(test_quiet),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

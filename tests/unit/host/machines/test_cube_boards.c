@@ -116,7 +116,8 @@ static void what_a_board_has_not(void **unused)
          ");",
          "a.cube:2: nodes: an entry without a node of this cube"},
         {"dimension = 0;\nnodes = ( { node = 0; } ); links = (" HOST_WIRE ");",
-         "a.cube:2: nodes: an entry without a node of this cube, or without"},
+         "a.cube:2: nodes: an entry without a node of this cube, or with "
+         "nothing"},
         {"dimension = 0; nodes = ( { node = 0; " M7 "},\n{ node = 0; " M7
          "} ); links = (" HOST_WIRE ");",
          "a.cube:2: nodes: a node twice"},

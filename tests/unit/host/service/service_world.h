@@ -57,6 +57,7 @@ static struct {
     bool sick;           /* node 0 starts again whenever it has work */
     uint64_t patience_s; /* 0: 8 */
     struct host_sharing sharing;
+    const struct host_onlookers *onlookers;
     uint64_t stopped_us; /* when a run that failed ended its nodes */
     void (*stop)(void *context);
     /* What the user was told, and when. */
@@ -235,6 +236,7 @@ static inline struct host_machine make_machine(void)
     machine.stop = machine_stop;
     machine.check = machine_check;
     machine.ended = machine_ended;
+    machine.onlookers = world.onlookers;
     return machine;
 }
 

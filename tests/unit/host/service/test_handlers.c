@@ -333,8 +333,8 @@ static void test_texts(void **unused)
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 9, expected 10"},
-        {NODE_READY, &ready, 4, "protocol version 9, expected 10"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 10, expected 11"},
+        {NODE_READY, &ready, 4, "protocol version 10, expected 11"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
         {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 40"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
@@ -362,7 +362,7 @@ static void test_texts(void **unused)
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
          "same version"}};
-    assert_int_equal(NODE_PROTOCOL, 10);
+    assert_int_equal(NODE_PROTOCOL, 11);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();

@@ -1,0 +1,377 @@
+#include "cube_new.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cube_file.h"
+#include "cube_key.h"
+#include "host/base/options.h"
+#include "host/base/parse.h"
+
+enum {
+    KEY_NEW = 256,
+    KEY_SERIAL,
+    KEY_TCP,
+    KEY_BOARD,
+    FIRST_PORT = 7400,
+    HOST_BYTES = 128 /* of one of a list */
+};
+
+static const struct argp_option options_of_cube[] = {
+    {"new", KEY_NEW, "N", 0, "Write a cube file of N nodes to start from", 0},
+    {"serial", KEY_SERIAL, "DEVICE", OPTION_ARG_OPTIONAL,
+     "Of it: serial wires, and the host's is DEVICE (/dev/ttyUSB0)", 0},
+    {"tcp", KEY_TCP, "HOST,HOST,..", 0,
+     "Of it: a machine for each node, wires over TCP, a key for them; "
+     "USER@HOST where incode deploy is to log in so",
+     0},
+    {"board", KEY_BOARD, "NAME", 0,
+     "Of it: what the nodes run on, linux or a board without a system", 0},
+    {"output", 'o', "FILE", 0, "Of it: the file, which must not be there yet",
+     0},
+    {0}};
+
+struct cube_new {
+    const char *file;   /* to check */
+    const char *output; /* to write */
+    unsigned nodes, dimension;
+    const char *device, *hosts;
+    const struct host_board *board;
+    struct host_error *error;
+};
+
+static void take_board(struct cube_new *c, const char *name)
+{
+    c->board = host_board_named(name);
+    if (c->board == NULL) {
+        host_fail(c->error, HOST_USAGE,
+                  "--board %s: not one that there is; incode run --help lists "
+                  "them",
+                  name);
+    }
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct cube_new *c = state->input;
+    switch (key) {
+    case KEY_NEW:
+        (void)host_parse_nodes("--new", value, HOST_NODES_MAX, "", &c->nodes,
+                               c->error);
+        return 0;
+    case KEY_SERIAL:
+        c->device = value == NULL ? "/dev/ttyUSB0" : value;
+        return 0;
+    case KEY_TCP:
+        c->hosts = value;
+        return 0;
+    case KEY_BOARD:
+        take_board(c, value);
+        return 0;
+    case 'o':
+        c->output = value;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (c->file != NULL) {
+            host_fail(c->error, HOST_USAGE,
+                      "%s: one argument too many; give one FILE", value);
+        }
+        c->file = value;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* "pi@10.0.0.11": the k-th of the list; "": there are fewer. */
+static void host_of(const struct cube_new *c, unsigned k, char text[HOST_BYTES])
+{
+    const char *at = c->hosts;
+    while (k > 0 && at != NULL) {
+        at = strchr(at, ',');
+        at = at == NULL ? NULL : at + 1;
+        k--;
+    }
+    snprintf(text, HOST_BYTES, "%.*s", at == NULL ? 0 : (int)strcspn(at, ","),
+             at == NULL ? "" : at);
+}
+
+/* That stands in quotation marks of a cube file as it is. */
+static bool is_word(const char *text)
+{
+    bool good = true;
+    for (const char *at = text; *at != '\0'; at++) {
+        good = good && *at > ' ' && *at < 0x7f && *at != '"' && *at != '\\';
+    }
+    return good;
+}
+
+static const char *address_of(const char *host)
+{
+    const char *at = strrchr(host, '@');
+    return at == NULL ? host : at + 1;
+}
+
+/* One for each node, neither more nor fewer. */
+static int check_hosts(const struct cube_new *c)
+{
+    char host[HOST_BYTES];
+    bool good = true;
+    for (unsigned i = 0; i <= c->nodes; i++) {
+        host_of(c, i, host);
+        good = good && (i == c->nodes) == (host[0] == '\0') && host[0] != '-' &&
+               is_word(host) && strlen(host) < HOST_BYTES - 1;
+    }
+    return good ? 0
+                : host_fail(c->error, HOST_USAGE,
+                            "--tcp %s: not %u hosts; give one for each node, "
+                            "as in 10.0.0.10,10.0.0.11",
+                            c->hosts, c->nodes);
+}
+
+static int check(struct cube_new *c)
+{
+    if (c->nodes > 0 && c->device != NULL && c->file != NULL) {
+        c->device = c->file; /* --serial DEVICE, with a blank */
+        c->file = NULL;
+    }
+    if (c->nodes == 0 && c->file == NULL) {
+        return host_fail(c->error, HOST_USAGE,
+                         "cube: too few arguments; give FILE to check it, or "
+                         "--new N -o FILE to write one");
+    }
+    if (c->nodes == 0 || c->file != NULL) {
+        return c->output == NULL && c->device == NULL && c->hosts == NULL &&
+                       c->board == NULL && c->nodes == 0
+                   ? 0
+                   : host_fail(c->error, HOST_USAGE,
+                               "cube: --new N writes a file, and FILE alone "
+                               "checks one; give --new N -o FILE, or FILE");
+    }
+    if (c->output == NULL) {
+        return host_fail(c->error, HOST_USAGE,
+                         "cube --new: no file to write; add -o lab.cube");
+    }
+    bool bare = c->board != NULL && c->board->bare != NULL;
+    if (c->hosts != NULL && (bare || c->device != NULL)) {
+        return host_fail(
+            c->error, HOST_USAGE, "--tcp: %s; leave one of them out",
+            bare ? "that board has no network" : "not beside --serial");
+    }
+    if (c->device != NULL && !is_word(c->device)) {
+        return host_fail(c->error, HOST_USAGE,
+                         "--serial %s: no name of a port; give one such as "
+                         "/dev/ttyUSB0, or usb:SERIAL of an adapter",
+                         c->device);
+    }
+    if (c->hosts != NULL && check_hosts(c) != 0) {
+        return c->error->code;
+    }
+    c->dimension = (unsigned)__builtin_ctz(c->nodes);
+    if (bare && c->nodes > host_bare_nodes_max(c->board->bare)) {
+        return host_fail(c->error, HOST_USAGE,
+                         "--new %u: %s has UARTs for a cube of %u; give %u or "
+                         "fewer",
+                         c->nodes, c->board->name,
+                         host_bare_nodes_max(c->board->bare),
+                         host_bare_nodes_max(c->board->bare));
+    }
+    return 0;
+}
+
+/* --- what it writes ------------------------------------------------------- */
+
+/* Every pair of neighbours, the smaller first; what is between them. */
+static void put_pairs(FILE *out, const struct cube_new *c,
+                      void (*put)(FILE *out, const struct cube_new *c,
+                                  unsigned node, unsigned d))
+{
+    for (unsigned i = 0; i < c->nodes; i++) {
+        for (unsigned d = 0; d < c->dimension; d++) {
+            if ((i & 1u << d) == 0) {
+                (void)fprintf(out, ",\n    { node = %u; to = %u; ", i,
+                              i | 1u << d);
+                put(out, c, i, d);
+                (void)fputs(" }", out);
+            }
+        }
+    }
+    (void)fputs("\n);\n", out);
+}
+
+static void put_unix(FILE *out, const struct cube_new *c, unsigned node,
+                     unsigned d)
+{
+    (void)c;
+    (void)fprintf(out, "unix = \"%u-%u.socket\";", node, node | 1u << d);
+}
+
+static void put_serial(FILE *out, const struct cube_new *c, unsigned node,
+                       unsigned d)
+{
+    (void)c;
+    (void)node;
+    (void)fprintf(out,
+                  "serial = [\"/dev/ttyUSB%u\", \"/dev/ttyUSB%u\"];\n"
+                  "      baud = 921600;",
+                  d, d);
+}
+
+/* A port of its own for each link of a machine. */
+static void put_tcp(FILE *out, const struct cube_new *c, unsigned node,
+                    unsigned d)
+{
+    char host[HOST_BYTES];
+    host_of(c, node, host);
+    (void)fprintf(out, "tcp = \"%s:%u\";", address_of(host),
+                  FIRST_PORT + 1 + node * c->dimension + d);
+}
+
+static void put_local(FILE *out, const struct cube_new *c)
+{
+    (void)fputs("# The host starts these nodes itself, on its own machine.\n"
+                "start = [",
+                out);
+    for (unsigned i = 0; i < c->nodes; i++) {
+        (void)fprintf(out, "%s%u", i == 0 ? "" : ", ", i);
+    }
+    (void)fputs("];\nlinks = (\n"
+                "    { node = 0; to = \"host\"; unix = \"host.socket\"; }",
+                out);
+    put_pairs(out, c, put_unix);
+}
+
+static void put_boards(FILE *out, const struct cube_new *c)
+{
+    const char *device = c->device == NULL ? "/dev/ttyUSB0" : c->device;
+    (void)fprintf(out,
+                  "board = \"%s\";\n"
+                  "# EDIT: the host's port.  usb:NUMBER is an adapter by its "
+                  "serial number.\n"
+                  "# From board to board UART goes to UART: incode cube says "
+                  "which.\n"
+                  "links = (\n    { node = 0; to = \"host\"; serial = [\"UART "
+                  "0\", \"%s\"];\n      baud = %u; }\n);\n",
+                  c->board->name, device, c->board->bare->serial_baud);
+}
+
+static void put_lines(FILE *out, const struct cube_new *c)
+{
+    (void)fprintf(out,
+                  "# EDIT: serial = [port at `node`, port at `to`], of its own "
+                  "machine each.\n"
+                  "links = (\n    { node = 0; to = \"host\"; serial = "
+                  "[\"/dev/ttyUSB%u\", \"%s\"];\n      baud = 921600; }",
+                  c->dimension, c->device);
+    put_pairs(out, c, put_serial);
+}
+
+static void put_machines(FILE *out, const struct cube_new *c, const char *key)
+{
+    char host[HOST_BYTES];
+    (void)fprintf(out,
+                  "# Whoever has a copy of this key can join the cube.\n"
+                  "key = \"%s\";\n"
+                  "# EDIT: who incode deploy logs in as; take out what you "
+                  "start by hand.\n"
+                  "nodes = (",
+                  key);
+    for (unsigned i = 0; i < c->nodes; i++) {
+        host_of(c, i, host);
+        (void)fprintf(out, "%s\n    { node = %u; ssh = \"%s\"; }",
+                      i == 0 ? "" : ",", i, host);
+    }
+    host_of(c, 0, host);
+    (void)fprintf(out,
+                  "\n);\n# At `node` this address is listened on, by `to` it "
+                  "is called.\nlinks = (\n"
+                  "    { node = 0; to = \"host\"; tcp = \"%s:%u\"; }",
+                  address_of(host), (unsigned)FIRST_PORT);
+    put_pairs(out, c, put_tcp);
+}
+
+/* The key of a new cube, beside its file: one that is there is taken. */
+static int make_key(const struct cube_new *c, char *path, size_t size)
+{
+    const char *slash = strrchr(c->output, '/');
+    const char *name = slash == NULL ? c->output : slash + 1;
+    const char *dot = strrchr(name, '.');
+    int stem = dot == NULL || dot == name ? (int)strlen(c->output)
+                                          : (int)(dot - c->output);
+    if (snprintf(path, size, "%.*s.key", stem, c->output) >= (int)size) {
+        return host_fail(c->error, HOST_USAGE,
+                         "-o %s: too long; give a shorter name", c->output);
+    }
+    return access(path, F_OK) == 0 ? 0 : host_key_make(path, c->error);
+}
+
+static int write_new(const struct cube_new *c)
+{
+    char key[4096] = "";
+    if (c->hosts != NULL && access(c->output, F_OK) != 0 &&
+        make_key(c, key, sizeof key) != 0) {
+        return c->error->code;
+    }
+    int fd = open(c->output, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    FILE *out = fd < 0 ? NULL : fdopen(fd, "w");
+    if (out == NULL) {
+        return host_fail(
+            c->error, HOST_INPUT, "%s: %s; give another -o", c->output,
+            errno == EEXIST ? "is there already, and stays" : strerror(errno));
+    }
+    (void)fprintf(out,
+                  "# A cube of %u nodes, by incode cube --new.  Check it with: "
+                  "incode cube FILE\n"
+                  "dimension = %u;\n",
+                  c->nodes, c->dimension);
+    if (c->hosts != NULL) {
+        const char *slash = strrchr(key, '/');
+        put_machines(out, c, slash == NULL ? key : slash + 1);
+    } else if (c->board != NULL && c->board->bare != NULL) {
+        put_boards(out, c);
+    } else if (c->device != NULL) {
+        put_lines(out, c);
+    } else {
+        put_local(out, c);
+    }
+    bool good = ferror(out) == 0;
+    if (fclose(out) != 0 || !good) {
+        int reason = errno;
+        (void)unlink(c->output);
+        return host_fail(c->error, HOST_INPUT, "%s: %s; give another -o",
+                         c->output, strerror(reason));
+    }
+    printf("%s: %u nodes%s%s; edit what says EDIT, then: incode cube %s\n",
+           c->output, c->nodes, key[0] == '\0' ? "" : ", with the key ", key,
+           c->output);
+    return 0;
+}
+
+int host_cube_command(int argc, char **argv, struct host_error *error)
+{
+    static const struct argp argp = {
+        options_of_cube,
+        parse,
+        "FILE\n--new N -o FILE",
+        "Checks a cube file, and prints how each of its nodes is started. Or "
+        "writes one to start from.\v"
+        "Example:\n"
+        "  incode cube --new 4 --tcp pi@10.0.0.10,pi@10.0.0.11,pi@10.0.0.12,"
+        "pi@10.0.0.13 -o lab.cube\n"
+        "  incode cube --new 8 --board mps2-an500 --serial=/dev/ttyUSB0 -o "
+        "lab.cube",
+        NULL,
+        NULL,
+        NULL};
+    struct cube_new c = {.error = error};
+    if (host_options_parse(&argp, argc, argv, 0, &c, error) != 0 ||
+        check(&c) != 0) {
+        return error->code;
+    }
+    return c.nodes > 0 ? write_new(&c) : host_cube_print(c.file, error);
+}

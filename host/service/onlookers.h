@@ -1,0 +1,79 @@
+/* Those who look on at the cube from other programs: what they ask goes to the
+ * nodes as any counted message, and only while they ask.
+ *
+ * Memory: struct host_onlooking, 0.4 KB.  Work: constant a message; where
+ * nobody looks, a call every 50 ms.
+ *
+ *     host_onlooking_look(&onlooking, &machine, now_us, &progress);
+ *     if (host_onlooking_due(&onlooking, node, &question) &&
+ *         cube_write(cube, 3, NODE_QUESTION, &question, sizeof question) == 0)
+ *         host_onlooking_sent(&onlooking, node);
+ *     if (message.type == NODE_ANSWER)
+ *         host_onlooking_take(&onlooking, &machine, &message);
+ */
+#ifndef HOST_ONLOOKERS_H
+#define HOST_ONLOOKERS_H
+
+#include "host/base/node_set.h"
+#include "machine.h"
+#include "node/questions.h"
+
+/* The tag of their questions; who else asks takes another. */
+#define HOST_ONLOOKERS_TAG UINT32_MAX
+
+struct host_onlookers_question {
+    enum node_question what;
+    struct host_node_set nodes;
+};
+
+/* How far a run is; all 0: there is none. */
+struct host_onlookers_progress {
+    uint64_t committed, bricks, tetrahedra;
+};
+
+/* Where they are: host/look/. */
+struct host_onlookers {
+    void *context;
+    /* The next question, once the one before is answered; false: none. */
+    bool (*ask)(void *context, uint64_t now_us,
+                struct host_onlookers_question *question);
+    /* What a node has answered, and that no more comes to this question. */
+    void (*answer)(void *context, unsigned node, const uint8_t *data,
+                   size_t size);
+    void (*answered)(void *context, uint64_t now_us,
+                     const struct host_onlookers_progress *progress);
+    /* Who has the cube, where it is another program of this machine: until the
+     * next call; NULL: not known. */
+    const char *(*holder)(void *context);
+};
+
+/* All zero: nobody looks. */
+struct host_onlooking {
+    bool asked;
+    struct host_onlookers_question question;
+    struct host_node_set due, waited;
+    uint64_t look_us, asked_us;
+};
+
+/* Takes the next question, or ends one whose answers are here, or late. */
+void host_onlooking_look(struct host_onlooking *onlooking,
+                         const struct host_machine *machine, uint64_t now_us,
+                         const struct host_onlookers_progress *progress);
+
+/* Whether the node is to be asked now. */
+bool host_onlooking_due(const struct host_onlooking *onlooking, unsigned node,
+                        struct node_question_message *question);
+void host_onlooking_sent(struct host_onlooking *onlooking, unsigned node);
+
+/* The node will not answer. */
+void host_onlooking_leave_out(struct host_onlooking *onlooking, unsigned node);
+
+/* NODE_ANSWER: whether it was theirs. */
+bool host_onlooking_take(struct host_onlooking *onlooking,
+                         const struct host_machine *machine,
+                         const struct cube_message *message);
+
+/* What was under way may be lost: who has not answered is asked again. */
+void host_onlooking_again(struct host_onlooking *onlooking);
+
+#endif

@@ -1,0 +1,187 @@
+/* Those who look on at a run ask all the time, and change nothing of what comes
+ * out: the simulated cube of service_world.h, in virtual time. */
+#include "host/service/onlookers.h"
+#include "service_world.h"
+
+enum {
+    SECOND = 1000000,
+    LATE_US = 2100000, /* of answers, and a round of the service */
+    EVERY_US = 50000
+};
+
+/* One who has the next question at once. */
+static struct {
+    bool asked;
+    uint32_t questions, answers, finished, sizes[NODE_QUESTIONS + 1];
+    uint64_t asked_us, longest_us, committed, tetrahedra;
+    enum node_question what;
+    struct host_node_set nodes, answered;
+} onlooker;
+
+static bool ask(void *context, uint64_t now_us,
+                struct host_onlookers_question *question)
+{
+    (void)context;
+    assert_false(onlooker.asked);
+    onlooker.asked = true;
+    onlooker.asked_us = now_us;
+    onlooker.what =
+        (enum node_question)(NODE_WHO + onlooker.questions++ % NODE_LOG);
+    memset(&onlooker.answered, 0, sizeof onlooker.answered);
+    question->what = onlooker.what;
+    question->nodes = onlooker.nodes;
+    return true;
+}
+
+static void answer(void *context, unsigned node, const uint8_t *data,
+                   size_t size)
+{
+    (void)context, (void)data;
+    assert_true(onlooker.asked);
+    assert_true(host_node_set_has(&onlooker.nodes, node));
+    assert_false(host_node_set_has(&onlooker.answered, node));
+    host_node_set_add(&onlooker.answered, node);
+    onlooker.answers++;
+    onlooker.sizes[onlooker.what] = (uint32_t)size;
+}
+
+static void answered(void *context, uint64_t now_us,
+                     const struct host_onlookers_progress *progress)
+{
+    uint64_t took_us = now_us - onlooker.asked_us;
+    (void)context;
+    assert_true(onlooker.asked);
+    assert_true(progress->committed <= progress->bricks);
+    assert_true(progress->committed >= onlooker.committed);
+    onlooker.asked = false;
+    onlooker.finished++;
+    onlooker.committed = progress->committed;
+    onlooker.tetrahedra = progress->tetrahedra;
+    onlooker.longest_us =
+        took_us > onlooker.longest_us ? took_us : onlooker.longest_us;
+}
+
+static const char *holder(void *context)
+{
+    (void)context;
+    return "incode run a.xyz, process 12 of alice";
+}
+
+static const struct host_onlookers onlookers = {NULL, ask, answer, answered,
+                                                holder};
+
+static int set_up(void **unused)
+{
+    struct host_error error = {0};
+    (void)unused;
+    assert_int_equal(host_gen("uniform", 16000, 5, &points, &error), 0);
+    for (unsigned k = 0; k < 2; k++) {
+        prepare();
+        start_world();
+        assert_int_equal(
+            run(k == 0 ? &host_sequential : &host_spatial, &expected, &error),
+            0);
+        *(k == 0 ? &sequential_us : &spatial_us) = world.sim.now_us;
+    }
+    return 0;
+}
+
+static int tear_down(void **unused)
+{
+    (void)unused;
+    host_points_free(&points);
+    return 0;
+}
+
+static void look_on(void)
+{
+    prepare();
+    memset(&onlooker, 0, sizeof onlooker);
+    host_node_set_all(&onlooker.nodes, NODES);
+    world.onlookers = &onlookers;
+}
+
+static void test_each_strategy(void **unused)
+{
+    static const struct host_strategy *const strategies[] = {
+        &host_sequential, &host_spatial, &host_exchange};
+    (void)unused;
+    for (size_t k = 0; k < sizeof strategies / sizeof strategies[0]; k++) {
+        look_on();
+        survives(strategies[k]);
+        assert_int_equal(result.generations, 1);
+        assert_true(onlooker.finished > 0);
+        assert_true(onlooker.finished + 1 >= onlooker.questions);
+        assert_true(onlooker.answers >= NODES * onlooker.finished);
+        assert_int_equal(onlooker.sizes[NODE_WHO], sizeof(struct node_who));
+        assert_true(onlooker.longest_us < SECOND);
+        assert_true(onlooker.questions <= world.sim.now_us / EVERY_US + 1);
+    }
+}
+
+/* Who starts again has forgotten what it was asked, and is asked again; who is
+ * gone is left out. */
+static void test_losses(void **unused)
+{
+    (void)unused;
+    static const enum what events[] = {RESTART, KILL, CUT};
+    for (unsigned k = 0; k < 12; k++) {
+        unsigned tenths = 1 + k / 3;
+        look_on();
+        world.events[0] =
+            (struct event){events[k % 3], 0.1 * tenths, 1 + k % 7, k % 3};
+        survives(k % 2 == 0 ? &host_spatial : &host_sequential);
+        assert_true(onlooker.finished > 0);
+        assert_true(onlooker.longest_us <= LATE_US);
+    }
+}
+
+/* A part of the nodes, and one question alone: the others hear nothing. */
+static void test_some(void **unused)
+{
+    (void)unused;
+    look_on();
+    memset(&onlooker.nodes, 0, sizeof onlooker.nodes);
+    host_node_set_add(&onlooker.nodes, 5);
+    survives(&host_spatial);
+    assert_true(onlooker.answers >= onlooker.finished);
+    assert_true(onlooker.answers <= onlooker.questions);
+}
+
+/* Nobody asks: to the microsecond the same run as where nobody can. */
+static bool asks_not(void *context, uint64_t now_us,
+                     struct host_onlookers_question *question)
+{
+    (void)context, (void)now_us, (void)question;
+    onlooker.questions++;
+    return false;
+}
+
+static void test_nobody(void **unused)
+{
+    static const struct host_onlookers nobody = {NULL, asks_not, answer,
+                                                 answered, holder};
+    uint64_t took_us[2], before = state;
+    (void)unused;
+    for (unsigned k = 0; k < 2; k++) {
+        look_on();
+        state = before;
+        world.onlookers = k == 0 ? NULL : &nobody;
+        survives(&host_spatial);
+        took_us[k] = world.sim.now_us;
+    }
+    assert_int_equal(took_us[0], took_us[1]);
+    assert_true(onlooker.questions > 0);
+    assert_true(onlooker.questions <= took_us[1] / EVERY_US + 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_each_strategy),
+        cmocka_unit_test(test_losses),
+        cmocka_unit_test(test_some),
+        cmocka_unit_test(test_nobody),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
