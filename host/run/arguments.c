@@ -363,7 +363,7 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         parse_output(p, value);
         return 0;
     case KEY_NODES:
-        (void)host_parse_nodes(value, HOST_PROCESSES_MAX,
+        (void)host_parse_nodes("--nodes", value, HOST_PROCESSES_MAX,
                                ", or with --cube what its file says",
                                &p->options->nodes, p->error);
         return 0;

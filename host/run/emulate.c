@@ -20,7 +20,14 @@
 #include "host/machines/board_emulated.h"
 #include "transport/drivers/tcp_address.h"
 
-enum { KEY_BOARD = 256, KEY_NODES, KEY_LINUX, KEY_OPEN, LOOK_US = 20000 };
+enum {
+    KEY_BOARD = 256,
+    KEY_NODES,
+    KEY_LINUX,
+    KEY_OPEN,
+    KEY_EMPTY,
+    LOOK_US = 20000
+};
 
 static const struct argp_option options_of_emulate[] = {
     {"board", KEY_BOARD, "NAME", 0, "mps2-an500, mps2-an385 or raspi3b", 0},
@@ -34,6 +41,10 @@ static const struct argp_option options_of_emulate[] = {
      "Joins no boards: between node 1 and node 3 each listens at its end, "
      "FILE.d/1-3.socket and FILE.d/3-1.socket, for what is put between them",
      0},
+    {"empty", KEY_EMPTY, NULL, 0,
+     "Puts no image into new flash chips: boards have their loaders alone, as "
+     "when they are bought, and wait for incode flash",
+     0},
     {"output", 'o', "FILE", 0,
      "The cube file to write. Sockets, consoles and flash chips are in FILE.d",
      0},
@@ -45,14 +56,14 @@ struct emulate {
     uint64_t linux_nodes; /* a bit for each */
     const char *list;     /* of them, as given; NULL: there are none */
     bool open;            /* boards are not joined */
+    bool empty;           /* and their chips have no image */
     const char *file;
     char directory[PATH_MAX];
     int locked; /* the directory, open */
     struct host_error *error;
 };
 
-/* --- the arguments ---------------------------------------------------------
- */
+/* --- the arguments -------------------------------------------------------- */
 
 static void parse_board(struct emulate *e, const char *value)
 {
@@ -107,14 +118,17 @@ static error_t parse(int key, char *value, struct argp_state *state)
         parse_board(e, value);
         return 0;
     case KEY_NODES:
-        (void)host_parse_nodes(value, HOST_EMULATED_MAX, "", &e->nodes,
-                               e->error);
+        (void)host_parse_nodes("--nodes", value, HOST_EMULATED_MAX, "",
+                               &e->nodes, e->error);
         return 0;
     case KEY_LINUX:
         parse_linux(e, value);
         return 0;
     case KEY_OPEN:
         e->open = true;
+        return 0;
+    case KEY_EMPTY:
+        e->empty = true;
         return 0;
     case 'o':
         e->file = value;
@@ -145,6 +159,12 @@ static int check(const struct emulate *e)
                          "or fewer",
                          e->nodes, e->board->name, most, most);
     }
+    if (e->empty && !e->board->bare->flash) {
+        return host_fail(e->error, HOST_USAGE,
+                         "--empty: %s has no flash, and is given its image at "
+                         "each start; leave it out",
+                         e->board->name);
+    }
     if ((e->linux_nodes & ~all) != 0 || e->linux_nodes == all) {
         return host_fail(e->error, HOST_USAGE,
                          "--linux %s: not some of nodes 0 to %u; leave a board "
@@ -154,8 +174,7 @@ static int check(const struct emulate *e)
     return 0;
 }
 
-/* --- what it leaves --------------------------------------------------------
- */
+/* --- what it leaves ------------------------------------------------------- */
 
 /* The directory beside the file, for one program at a time. */
 static int take_directory(struct emulate *e)
@@ -279,8 +298,7 @@ static int write_file(const struct emulate *e)
     return host_output_commit(e->error);
 }
 
-/* --- its run ---------------------------------------------------------------
- */
+/* --- its run -------------------------------------------------------------- */
 
 static volatile sig_atomic_t ended;
 
@@ -314,7 +332,8 @@ static int start(const struct emulate *e, struct host_started *started)
                                            .link = host_link_named("uart"),
                                            .left_out = e->linux_nodes,
                                            .directory = e->directory,
-                                           .open = e->open};
+                                           .open = e->open,
+                                           .empty = e->empty};
     return e->board->start(e->board, &options, started, e->error);
 }
 
@@ -385,8 +404,11 @@ int host_emulate(int argc, char **argv, struct host_error *error)
     int status = write_file(&e);
     expect_end();
     if (status == 0) {
-        printf("%u nodes of %s: incode run POINTS --cube %s\n", e.nodes,
-               e.board->name, e.file);
+        printf("%u nodes of %s: ", e.nodes, e.board->name);
+        if (e.empty) {
+            printf("incode flash IMAGE --cube %s; then ", e.file);
+        }
+        printf("incode run POINTS --cube %s\n", e.file);
         (void)fflush(stdout);
         status = keep(&e, machine);
         (void)unlink(e.file);

@@ -3,6 +3,9 @@
 #include "host/machines/remote.h"
 #include "transport/secure_wipe.h"
 
+/* Until another program of this machine has ended. */
+enum { IN_USE_US = 5000000 };
+
 /* One run a program. */
 static struct host_cube_file the_file;
 static void (*stop_remote)(void *context);
@@ -14,18 +17,6 @@ static void stop(void *context)
     secure_wipe(the_file.key, sizeof the_file.key);
 }
 
-/* What the first node of those that the host starts runs on; NULL: there is
- * none. */
-static const struct host_board *started_board(const struct host_cube_file *file)
-{
-    for (unsigned i = 0; i < file->nodes; i++) {
-        if (file->local[i]) {
-            return file->board_of[i];
-        }
-    }
-    return NULL;
-}
-
 static int begin(const struct host_run_options *options,
                  struct host_run_result *result, struct host_machine *machine,
                  struct host_error *error)
@@ -33,10 +24,9 @@ static int begin(const struct host_run_options *options,
     static struct host_remote remote;
     static char program[4096];
     (void)result;
-    const struct host_board *board = started_board(&the_file);
-    if ((board != NULL &&
-         host_cluster_program(options->node_program, board->program, program,
-                              sizeof program, error) != 0) ||
+    if (host_remote_free(&the_file, IN_USE_US, error) != 0 ||
+        host_remote_program(&the_file, options->node_program, program,
+                            sizeof program, error) != 0 ||
         host_remote_start(&remote, &the_file, program, error) != 0) {
         return error->code;
     }
@@ -63,7 +53,8 @@ int host_run_on_cube(struct host_run_options *options, struct host_error *error)
                          "has its own; leave it out",
                          options->cube);
     }
-    if (options->node_program != NULL && started_board(&the_file) == NULL) {
+    if (options->node_program != NULL &&
+        host_remote_started(&the_file) == NULL) {
         return host_fail(error, HOST_USAGE,
                          "--node-program: the host starts none of the nodes of "
                          "%s; leave it out",

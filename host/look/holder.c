@@ -1,0 +1,140 @@
+#include "holder.h"
+
+#include <fcntl.h>
+#include <pwd.h>
+#include <sodium.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "host/base/text.h"
+
+enum { NAME_BYTES = 16, START_FIELD = 22, DAY_S = 86400 };
+
+socklen_t host_holder_address(const char *wire, struct sockaddr_un *address)
+{
+    uint8_t digest[NAME_BYTES];
+    char hex[2 * NAME_BYTES + 1];
+    memset(address, 0, sizeof *address);
+    address->sun_family = AF_UNIX;
+    (void)crypto_generichash(digest, sizeof digest, (const uint8_t *)wire,
+                             strlen(wire), NULL, 0);
+    (void)sodium_bin2hex(hex, sizeof hex, digest, sizeof digest);
+    int size = snprintf(address->sun_path + 1, sizeof address->sun_path - 1,
+                        "incode-look-%s", hex);
+    return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 +
+                       (size_t)size);
+}
+
+/* A file of /proc/PID; how many bytes. */
+static size_t read_of(pid_t pid, const char *name, char *text, size_t size)
+{
+    char path[64];
+    snprintf(path, sizeof path, "/proc/%ld/%s", (long)pid, name);
+    int file = open(path, O_RDONLY | O_CLOEXEC);
+    ssize_t n = file < 0 ? -1 : read(file, text, size - 1);
+    if (file >= 0) {
+        close(file);
+    }
+    text[n > 0 ? n : 0] = '\0';
+    return n > 0 ? (size_t)n : 0;
+}
+
+static void find_command(struct host_holder *holder)
+{
+    char line[sizeof holder->command];
+    size_t used = read_of(holder->pid, "cmdline", line, sizeof line);
+    while (used > 0 && line[used - 1] == '\0') {
+        used--;
+    }
+    for (size_t i = 0; i < used; i++) {
+        line[i] = line[i] == '\0' ? ' ' : line[i];
+    }
+    size_t name = strcspn(line, " ");
+    while (name > 0 && line[name - 1] != '/') {
+        name--;
+    }
+    host_text_printable(holder->command, sizeof holder->command, line + name);
+    if (used == 0) {
+        snprintf(holder->command, sizeof holder->command, "a program");
+    }
+}
+
+static void find_user(struct host_holder *holder)
+{
+    const struct passwd *user = getpwuid(holder->uid);
+    if (user != NULL) {
+        host_text_printable(holder->user, sizeof holder->user, user->pw_name);
+    } else {
+        snprintf(holder->user, sizeof holder->user, "user %lu",
+                 (unsigned long)holder->uid);
+    }
+}
+
+/* The kernel counts ticks from its own start to that of the process. */
+static void find_since(struct host_holder *holder)
+{
+    char text[1024];
+    struct timespec up;
+    const char *at = NULL;
+    long a_second = sysconf(_SC_CLK_TCK);
+    if (read_of(holder->pid, "stat", text, sizeof text) > 0) {
+        at = strrchr(text, ')'); /* the name before it may hold anything */
+    }
+    for (int field = 2; at != NULL && field < START_FIELD; field++) {
+        at = strchr(at + 1, ' ');
+    }
+    if (at != NULL && a_second > 0 && clock_gettime(CLOCK_BOOTTIME, &up) == 0) {
+        int64_t began_s = strtoll(at, NULL, 10) / a_second;
+        holder->since_s = (int64_t)time(NULL) - (int64_t)up.tv_sec + began_s;
+    }
+}
+
+bool host_holder_of(struct host_holder *holder, int file)
+{
+    struct ucred peer;
+    socklen_t size = sizeof peer;
+    memset(holder, 0, sizeof *holder);
+    if (getsockopt(file, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 ||
+        peer.pid <= 0) {
+        return false;
+    }
+    holder->pid = peer.pid;
+    holder->uid = peer.uid;
+    find_command(holder);
+    find_user(holder);
+    find_since(holder);
+    return true;
+}
+
+bool host_holder_find(struct host_holder *holder, const char *wire)
+{
+    struct sockaddr_un address;
+    socklen_t size = host_holder_address(wire, &address);
+    int file = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    bool found = file >= 0 &&
+                 connect(file, (const struct sockaddr *)&address, size) == 0 &&
+                 host_holder_of(holder, file) && holder->pid != getpid();
+    if (file >= 0) {
+        close(file);
+    }
+    return found;
+}
+
+const char *host_holder_text(const struct host_holder *holder, char *text,
+                             size_t size)
+{
+    char since[48] = "";
+    time_t began = (time_t)holder->since_s;
+    struct tm tm;
+    if (holder->since_s != 0 && localtime_r(&began, &tm) != NULL) {
+        bool today = time(NULL) - began < DAY_S;
+        (void)strftime(since, sizeof since,
+                       today ? ", since %H:%M" : ", since %Y-%m-%d %H:%M", &tm);
+    }
+    snprintf(text, size, "%s, process %ld of %s%s", holder->command,
+             (long)holder->pid, holder->user, since);
+    return text;
+}
