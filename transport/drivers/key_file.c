@@ -8,9 +8,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "transport/check.h"
 #include "transport/secure_wipe.h"
 
-enum { DIGITS = 2 * SECURE_KEY_BYTES };
+enum { DIGITS = 2 * SECURE_KEY_BYTES, TEXT = KEY_FILE_MARK_MAX + DIGITS };
 
 /* As many as there are, up to size; -1 and errno. */
 static ssize_t read_all(int fd, char *text, size_t size)
@@ -46,10 +47,12 @@ static void forbid_dumps(void)
     (void)prctl(PR_SET_DUMPABLE, 0);
 }
 
-static enum key_file_state read_key(int fd, uint8_t *key)
+static enum key_file_state read_key(int fd, const char *mark, uint8_t *key)
 {
     struct stat about;
-    char text[DIGITS];
+    char text[TEXT];
+    size_t before = strlen(mark);
+    LINK_ASSERT(before <= KEY_FILE_MARK_MAX);
     if (fstat(fd, &about) != 0) {
         return KEY_FILE_UNREADABLE;
     }
@@ -63,8 +66,10 @@ static enum key_file_state read_key(int fd, uint8_t *key)
     if ((about.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
         return KEY_FILE_WRITABLE;
     }
-    ssize_t got = read_all(fd, text, sizeof text);
-    bool whole = got == DIGITS && read_digits(text, key);
+    ssize_t got = read_all(fd, text, before + DIGITS);
+    bool whole = got == (ssize_t)before + DIGITS &&
+                 memcmp(text, mark, before) == 0 &&
+                 read_digits(text + before, key);
     secure_wipe(text, sizeof text);
     if (!whole) {
         return got < 0 ? KEY_FILE_UNREADABLE : KEY_FILE_NO_KEY;
@@ -73,13 +78,14 @@ static enum key_file_state read_key(int fd, uint8_t *key)
                                                       : KEY_FILE_GOOD;
 }
 
-enum key_file_state key_file_read(const char *path, uint8_t *key)
+enum key_file_state key_file_read_marked(const char *path, const char *mark,
+                                         uint8_t *key)
 {
     forbid_dumps();
     /* A pipe's other end is not waited for. */
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     enum key_file_state state =
-        fd < 0 ? KEY_FILE_UNREADABLE : read_key(fd, key);
+        fd < 0 ? KEY_FILE_UNREADABLE : read_key(fd, mark, key);
     int reason = errno;
     if (fd >= 0) {
         close(fd);
@@ -89,6 +95,11 @@ enum key_file_state key_file_read(const char *path, uint8_t *key)
     }
     errno = reason;
     return state;
+}
+
+enum key_file_state key_file_read(const char *path, uint8_t *key)
+{
+    return key_file_read_marked(path, "", key);
 }
 
 struct key_file_text key_file_text(enum key_file_state state)

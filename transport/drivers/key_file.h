@@ -3,7 +3,7 @@
  * those who can read it, of which the user is to be told.  From then on the
  * process leaves no core, and the user's other programs cannot look into it.
  *
- * Memory: none.  Work: reads the first 64 bytes.
+ * Memory: none.  Work: reads the digits.
  *
  *     enum key_file_state state = key_file_read("cube.key", key);
  *     if (state != KEY_FILE_GOOD)
@@ -13,6 +13,8 @@
 #define TRANSPORT_DRIVERS_KEY_FILE_H
 
 #include "transport/secure.h"
+
+enum { KEY_FILE_MARK_MAX = 32 };
 
 enum key_file_state {
     KEY_FILE_GOOD,
@@ -30,6 +32,11 @@ struct key_file_text {
 /* key: SECURE_KEY_BYTES, filled where the state is one of the first two, else
  * zeros; the caller's to wipe. */
 enum key_file_state key_file_read(const char *path, uint8_t *key);
+
+/* The same of another secret, whose digits stand behind a mark, at most
+ * KEY_FILE_MARK_MAX bytes, so that neither is taken for the other. */
+enum key_file_state key_file_read_marked(const char *path, const char *mark,
+                                         uint8_t *key);
 struct key_file_text key_file_text(enum key_file_state state);
 
 #endif

@@ -358,3 +358,13 @@ void serial_port_close(struct serial_port *port)
     port->pipe.closed = true;
     port->pipe.recover = NULL;
 }
+
+int serial_port_set(const struct serial_port *port, bool rts, bool high)
+{
+    int line = rts ? TIOCM_RTS : TIOCM_DTR;
+    if (port->pipe.fd < 0) {
+        errno = ENODEV;
+        return -1;
+    }
+    return ioctl(port->pipe.fd, high ? TIOCMBIS : TIOCMBIC, &line);
+}

@@ -46,6 +46,10 @@ int serial_port_open(struct serial_port *port,
                      const struct serial_port_settings *settings);
 void serial_port_close(struct serial_port *port);
 
+/* Raises or lowers RTS, else DTR, of a port that is open: 0, or -1 and errno;
+ * ENODEV: it is not. */
+int serial_port_set(const struct serial_port *port, bool rts, bool high);
+
 /* The process other than this that has a device open: its number and its name,
  * as far as /proc tells; 0: none that it tells of.  Whoever has the master of a
  * pseudo-terminal does not count. */
