@@ -1,0 +1,362 @@
+#include "sign.h"
+
+#include <argp.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/base/options.h"
+#include "host/base/parse.h"
+#include "host/base/text.h"
+#include "host/files/output.h"
+#include "host/machines/boards.h"
+#include "image_file.h"
+#include "node/loader/messages.h"
+#include "node/version.h"
+#include "sign_key.h"
+#include "transport/drivers/loader_sodium.h"
+
+enum {
+    KEY_KEY = 256,
+    KEY_BOARD,
+    KEY_VERSION,
+    KEY_NUMBER,
+    KEY_ADDRESS,
+    KEY_NO_WAY_BACK,
+    ADDRESS = 0x10000, /* that boards' images are linked for */
+    BYTES_MAX = LOADER_BLOCKS_MAX * LOADER_BLOCK_BYTES
+};
+
+struct sign {
+    const char *path, *key, *board, *version, *output;
+    uint64_t number, address;
+    bool has_number, has_address, no_way_back;
+    struct host_error *error;
+};
+
+/* --- the arguments -------------------------------------------------------- */
+
+static const struct argp_option options_of_sign[] = {
+    {"key", KEY_KEY, "FILE", 0,
+     "The secret half of a pair, as incode key --sign makes it", 0},
+    {"board", KEY_BOARD, "NAME", 0,
+     "IMAGE is a board's binary, and of this one: it becomes an image", 0},
+    {"version", KEY_VERSION, "TEXT", 0,
+     "For people. Default: the image's, or that of this program", 0},
+    {"number", KEY_NUMBER, "N", 0,
+     "How you count your images: a later one is larger. Default: the image's, "
+     "or 1",
+     0},
+    {"no-way-back", KEY_NO_WAY_BACK, NULL, 0,
+     "A board that has run this image takes none with a lower number", 0},
+    {"address", KEY_ADDRESS, "A", 0,
+     "That the binary is linked for. Default: the image's, or 0x10000", 0},
+    {"output", 'o', "FILE", 0, "Write it there. Default: to IMAGE itself", 0},
+    {0}};
+
+static const struct argp_option options_of_image[] = {
+    {"key", KEY_KEY, "FILE.pub", 0,
+     "Is it signed with this pair? The exit status is 5 if not", 0},
+    {0}};
+
+static void parse_value(struct sign *s, const char *option, const char *value,
+                        uint64_t *number, bool *given)
+{
+    char *end = NULL;
+    bool hex = strncmp(value, "0x", 2) == 0 && value[2] != '\0';
+    unsigned long long all = hex ? strtoull(value, &end, 16) : 0;
+    *given = true;
+    *number = all;
+    bool good = hex ? *end == '\0' && all <= UINT32_MAX
+                    : host_parse_number(value, 0, UINT32_MAX, number) == 0;
+    if (!good) {
+        host_fail(s->error, HOST_USAGE,
+                  "--%s %s: not a number; give 0 to 4294967295", option, value);
+    }
+}
+
+static void parse_text(struct sign *s, const char *option, const char *value,
+                       size_t most, const char **text)
+{
+    bool printable = *value != '\0';
+    for (const char *at = value; *at != '\0'; at++) {
+        printable = *at > ' ' && *at < 0x7f && printable;
+    }
+    *text = value;
+    if (!printable || strlen(value) > most) {
+        host_fail(s->error, HOST_USAGE,
+                  "--%s %s: not a word of 1 to %zu letters, digits and signs; "
+                  "give such a one",
+                  option, value, most);
+    }
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct sign *s = state->input;
+    switch (key) {
+    case KEY_KEY:
+        s->key = value;
+        return 0;
+    case KEY_BOARD:
+        s->board = value;
+        return 0;
+    case KEY_VERSION:
+        parse_text(s, "version", value, LOADER_VERSION_BYTES, &s->version);
+        return 0;
+    case KEY_NUMBER:
+        parse_value(s, "number", value, &s->number, &s->has_number);
+        return 0;
+    case KEY_ADDRESS:
+        parse_value(s, "address", value, &s->address, &s->has_address);
+        return 0;
+    case KEY_NO_WAY_BACK:
+        s->no_way_back = true;
+        return 0;
+    case 'o':
+        s->output = value;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (s->path != NULL) {
+            host_fail(s->error, HOST_USAGE,
+                      "%s: one argument too many; give IMAGE alone", value);
+        }
+        s->path = value;
+        return 0;
+    case ARGP_KEY_END:
+        if (s->path == NULL) {
+            host_fail(s->error, HOST_USAGE,
+                      "%s: no IMAGE is given; give its file, see --help",
+                      state->name);
+        }
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int check_board(const struct sign *s)
+{
+    char allowed[120] = "";
+    for (unsigned i = 0; host_board_name(i) != NULL; i++) {
+        const struct host_board *board = host_board_row(i);
+        size_t used = strlen(allowed);
+        if (board->bare == NULL) {
+            continue;
+        }
+        if (strcmp(s->board, board->name) == 0) {
+            return 0;
+        }
+        snprintf(allowed + used, sizeof allowed - used, "%s%s",
+                 used == 0 ? "" : ", ", board->name);
+    }
+    return host_fail(s->error, HOST_USAGE,
+                     "--board %s: no board without a system; allowed: %s",
+                     s->board, allowed);
+}
+
+/* --- sign ----------------------------------------------------------------- */
+
+/* What the image is to be, and where its code begins in the file. */
+static int describe(const struct sign *s, const struct host_source *source,
+                    struct loader_image *image, size_t *code)
+{
+    bool old = source->bytes >= LOADER_HEADER_BYTES &&
+               loader_image_unpack(image, source->data) == LOADER_GOOD;
+    *code = old ? LOADER_HEADER_BYTES : 0;
+    if (old && source->bytes - *code != image->bytes) {
+        return host_fail(s->error, HOST_INPUT,
+                         "%s: an image that is not whole; copy or build it "
+                         "anew",
+                         s->path);
+    }
+    if (!old && s->board == NULL) {
+        return host_fail(s->error, HOST_USAGE,
+                         "%s: no image, or one with a damaged header; if it is "
+                         "a board's binary, say which with --board NAME",
+                         s->path);
+    }
+    if (source->bytes - *code > BYTES_MAX - LOADER_HEADER_BYTES) {
+        return host_fail(s->error, HOST_INPUT,
+                         "%s: %zu bytes, and a board takes %d; give a board's "
+                         "binary",
+                         s->path, source->bytes, BYTES_MAX);
+    }
+    if (!old) {
+        *image = (struct loader_image){.bytes = (uint32_t)source->bytes,
+                                       .address = ADDRESS,
+                                       .number = 1,
+                                       .version = NODE_VERSION};
+    }
+    if (s->board != NULL) {
+        memset(image->board, 0, sizeof image->board);
+        snprintf(image->board, sizeof image->board, "%s", s->board);
+    }
+    if (s->version != NULL) {
+        memset(image->version, 0, sizeof image->version);
+        snprintf(image->version, sizeof image->version, "%s", s->version);
+    }
+    image->number = s->has_number ? (uint32_t)s->number : image->number;
+    image->address = s->has_address ? (uint32_t)s->address : image->address;
+    image->flags |= s->no_way_back ? LOADER_NO_WAY_BACK : 0;
+    return 0;
+}
+
+/* An image is taken from somewhere else under its own digest alone. */
+static int check_old(const struct sign *s, const struct host_source *source)
+{
+    struct host_image old = {.source = *source};
+    (void)loader_image_unpack(&old.image, source->data);
+    return host_image_fault(&old) == LOADER_WRONG_DIGEST
+               ? host_fail(s->error, HOST_INPUT,
+                           "%s: its code is not what its header says; copy or "
+                           "build it anew",
+                           s->path)
+               : 0;
+}
+
+static int make(const struct sign *s, const struct host_source *source,
+                const struct host_sign_key *pair,
+                uint8_t header[LOADER_HEADER_BYTES], size_t *code)
+{
+    struct loader_image image;
+    if (describe(s, source, &image, code) != 0 ||
+        (*code > 0 && check_old(s, source) != 0)) {
+        return s->error->code;
+    }
+    loader_image_pack(&image, header);
+    host_image_digest(header, source->data + *code, image.bytes, image.digest);
+    memcpy(image.key, pair->public, sizeof image.key);
+    loader_image_pack(&image, header);
+    host_sign_key_sign(pair, header, LOADER_SIGNED_BYTES, image.signature);
+    loader_image_pack(&image, header);
+    return 0;
+}
+
+static int write_image(const struct sign *s, const struct host_source *source,
+                       const uint8_t header[LOADER_HEADER_BYTES], size_t code)
+{
+    struct host_output out;
+    const char *path = s->output == NULL ? s->path : s->output;
+    if (host_output_open(&out, path, s->error) != 0) {
+        return s->error->code;
+    }
+    host_output_bytes(&out, header, LOADER_HEADER_BYTES);
+    host_output_bytes(&out, source->data + code, source->bytes - code);
+    (void)host_output_close(&out, 1, s->error);
+    return host_output_commit(s->error);
+}
+
+int host_sign(int argc, char **argv, struct host_error *error)
+{
+    static const struct argp argp = {
+        options_of_sign,
+        parse,
+        "IMAGE --key FILE",
+        "Makes an image of a board's binary, or takes one as it is, and signs "
+        "it: boards take what is signed with the pair whose public half their "
+        "loader has.\v"
+        "Example:\n"
+        "  incode key --sign lab.sign\n"
+        "  incode sign build/firmware/mps2-an500.img --key lab.sign --number 2",
+        NULL,
+        NULL,
+        NULL};
+    struct sign s = {.error = error};
+    struct host_source source;
+    struct host_sign_key pair;
+    uint8_t header[LOADER_HEADER_BYTES];
+    size_t code;
+    if (host_options_parse(&argp, argc, argv, 0, &s, error) != 0 ||
+        (s.board != NULL && check_board(&s) != 0)) {
+        return error->code;
+    }
+    if (s.key == NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "--key: is missing; give the secret half of a pair, "
+                         "made with: incode key --sign FILE");
+    }
+    if (host_sign_key_read(&pair, s.key, error) != 0) {
+        return error->code;
+    }
+    int status = host_source_open(&source, s.path, false, error);
+    if (status == 0) {
+        status = make(&s, &source, &pair, header, &code);
+        status = status == 0 ? write_image(&s, &source, header, code) : status;
+        host_source_close(&source);
+    }
+    host_sign_key_wipe(&pair);
+    return status;
+}
+
+/* --- image ---------------------------------------------------------------- */
+
+static void print_hex(const char *name, const uint8_t *bytes, size_t size)
+{
+    char text[2 * LOADER_SIGNATURE_BYTES + 1];
+    host_sign_hex(text, bytes, size);
+    printf("%-10s %s\n", name, text);
+}
+
+static void print_image(const struct loader_image *image)
+{
+    host_say(stdout, "board      %s\n", image->board);
+    host_say(stdout, "version    %s\n", image->version);
+    printf("number     %u%s\n", image->number,
+           (image->flags & LOADER_NO_WAY_BACK) != 0
+               ? ": a board that has run it takes none with a lower one"
+               : "");
+    printf("code       %u bytes, for address 0x%08x\n", image->bytes,
+           image->address);
+    print_hex("digest", image->digest, sizeof image->digest);
+}
+
+/* What to do about it, and the exit status. */
+static int judge(const struct sign *s, const struct host_image *file,
+                 const uint8_t wanted[LOADER_PUBLIC_BYTES])
+{
+    enum loader_fault fault = host_image_fault(file);
+    if (fault == LOADER_UNSIGNED) {
+        printf("signed by  nobody\n");
+    } else {
+        print_hex("signed by", file->image.key, sizeof file->image.key);
+    }
+    if (fault == LOADER_GOOD && s->key != NULL) {
+        fault = loader_image_signed(file->source.data, &loader_sodium, wanted);
+    }
+    if (fault == LOADER_GOOD || (fault == LOADER_UNSIGNED && s->key == NULL)) {
+        return 0;
+    }
+    const char *next =
+        fault == LOADER_WRONG_DIGEST || fault == LOADER_WRONG_SIGNATURE
+            ? "copy or build it anew"
+            : "sign it with: incode sign IMAGE --key FILE";
+    return host_fail(s->error, HOST_UNVERIFIED, "%s: %s; %s", s->path,
+                     loader_fault_text(fault), next);
+}
+
+int host_image_show(int argc, char **argv, struct host_error *error)
+{
+    static const struct argp argp = {
+        options_of_image,
+        parse,
+        "IMAGE",
+        "Says what is in an image: board, version, number, digest, and by whom "
+        "it is signed. One that is damaged, or falsely signed, is a failure.",
+        NULL,
+        NULL,
+        NULL};
+    struct sign s = {.error = error};
+    struct host_image file;
+    uint8_t wanted[LOADER_PUBLIC_BYTES];
+    if (host_options_parse(&argp, argc, argv, 0, &s, error) != 0 ||
+        (s.key != NULL && host_sign_public_read(wanted, s.key, error) != 0) ||
+        host_image_open(&file, s.path, error) != 0) {
+        return error->code;
+    }
+    print_image(&file.image);
+    int status = judge(&s, &file, wanted);
+    host_image_close(&file);
+    return status;
+}

@@ -1,0 +1,150 @@
+#!/usr/bin/env bash
+# Keys, images, and their way to boards: what is no image or is signed by
+# somebody else changes nothing on any; emulated boards with nothing but their
+# loader take one, all at once.
+. tests/system/lib.sh
+
+errors=$scratch/errors
+said=$scratch/said
+key=$scratch/lab.sign
+
+# --- keys and images ------------------------------------------------------------
+
+succeeds 'flash/key' incode key --sign "$key"
+succeeds 'flash/key of a cube' incode key "$scratch/cube.key"
+check 'flash/key: for its owner alone' "$(stat -c %a "$key")" \
+    [ "$(stat -c %a "$key")" = 600 ]
+check 'flash/key: its public half' "$(cat "$key.pub")" \
+    grep -qxE '[0-9a-f]{64}' "$key.pub"
+refuses 'flash/key: is not replaced' 3 'is there already' \
+    incode key --sign "$key"
+
+head -c 40000 /dev/urandom > "$scratch/raw"
+raw=$scratch/raw.img
+succeeds 'flash/sign' incode sign "$scratch/raw" --key "$key" \
+    --board mps2-an500 --number 7 --version 1.2.3 -o "$raw"
+succeeds 'flash/image' incode image "$raw" --key "$key.pub" > "$said"
+for row in 'board      mps2-an500' 'version    1.2.3' 'number     7' \
+    "signed by  $(cat "$key.pub")"; do
+    check "flash/image: $row" "$(tr '\n' ' ' < "$said")" \
+        grep -qxF "$row" "$said"
+done
+refuses 'flash/sign: a key of a cube' 3 "a cube's key" \
+    incode sign "$raw" --key "$scratch/cube.key"
+refuses 'flash/sign: a public half' 3 'a public half' \
+    incode sign "$raw" --key "$key.pub"
+refuses 'flash/image: another key' 5 'signed with another key; sign it' \
+    incode image "$raw" --key "$scratch/cube.key"
+refuses 'flash/sign: a full disk' 3 '^incode: /dev/full: ' \
+    incode sign "$raw" --key "$key" -o /dev/full
+chmod 640 "$key"
+refuses 'flash/sign: others can read the key' 3 'read by others.*; chmod 600' \
+    incode sign "$raw" --key "$key"
+chmod 600 "$key"
+
+# A cube where nobody is: what is wrong with an image is told before.
+cat > "$scratch/nobody.cube" << END
+dimension = 1;
+board = "mps2-an500";
+links = ( { node = 0; to = "host"; unix = "nobody.socket"; } );
+END
+# refuses_image NAME PATTERN FILE: by incode flash, and by incode image unless
+# it is whole.
+refuses_image() {
+    refuses "flash/$1" 3 "$2" incode flash --cube "$scratch/nobody.cube" "$3"
+}
+head -c 30000 "$raw" > "$scratch/short.img"
+refuses_image 'a truncated image' '30000 bytes, fewer than the 40256' \
+    "$scratch/short.img"
+cp "$raw" "$scratch/false.img"
+printf 'x' | dd of="$scratch/false.img" bs=1 seek=20000 conv=notrunc 2> /dev/null
+refuses_image 'a false byte' 'its code is not what was signed; ' \
+    "$scratch/false.img"
+refuses 'flash/image: a false byte' 5 'its code is not what was signed; ' \
+    incode image "$scratch/false.img"
+refuses_image 'no image' 'no image, or one with a damaged header; ' \
+    "$scratch/raw"
+refuses_image 'an empty file' ': .*; ' /dev/null
+refuses_image 'no file' 'No such file' "$scratch/no.img"
+refuses_image 'a directory' ': .*; ' "$scratch"
+incode sign "$raw" --key "$key" --board mps2-an385 -o "$scratch/other.img"
+refuses_image 'an image for another board' 'is for mps2-an385, and .*; ' \
+    "$scratch/other.img"
+refuses 'flash/no place' 2 'give --cube FILE' incode flash "$raw"
+refuses 'flash/nodes that there are not' 2 '^incode: 0-3: not nodes of this cube; ' \
+    incode flash --cube "$scratch/nobody.cube" --nodes 0-3 "$raw"
+refuses 'flash/nobody there' 4 '^incode: nodes? 0.*; ' \
+    incode flash --cube "$scratch/nobody.cube" -q --patience 1 --nodes 0 "$raw"
+
+# --- boards ---------------------------------------------------------------------
+
+image=$BUILD/firmware/mps2-an500.img
+hangs=$BUILD/firmware/tests/image-mps2-an500-hang.img
+if [ ! -r "$image" ]; then
+    skip flash "there is no $BUILD/firmware: make firmware"
+    exit 0
+fi
+if ! command -v qemu-system-arm > /dev/null; then
+    skip flash 'qemu-system-arm is not there: make deps'
+    exit 0
+fi
+cube=$scratch/lab.cube
+within "$INCODE" emulate --board mps2-an500 --nodes 2 --empty -o "$cube" \
+    > "$scratch/boards" 2>&1 &
+boards=$!
+trap 'kill $boards 2> /dev/null; wait $boards; rm -rf "$scratch"' EXIT
+if ! await grep -q '^2 nodes' "$scratch/boards"; then
+    fail 'flash/boards' "they do not start: $(last "$scratch/boards")"
+    exit 1
+fi
+
+# flashes NAME PATTERN OPTION... IMAGE: ends with 0, and says that.
+flashes() {
+    local name=$1 pattern=$2 status
+    shift 2
+    incode flash --cube "$cube" "$@" > "$said" 2> "$errors"
+    status=$?
+    if [ $status != 0 ]; then
+        fail "$name" "exit $status: $(last "$errors")"
+    else
+        check "$name" "$(last "$said")" grep -qE "$pattern" "$said"
+    fi
+}
+flashes 'flash/a dry run' '^nodes 0-1: would be given mps2-an500' --dry-run \
+    "$image"
+refuses 'flash/a wrong key' 3 \
+    '^incode: nodes 0-1: refuses the image: it is signed with another key; ' \
+    incode flash --cube "$cube" -q "$raw"
+refuses 'flash/an image that hangs' 4 \
+    '^incode: node 1: did not come up with the image, and waits.*: .*; ' \
+    incode flash --cube "$cube" -q --nodes 1 "$hangs"
+
+# Ended in mid-transfer, and begun again.
+"$INCODE" flash --cube "$cube" "$image" > /dev/null 2> "$errors" &
+flash=$!
+await grep -q 'node 1: takes blocks' "$errors"
+sleep 2
+kill -TERM $flash 2> /dev/null
+wait $flash
+check 'flash/interrupted' "exit $?" [ $? != 0 ]
+if has_terminals 'flash/a terminal'; then
+    script -qec "stty cols 80 rows 24; exec '$INCODE' flash --cube '$cube' \
+'$image'" "$said" > /dev/null 2>&1 < /dev/null
+    check 'flash/a terminal: exit 0' "exit $?: $(last "$said")" [ $? = 0 ]
+    check 'flash/a terminal: a row a node' "$(head -c 300 "$said")" \
+        grep -qE 'node 1 \[#+ +\] +[0-9]+ % takes blocks' "$said"
+    check 'flash/a terminal: all of them' "$(last "$said")" \
+        grep -q 'nodes 0-1: runs mps2-an500' "$said"
+else
+    flashes 'flash/all of them' '^nodes 0-1: runs mps2-an500' "$image"
+fi
+flashes 'flash/nothing to do' '^nodes 0-1: had mps2-an500 .* already' "$image"
+
+# A wrong one changes nothing, and they compute all the same.
+refuses 'flash/a wrong key for boards that run' 3 'signed with another key; ' \
+    incode flash --cube "$cube" -q "$raw"
+flashes 'flash/the old image stays' '^nodes 0-1: had mps2-an500 .* already' \
+    --dry-run "$image"
+"$INCODE" gen uniform 200 --seed 1 -o "$scratch/points.npy" 2> /dev/null
+succeeds 'flash/they triangulate' incode run "$scratch/points.npy" -q \
+    --cube "$cube" --verify
