@@ -1,0 +1,37 @@
+/* The console's cube where its options say it is: the wires, lines that reset
+ * boards, and runs beside it.
+ *
+ * Memory: struct host_console_place.  Work: as its parts'.
+ *
+ *     struct host_console_place here;
+ *     host_console_place_init(&here, &options);
+ *     host_shell_init(&shell, &here.place, &sink, false);
+ *     host_console_place_end(&here);
+ */
+#ifndef HOST_CONSOLE_PLACE_H
+#define HOST_CONSOLE_PLACE_H
+
+#include "child_run.h"
+#include "host/lines/lines.h"
+#include "host/visit/site.h"
+#include "shell.h"
+
+enum { HOST_CONSOLE_PATH = 4200 };
+
+struct host_console_place {
+    struct host_site_options options;
+    struct host_site site;
+    struct host_child_run run;
+    struct host_shell_place place;
+    char wire[HOST_WIRE_NAME]; /* the host's, once it was open */
+    char folder[64];           /* of the files below; "": there are none */
+    char cube[HOST_CONSOLE_PATH], stats[HOST_CONSOLE_PATH];
+};
+
+void host_console_place_init(struct host_console_place *place,
+                             const struct host_site_options *options);
+
+/* Removes what was written for runs. */
+void host_console_place_end(struct host_console_place *place);
+
+#endif
