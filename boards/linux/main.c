@@ -65,11 +65,12 @@ static uint32_t refused(void *context)
     return linux_wires_refused(board->wire, board->links_count);
 }
 
-/* A node that a user started begins anew, with an epoch of its own. */
+/* A node that a user started begins anew, with an epoch of its own; there is no
+ * loader in which it would stay. */
 static void reset(void *context, int status)
 {
     const struct linux_board *board = context;
-    if (status == 0 && board->again != NULL) {
+    if (board->again != NULL) {
         char *environment[] = {(char[]){LINUX_AGAIN "=1"}, NULL};
         execve("/proc/self/exe", board->again, environment);
     }
@@ -224,16 +225,17 @@ static const char *take_memory(struct node_board *board,
                                struct tcp_wire **net)
 {
     size_t wires = options->wires_count * sizeof **net;
-    size_t fixed = process_static_bytes() + options->stack;
+    size_t memory = (size_t)options->memory, stack = (size_t)options->stack;
+    size_t fixed = process_static_bytes() + stack;
 #ifdef INCODE_SANITIZED
     /* A sanitizer's own data is not a node's, and nothing limits it. */
-    fixed = SANITIZED_STATIC + options->stack;
+    fixed = SANITIZED_STATIC + stack;
 #endif
     wires = (wires + PROCESS_PAGE - 1) / PROCESS_PAGE * PROCESS_PAGE;
-    if (options->memory < fixed + wires + PROCESS_PAGE) {
+    if (memory < fixed + wires + PROCESS_PAGE) {
         return "does not hold the program's own data and the wires";
     }
-    size_t bytes = (options->memory - fixed) / PROCESS_PAGE * PROCESS_PAGE;
+    size_t bytes = (memory - fixed) / PROCESS_PAGE * PROCESS_PAGE;
     board->arena = process_arena(bytes);
     board->arena_bytes = bytes - wires;
     board->fixed_bytes = fixed + wires;
@@ -309,6 +311,6 @@ int main(int argc, char **argv)
                                              .next = "see incode-node --help"},
                         4);
     }
-    node_run(node);
-    board.reset(board.context, 0);
+    enum node_reset why_it_ends = node_run(node);
+    board.reset(board.context, (int)why_it_ends);
 }

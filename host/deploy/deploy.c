@@ -1,0 +1,308 @@
+#include "deploy.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "board.h"
+#include "host/base/node_set.h"
+#include "host/base/options.h"
+#include "lines.h"
+
+enum {
+    KEY_CUBE = 256,
+    KEY_NODES,
+    KEY_STATUS,
+    KEY_UPDATE,
+    KEY_REMOVE,
+    KEY_DRY_RUN,
+    KEY_PROGRAMS,
+    KEY_SSH_CONFIG,
+    DEPLOY_AT_ONCE = 64
+};
+
+static const struct argp_option options_of_deploy[] = {
+    {"cube", KEY_CUBE, "FILE", 0,
+     "The cube; its nodes that have ssh = \"USER@ADDRESS\" are those meant", 0},
+    {"nodes", KEY_NODES, "SET", 0, "Only these, as in 0-3,7", 0},
+    {"update", KEY_UPDATE, NULL, 0,
+     "Copy what differs from here, and start the node anew where anything did: "
+     "the default",
+     0},
+    {"status", KEY_STATUS, NULL, 0, "Say what is there and whether it runs", 0},
+    {"remove", KEY_REMOVE, NULL, 0, "Stop the node and take all of it away", 0},
+    {"dry-run", KEY_DRY_RUN, NULL, 0,
+     "Look, and say what would be done; nothing changes", 0},
+    {"programs", KEY_PROGRAMS, "FOLDER", 0,
+     "Where the programs of make nodes are, incode-node-aarch64 and the like",
+     0},
+    {"ssh-config", KEY_SSH_CONFIG, "FILE", 0,
+     "Have ssh read this file, as with its -F", 0},
+    {"quiet", 'q', NULL, 0, "Say only what is wrong", 0},
+    {0}};
+
+struct deploy {
+    struct host_deploy_job job;
+    const char *cube, *nodes, *programs;
+    bool quiet, ordered;
+    struct host_error *error;
+};
+
+static void take_order(struct deploy *d, enum host_deploy_order order)
+{
+    if (d->ordered && d->job.order != order) {
+        host_fail(d->error, HOST_USAGE,
+                  "deploy: --status, --update and --remove are different "
+                  "orders; give one of them");
+    }
+    d->ordered = true;
+    d->job.order = order;
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct deploy *d = state->input;
+    switch (key) {
+    case KEY_CUBE:
+        d->cube = value;
+        return 0;
+    case KEY_NODES:
+        d->nodes = value;
+        return 0;
+    case KEY_STATUS:
+        take_order(d, HOST_STATUS);
+        return 0;
+    case KEY_UPDATE:
+        take_order(d, HOST_DEPLOY);
+        return 0;
+    case KEY_REMOVE:
+        take_order(d, HOST_REMOVE);
+        return 0;
+    case KEY_DRY_RUN:
+        d->job.dry_run = true;
+        return 0;
+    case KEY_PROGRAMS:
+        d->programs = value;
+        return 0;
+    case KEY_SSH_CONFIG:
+        d->job.ssh_config = value;
+        return 0;
+    case 'q':
+        d->quiet = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        host_fail(d->error, HOST_USAGE,
+                  "%s: one argument too many; give --cube FILE", value);
+        return 0;
+    case ARGP_KEY_END:
+        if (d->cube == NULL) {
+            host_fail(d->error, HOST_USAGE,
+                      "deploy: --cube FILE is missing; write one with: incode "
+                      "cube --new");
+        }
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* --- which ---------------------------------------------------------------- */
+
+/* Whether there is a program of that name: it is a package of its own. */
+static int check_ssh(struct host_error *error)
+{
+    static const char usual[] = "/usr/local/bin:/usr/bin:/bin";
+    const char *path = getenv("PATH");
+    char name[4096];
+    for (const char *at = path == NULL ? usual : path; at != NULL;) {
+        int length = (int)strcspn(at, ":");
+        snprintf(name, sizeof name, "%.*s/ssh", length, at);
+        if (access(name, X_OK) == 0) {
+            return 0;
+        }
+        at = at[length] == ':' ? at + length + 1 : NULL;
+    }
+    return host_fail(error, HOST_BROKEN,
+                     "ssh: not found; install the package openssh-client");
+}
+
+/* The nodes that are meant and have a board to log in to. */
+static int choose(const struct deploy *d, const struct host_cube_file *file,
+                  struct host_node_set *chosen)
+{
+    struct host_node_set wanted;
+    memset(chosen, 0, sizeof *chosen);
+    host_node_set_all(&wanted, file->nodes);
+    if (d->nodes != NULL &&
+        host_node_set_parse(&wanted, d->nodes, file->nodes, d->error) != 0) {
+        return d->error->code;
+    }
+    for (unsigned i = 0; i < file->nodes; i++) {
+        bool there = host_cube_ssh(file, i) != NULL;
+        if (host_node_set_has(&wanted, i) && there) {
+            host_node_set_add(chosen, i);
+        } else if (host_node_set_has(&wanted, i) && d->nodes != NULL) {
+            return host_fail(d->error, HOST_INPUT,
+                             "%s: node %u has no ssh; add { node = %u; ssh = "
+                             "\"pi@10.0.0.11\"; } to nodes, or leave it out of "
+                             "--nodes",
+                             file->path, i, i);
+        }
+    }
+    return host_node_set_count(chosen) > 0
+               ? 0
+               : host_fail(
+                     d->error, HOST_INPUT,
+                     "%s: no node has ssh; write nodes = ( { node = 0; ssh "
+                     "= \"pi@10.0.0.11\"; }, .. );",
+                     file->path);
+}
+
+/* --- all of them ---------------------------------------------------------- */
+
+struct boards {
+    struct host_deploy_board *board;
+    unsigned count, begun;
+};
+
+/* Begins as many as there is room for; how many are at work. */
+static unsigned begin_more(struct boards *boards, struct deploy *d)
+{
+    unsigned at_work = 0;
+    for (unsigned i = 0; i < boards->begun; i++) {
+        at_work += !boards->board[i].ended;
+    }
+    while (boards->begun < boards->count && at_work < DEPLOY_AT_ONCE) {
+        struct host_deploy_board *board = &boards->board[boards->begun++];
+        at_work += host_board_begin(board, &d->job, board->node) == 0;
+    }
+    return at_work;
+}
+
+static void run(struct boards *boards, struct deploy *d,
+                struct host_deploy_lines *lines)
+{
+    struct pollfd files[DEPLOY_AT_ONCE * HOST_BOARD_FILES];
+    while (begin_more(boards, d) > 0) {
+        unsigned count = 0, at = 0;
+        for (unsigned i = 0; i < boards->begun; i++) {
+            count += host_board_files(&boards->board[i], files + count);
+        }
+        if (poll(files, count, 1000) < 0 && errno != EINTR) {
+            continue;
+        }
+        for (unsigned i = 0; i < boards->begun; i++) {
+            struct pollfd mine[HOST_BOARD_FILES];
+            unsigned n = host_board_files(&boards->board[i], mine);
+            if (!boards->board[i].ended) {
+                host_board_step(&boards->board[i], &d->job, files + at, n);
+            }
+            at += n;
+        }
+        host_deploy_lines_show(lines, boards->board, boards->count);
+    }
+}
+
+/* Which failed, or do not run. */
+static int conclude(const struct boards *boards, const struct deploy *d)
+{
+    struct host_node_set failed = {{0}}, stopped = {{0}};
+    char text[120];
+    for (unsigned i = 0; i < boards->count; i++) {
+        const struct host_deploy_board *board = &boards->board[i];
+        if (board->error.code != 0) {
+            host_node_set_add(&failed, board->node);
+        } else if (d->job.order == HOST_STATUS && !board->running) {
+            host_node_set_add(&stopped, board->node);
+        }
+    }
+    if (host_node_set_count(&failed) > 0) {
+        host_node_set_print(&failed, text, sizeof text);
+        return host_fail(d->error, HOST_CUBE,
+                         "%s: %u of %u boards failed, nodes %s; do what is "
+                         "said above, and repeat it with --nodes %s",
+                         d->cube, host_node_set_count(&failed), boards->count,
+                         text, text);
+    }
+    if (host_node_set_count(&stopped) > 0) {
+        host_node_set_print(&stopped, text, sizeof text);
+        return host_fail(d->error, HOST_CUBE,
+                         "%s: nodes %s do not run; start them with: incode "
+                         "deploy --cube %s --nodes %s",
+                         d->cube, text, d->cube, text);
+    }
+    return 0;
+}
+
+static int deploy(struct deploy *d, const struct host_node_set *chosen)
+{
+    struct host_deploy_lines lines;
+    struct boards boards = {.count = host_node_set_count(chosen)};
+    boards.board = calloc(boards.count, sizeof *boards.board);
+    if (boards.board == NULL) {
+        return host_fail_memory(d->error, "the boards");
+    }
+    for (unsigned i = 0, at = 0; i < d->job.file->nodes; i++) {
+        if (host_node_set_has(chosen, i)) {
+            boards.board[at].to = host_cube_ssh(d->job.file, i)->to;
+            snprintf(boards.board[at].step, sizeof boards.board[at].step,
+                     "waiting");
+            boards.board[at++].node = i;
+        }
+    }
+    (void)signal(SIGPIPE, SIG_IGN);
+    host_deploy_lines_begin(&lines, boards.count, d->quiet);
+    run(&boards, d, &lines);
+    host_deploy_lines_end(&lines, boards.board, boards.count);
+    int status = conclude(&boards, d);
+    for (unsigned i = 0; i < boards.count; i++) {
+        host_board_free(&boards.board[i]);
+    }
+    free(boards.board);
+    return status;
+}
+
+int host_deploy(int argc, char **argv, struct host_error *error)
+{
+    static const struct argp argp = {
+        options_of_deploy,
+        parse,
+        "",
+        "Puts the node program on boards with Linux, over ssh, and starts it "
+        "there: under systemd, at every boot, where that runs.\v"
+        "A cube file says where a node's board is:\n"
+        "  nodes = ( { node = 0; ssh = \"pi@10.0.0.11\"; }, .. );\n"
+        "ssh must be able to log in without a question: see ssh-copy-id(1).\n\n"
+        "Example:\n"
+        "  incode deploy --cube lab.cube --dry-run\n"
+        "  incode deploy --cube lab.cube\n"
+        "  incode run points.xyz --cube lab.cube",
+        NULL,
+        NULL,
+        NULL};
+    static struct host_cube_file file;
+    static struct host_programs programs;
+    struct deploy d = {.error = error};
+    struct host_node_set chosen;
+    if (host_options_parse(&argp, argc, argv, 0, &d, error) != 0 ||
+        check_ssh(error) != 0 ||
+        host_cube_file_read(&file, d.cube, error) != 0) {
+        return error->code;
+    }
+    d.job.file = &file;
+    d.job.programs = &programs;
+    int status = choose(&d, &file, &chosen);
+    if (status == 0) {
+        status = host_programs_open(&programs, d.programs, error);
+    }
+    if (status == 0) {
+        status = deploy(&d, &chosen);
+    }
+    host_programs_free(&programs);
+    host_cube_file_free(&file);
+    return status;
+}

@@ -1,0 +1,50 @@
+/* The node programs of `make nodes`, one a processor, as boards are sent them.
+ *
+ * Memory: the programs that boards asked for, some 500 KB each.  Work: reading
+ * each once.
+ *
+ *     struct host_programs programs;
+ *     if (host_programs_open(&programs, NULL, &error) != 0)
+ *         return error.code;
+ *     program = host_programs_take(&programs, "armv7l", &error);
+ *     host_programs_free(&programs);
+ */
+#ifndef HOST_PROGRAMS_H
+#define HOST_PROGRAMS_H
+
+#include <limits.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "host/base/error.h"
+
+enum { HOST_PROGRAMS_MAX = 4, HOST_SHA256_DIGITS = 64 };
+
+struct host_program {
+    const char *processor;
+    uint8_t *bytes; /* NULL: not read yet */
+    size_t size;
+    char digest[HOST_SHA256_DIGITS + 1];
+};
+
+struct host_programs {
+    char folder[PATH_MAX];
+    struct host_program program[HOST_PROGRAMS_MAX];
+};
+
+/* folder: NULL for nodes/ beside this program, or lib/incode/ where it is
+ * installed.  0, or HOST_BROKEN. */
+int host_programs_open(struct host_programs *programs, const char *folder,
+                       struct host_error *error);
+void host_programs_free(struct host_programs *programs);
+
+/* That for a machine as its `uname -m` says; NULL: as the error says. */
+const struct host_program *host_programs_take(struct host_programs *programs,
+                                              const char *machine,
+                                              struct host_error *error);
+
+/* SHA-256 of bytes, in hexadecimal digits. */
+void host_digest_bytes(const void *bytes, size_t size,
+                       char digits[HOST_SHA256_DIGITS + 1]);
+
+#endif
