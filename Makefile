@@ -37,7 +37,8 @@ Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
 MPI_CFLAGS = $(addprefix -isystem ,$(shell mpicc --showme:incdirs))
 MPI_LIBS = $(addprefix -L,$(shell mpicc --showme:libdirs)) -lmpi
-HOST_LIBS = -lconfig -lsodium -lserialport -ljansson -lnettle -lexpat -lpng -lz -lm
+HOST_LIBS = -ledit -lconfig -lsodium -lserialport -lgpiod -ljansson -lnettle -lexpat \
+	-lpng -lz -lm
 
 # libsodium's own code is the same under either C library; its headers are
 # made visible to musl's compiler alone.
@@ -51,7 +52,8 @@ freestanding := $(call files,incode node transport/tuples) \
 	$(wildcard transport/*.c)
 drivers      := $(filter-out %/mpi.c,$(wildcard transport/drivers/*.c))
 # Those that need what a static node has not.
-host_drivers := transport/drivers/serial_port.c
+host_drivers := transport/drivers/serial_port.c \
+	transport/drivers/loader_sodium.c
 node_drivers := $(filter-out $(host_drivers),$(drivers))
 # A folder a board.  Its program is incode-node-NAME, that of linux incode-node;
 # mpi's is no static one.
@@ -60,7 +62,12 @@ boards       := $(filter-out mpi,$(patsubst boards/%/main.c,%,$(wildcard \
 	boards/*/main.c)))
 # Host and node as ranks of Open MPI: no other program is linked with it.
 host_mpi     := host/main_mpi.c $(wildcard host/*/mpi/*.c)
+# The calls of that version of libgpiod which is installed.
+GPIOD        := $(firstword $(subst ., ,$(shell pkg-config --modversion libgpiod \
+	2>/dev/null)) 1)
 host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
+host         := $(filter-out host/lines/lines_gpiod%,$(host)) \
+	host/lines/lines_gpiod$(GPIOD).c
 # A library of its own, for others' programs: nothing here is linked with it.
 ncube        := $(wildcard transport/ncube/*.c)
 unit         := $(call files,tests/unit)
@@ -81,9 +88,9 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all ncube unit points planted bare arithmetic fuzzers run check test test-full \
-	bench firmware fuzz lint install uninstall clean help deps deps-run deps-test \
-	deps-bench deps-full FORCE
+.PHONY: all ncube unit points planted bare arithmetic fuzzers run check test \
+	test-full bench firmware nodes cross fuzz lint install uninstall clean \
+	help deps deps-run deps-nodes deps-test deps-bench deps-full FORCE
 
 programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
 	$(nodes)
@@ -116,16 +123,23 @@ $(BUILD)/%.a: $(BUILD)/lists
 	@rm -f $@
 	@$(AR) rcs $@ $(filter %.o,$^)
 # An archive keeps nothing of a file that is gone.
+archived = $(core_objects) $(host_objects) $(ncube) $(bare_shared)
 $(BUILD)/lists: FORCE
 	@mkdir -p $(@D)
-	@echo '$(core_objects) $(host_objects) $(ncube) $(bare_shared)' | cmp -s - $@ || \
-		echo '$(core_objects) $(host_objects) $(ncube) $(bare_shared)' > $@
+	@echo '$(archived)' | cmp -s - $@ || echo '$(archived)' > $@
 
 # Objects depend on the flags that they were compiled with.
 $(BUILD)/flags: FORCE
 	@mkdir -p $(@D)
 	@echo '$(CC) $(NODE_CC) $(HOSTED)' | cmp -s - $@ || \
 		echo '$(CC) $(NODE_CC) $(HOSTED)' > $@
+
+ifeq ($(wildcard host/lines/lines_gpiod$(GPIOD).c),)
+host/lines/lines_gpiod$(GPIOD).c:
+	@echo 'make: libgpiod $(GPIOD) is installed; its calls belong in $@,' \
+		'as those of version 1 are in lines_gpiod1.c' >&2
+	@false
+endif
 
 # A simulation's failure names the commit that replays it.
 COMMIT := $(or $(shell git rev-parse --short=12 HEAD 2>/dev/null),unknown)
@@ -170,6 +184,9 @@ $(BUILD)/include/sodium.h:
 	@mkdir -p $(@D)
 	@ln -sfn /usr/include/sodium $(@D)/sodium
 	@ln -sfn /usr/include/sodium.h $@
+
+# The script for boards is taken in as it is.
+$(obj)/host/deploy/script.o: host/deploy/board.sh
 
 # What bare boards share, for tests on this machine; its own memory functions
 # and root under other names.
@@ -232,10 +249,15 @@ tools := $(patsubst tests/system/%.c,$(BUILD)/tests/%,$(wildcard \
 points: $(tools)
 relay := $(patsubst %.c,$(obj)/%.o,$(wildcard tests/system/relay/*.c))
 $(BUILD)/tests/relay $(BUILD)/tests/test_relay: $(relay)
+$(BUILD)/tests/pulse: $(BUILD)/libhost.a $(BUILD)/libcore.a
+$(BUILD)/tests/pulse: tool_libs = $(HOST_LIBS)
 $(tools): $(BUILD)/tests/%: $(obj)/tests/system/%.o
 	@mkdir -p $(@D)
 	$(say) LINK $@
-	$(Q)$(CC) $(HOSTED) $^ -lm -o $@
+	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(tool_libs) -lm -o $@
+# A board's flash chip, as its loader has it.
+$(BUILD)/tests/chip: $(obj)/transport/drivers/loader_sodium.o $(BUILD)/libcore.a
+$(BUILD)/tests/chip: tool_libs = -lsodium
 
 $(BUILD)/tests/test_mpi: $(obj)/tests/unit/transport/drivers/test_mpi.o \
 		$(obj)/transport/drivers/mpi.o $(BUILD)/libcore.a
@@ -265,80 +287,16 @@ $(BUILD)/peers/instructions.so: tests/bench/instructions.c
 	$(say) CC $@
 	$(Q)$(CC) $(HOSTED) -shared -fPIC $< -o $@
 
-# Bare boards: those folders that have a board.mk, which gives the compiler's
-# prefix, the processor's flags (machine) and the sources beside the board's own
-# and those of boards/bare.  An image is a main's objects and all of these; what
-# it does not need, the linker leaves out.
-bare_boards := $(patsubst boards/%/board.mk,%,$(wildcard boards/*/board.mk))
-bare_rest   := boards/bare/sqrt.c boards/bare/program.c
-# With -ffreestanding alone each memcpy of a few bytes is a call.  What serves
-# interrupts is to be short.
-BARE_OPT    ?= -O3
-BARE = -std=c11 -I. $(WARNINGS) -Werror $(BARE_OPT) -g -ffreestanding -fbuiltin \
-	$(FLOATING) -ffunction-sections -fdata-sections -fstack-usage \
-	-fcallgraph-info=su
-images := $(bare_boards:%=$(BUILD)/firmware/%.img)
-# Tests on a board: other mains with its start-up code.  That of
-# tests/boards/NAME.c is firmware/tests/BOARD-NAME.img; bare_with_NAME: sources
-# that it needs beside.
-bare_mains := $(patsubst tests/boards/%.c,%,$(wildcard tests/boards/*.c))
-trials := $(foreach b,$(bare_boards),$(bare_mains:%=$(BUILD)/firmware/tests/$(b)-%.img))
-bare: $(images) $(trials)
+# The distribution's sources of libraries, for boards and processors of which it
+# has no packages.
+fetched := $(BUILD)/source
+$(fetched)/%/fetched: boards/source
+	$(say) GET $(@D)
+	$(Q)boards/source $* $(fetched)
+	@touch $@
 
-# The cases of arithmetic, on boards and here.
-arithmetic := $(filter-out %/native.c,$(wildcard tests/arithmetic/*.c))
-bare_with_arithmetic := $(arithmetic)
-
-# bare_board BOARD: bare_BOARD is its objects without a main.
-define bare_board
-include boards/$(1)/board.mk
-bare_cc_$(1) := $$(prefix)gcc $$(machine)
-bare_copy_$(1) := $$(prefix)objcopy
-bare_$(1) := $$(patsubst %,$(BUILD)/firmware/$(1)/%.o,$$(basename \
-	$$(freestanding) $$(filter-out $$(bare_rest),$$(wildcard \
-	boards/bare/*.c)) $$(wildcard boards/$(1)/*.[cS]) $$(sources)))
-$(BUILD)/firmware/$(1)/%.o: %.c $(BUILD)/firmware/flags
-	@mkdir -p $$(@D)
-	$$(say) CC $$@
-	$$(Q)$$(bare_cc_$(1)) $$(BARE) -MMD -MP -c $$< -o $$@
-$(BUILD)/firmware/$(1)/%.o: %.S $(BUILD)/firmware/flags
-	@mkdir -p $$(@D)
-	$$(say) AS $$@
-	$$(Q)$$(bare_cc_$(1)) -I. -g -MMD -MP -c $$< -o $$@
-$(BUILD)/firmware/$(1)/boards/%.o: private BARE_OPT = -O2
-$(BUILD)/firmware/$(1)/boards/bare/memory.o: private BARE += \
-	-fno-tree-loop-distribute-patterns
-$(BUILD)/firmware/$(1).elf: \
-	$(BUILD)/firmware/$(1)/boards/bare/program.o
-$(BUILD)/firmware/$(1).elf: $$(bare_$(1)) \
-		boards/$(1)/board.ld boards/bare/start.ld
-	$$(say) LINK $$@
-	$$(Q)$$(call bare_link,$(1))
-$(BUILD)/firmware/$(1).img: $(BUILD)/firmware/$(1).elf
-	$$(Q)$$(bare_copy_$(1)) -O binary $$< $$@
-endef
-
-# bare_main BOARD NAME
-define bare_main
-$(BUILD)/firmware/tests/$(1)-$(2).elf: $$(patsubst \
-		%.c,$(BUILD)/firmware/$(1)/%.o,tests/boards/$(2).c $$(bare_with_$(2))) \
-		$$(bare_$(1)) boards/$(1)/board.ld boards/bare/start.ld
-	@mkdir -p $$(@D)
-	$$(say) LINK $$@
-	$$(Q)$$(call bare_link,$(1))
-$(BUILD)/firmware/tests/$(1)-$(2).img: $(BUILD)/firmware/tests/$(1)-$(2).elf
-	$$(Q)$$(bare_copy_$(1)) -O binary $$< $$@
-endef
-bare_link = $(bare_cc_$(1)) -nostdlib -nostartfiles -Wl,--gc-sections \
-	-Wl,--build-id=none \
-	-Wl,--fatal-warnings -Wl,-Map=$(@:.elf=.map) -T boards/$(1)/board.ld -L boards/bare \
-	$(filter %.o,$^) -lgcc -o $@
-$(foreach b,$(bare_boards),$(eval $(call bare_board,$(b))))
-$(foreach b,$(bare_boards),$(foreach m,$(bare_mains), \
-	$(eval $(call bare_main,$(b),$(m)))))
-$(BUILD)/firmware/flags: FORCE
-	@mkdir -p $(@D)
-	@echo '$(BARE)' | cmp -s - $@ || echo '$(BARE)' > $@
+include boards/bare/images.mk
+include boards/linux/nodes.mk
 
 # The cases of arithmetic here, and where it is known to be wrong.
 $(BUILD)/tests/arithmetic: $(arithmetic:%.c=$(obj)/%.o) \
@@ -407,7 +365,10 @@ man        = $(DESTDIR)$(PREFIX)/share/man/man1
 completion = $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 # Images of boards that make firmware has made.
 lib        = $(DESTDIR)$(PREFIX)/lib/incode
-made_images = $(wildcard $(images))
+made_images  = $(wildcard $(images))
+made_loaders = $(wildcard $(images:$(BUILD)/firmware/%=$(BUILD)/firmware/loader/%))
+# Likewise programs of nodes that make nodes has made.
+made_nodes   = $(wildcard $(node_programs))
 man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
 pages     := $(man_pages) $(BUILD)/pages/incode.bash
 $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
@@ -422,10 +383,15 @@ install: all $(pages)
 	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode'
 	$(if $(made_images),install -d '$(lib)' && \
 		install -m 644 $(made_images) '$(lib)')
+	$(if $(made_loaders),install -d '$(lib)/loader' && \
+		install -m 644 $(made_loaders) '$(lib)/loader')
+	$(if $(made_nodes),install -d '$(lib)' && install $(made_nodes) '$(lib)')
 	ln -sf incode '$(completion)/incode-node'
 
 uninstall:
-	rm -f $(patsubst %,'$(lib)/%.img',$(bare_boards))
+	rm -f $(patsubst %,'$(lib)/%.img',$(bare_boards)) \
+		$(patsubst %,'$(lib)/loader/%.img',$(bare_boards)) \
+		$(patsubst %,'$(lib)/%',$(notdir $(node_programs)))
 	rm -f $(patsubst %,'$(bin)/%',$(notdir $(programs))) \
 		$(patsubst %,'$(man)/%',$(notdir $(man_pages))) \
 		'$(completion)/incode' '$(completion)/incode-node'
@@ -446,29 +412,36 @@ help:
 	@echo '                         chroot (hours)'
 	@echo 'make bench [SETS=DIRS]   ratios against CGAL, TetGen and Qhull, and'
 	@echo '                         what they are held to (half an hour)'
-	@echo 'make firmware            build/firmware/BOARD.img for each bare board,'
-	@echo '                         its memory map and checks'
+	@echo 'make firmware [SIGN=FILE]  build/firmware/BOARD.img for each bare board,'
+	@echo '                         and its loader, signed with your own pair or one'
+	@echo '                         made once; memory maps and checks'
+	@echo 'make nodes               build/nodes/incode-node-ARCH, static, for boards'
+	@echo '                         with Linux: x86_64, aarch64, armhf, riscv64'
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
 	@echo 'make lint                the order of rooms, format, examples, sizes,'
 	@echo '                         warnings as errors, analysers'
 	@echo 'make ncube               build/libncube.a: the calls of the nCUBE, for'
 	@echo '                         porting programs that were written for them'
 	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, their man pages'
-	@echo '                         and completion to DIR/share, firmware of boards to'
-	@echo '                         DIR/lib/incode, if it is made'
+	@echo '                         and completion to DIR/share, firmware and node'
+	@echo '                         programs of boards to DIR/lib/incode, if made'
 	@echo 'make uninstall           remove them (with the same PREFIX)'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
 
 # --- packages --------------------------------------------------------------
 
-run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev libpng-dev nettle-dev \
-	libjansson-dev libserialport-dev libsodium-dev libconfig-dev \
+run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev \
+	libpng-dev nettle-dev libjansson-dev libserialport-dev libsodium-dev \
+	libconfig-dev libgpiod-dev pkg-config libedit-dev \
 	libopenmpi-dev openmpi-bin
+node_packages  = $(run_packages) dpkg-dev gcc-aarch64-linux-gnu \
+	libc6-dev-arm64-cross gcc-arm-linux-gnueabihf libc6-dev-armhf-cross \
+	gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
-	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps \
+	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps tmux \
 	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi \
-	qemu-system-arm gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages)
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev
 full_packages  = $(test_packages) $(bench_packages) debootstrap cpio
@@ -478,6 +451,8 @@ deps-run:
 	@sh tests/deps $(run_packages)
 deps-test:
 	@sh tests/deps $(test_packages)
+deps-nodes:
+	@sh tests/deps $(node_packages)
 deps-bench:
 	@sh tests/deps $(bench_packages)
 deps-full:

@@ -1,4 +1,5 @@
 /* The host program.  Nothing here but its commands and their arguments. */
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,14 +10,20 @@
 #include "host/base/text.h"
 #include "host/bench/bench_arguments.h"
 #include "host/check/verify.h"
+#include "host/console/console.h"
+#include "host/console/nodes.h"
+#include "host/deploy/deploy.h"
 #include "host/draw/draw.h"
 #include "host/files/output.h"
+#include "host/flash/flash.h"
+#include "host/flash/sign.h"
+#include "host/flash/sign_key.h"
 #include "host/formats/convert.h"
 #include "host/formats/formats.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
-#include "host/machines/cube_file.h"
 #include "host/machines/cube_key.h"
+#include "host/machines/cube_new.h"
 #include "host/mesh/gen.h"
 #include "host/mesh/tetrahedra.h"
 #include "host/run/arguments.h"
@@ -31,7 +38,7 @@
 
 const char *argp_program_version = "incode " NODE_VERSION;
 
-enum { ARGUMENTS_MAX = 4, KEY_FORMAT_IN = 256, KEY_FORMAT_OUT };
+enum { ARGUMENTS_MAX = 4, KEY_FORMAT_IN = 256, KEY_FORMAT_OUT, KEY_SIGN };
 
 /* What the small commands take: arguments, and a few options. */
 struct simple {
@@ -40,6 +47,7 @@ struct simple {
     const char *output;
     const char *format;
     uint64_t seed;
+    bool sign;
     const char *wanted; /* names of the arguments */
     struct host_error *error;
 };
@@ -54,6 +62,9 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
     case KEY_FORMAT_IN:
     case KEY_FORMAT_OUT:
         s->format = value;
+        return 0;
+    case KEY_SIGN:
+        s->sign = true;
         return 0;
     case 's':
         if (host_parse_number(value, 0, UINT64_MAX, &s->seed) != 0) {
@@ -270,30 +281,25 @@ static int command_draw(int argc, char **argv, struct host_error *error)
     return host_draw(&options, error);
 }
 
-static int command_cube(int argc, char **argv, struct host_error *error)
-{
-    struct simple s = {0};
-    if (parse(
-            argc, argv, NULL, "FILE",
-            "Checks a cube file, and prints how each of its nodes is started.",
-            1, &s, error) != 0) {
-        return error->code;
-    }
-    return host_cube_print(s.argument[0], error);
-}
-
 static int command_key(int argc, char **argv, struct host_error *error)
 {
+    static const struct argp_option options[] = {
+        {"sign", KEY_SIGN, NULL, 0,
+         "Makes a pair to sign images with instead: the secret half in FILE, "
+         "the public one in FILE.pub",
+         0},
+        {0}};
     struct simple s = {0};
     if (parse(
-            argc, argv, NULL, "FILE",
+            argc, argv, options, "FILE",
             "Makes the key of a cube, 64 random hexadecimal digits, in a new "
             "file that its owner alone can read.  Whoever has a copy can join "
             "the cube: give one to each machine of it, and to nobody else.",
             1, &s, error) != 0) {
         return error->code;
     }
-    return host_key_make(s.argument[0], error);
+    return s.sign ? host_sign_key_make(s.argument[0], error)
+                  : host_key_make(s.argument[0], error);
 }
 
 static int command_sim(int argc, char **argv, struct host_error *error)
@@ -326,9 +332,24 @@ static const struct command commands[] = {
     {"digest", "TETS", "print what tells triangulations apart", command_digest},
     {"convert", "IN OUT", "from one file format to another", command_convert},
     {"draw", "POINTS TETS -o FILE", "a section, as SVG or PNG", command_draw},
-    {"cube", "FILE", "check a cube file, print what starts its nodes",
-     command_cube},
-    {"key", "FILE", "make a cube's key", command_key},
+    {"cube", "FILE",
+     "check a cube file, print what starts its nodes;\nwrite one "
+     "to start from (--new)",
+     host_cube_command},
+    {"nodes", "--cube FILE|..",
+     "who is there, what is missing or wired wrongly,\nand what to do next",
+     host_nodes_command},
+    {"console", "--cube FILE|..",
+     "look at a cube, and tell its nodes what to do", host_console_command},
+    {"key", "FILE", "make a cube's key; --sign: a pair to sign images",
+     command_key},
+    {"flash", "--cube FILE IMAGE",
+     "bring a program to all boards of a cube at once", host_flash},
+    {"sign", "IMAGE --key FILE", "sign a program for boards", host_sign},
+    {"image", "IMAGE", "say what is in an image, and who signed it",
+     host_image_show},
+    {"deploy", "--cube FILE", "put nodes on boards with Linux, over ssh",
+     host_deploy},
     {"emulate", "-o FILE.cube",
      "boards without a system, emulated, and the cube\nfile that leads to them",
      host_emulate},

@@ -99,8 +99,8 @@ static bool parse_paper(int key, const char *value, struct arguments *a)
     switch (key) {
     case 'n':
         a->of_paper = "--nodes";
-        (void)host_parse_nodes(value, HOST_NODES_MAX, "", &paper->nodes_max,
-                               a->error);
+        (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
+                               &paper->nodes_max, a->error);
         return true;
     case KEY_QUICK:
         a->of_paper = "--quick";

@@ -144,8 +144,10 @@ static void add(FILE *file, const struct functions *functions,
 {
     uint64_t block[3]; /* address, instructions, times: struct count */
     while (fread(block, sizeof block, 1, file) == 1 && block[1] != 0) {
-        counted[room_at(functions, block[0])] +=
-            (double)block[1] * (double)block[2];
+        if (block[0] >= functions->all[0].from) { /* else it is the loader's */
+            counted[room_at(functions, block[0])] +=
+                (double)block[1] * (double)block[2];
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 /* Where a board's instructions go: what tests/bench/instructions.c has counted,
  * each block in the room of the function that it begins, as the linker's map
  * tells.  What the compiler has put into a function from another room is that
- * function's.
+ * function's.  A loader, which runs below the image, is not counted.
  *
  * Memory: 24 bytes a function, freed before it returns.  Work: a pass over the
  * map, a search a block.

@@ -203,8 +203,7 @@ static int finish(struct host_source *source, bool packed,
         unpack(source, error);
     }
     if (error->code == 0 && source->bytes == 0) {
-        host_source_fail(source, error,
-                         "the file is empty; give one with points");
+        host_source_fail(source, error, "the file is empty; give another");
     }
     if (error->code != 0) {
         host_source_close(source);

@@ -126,14 +126,22 @@ check 'boards/an emulator that ends: says why' "$(last "$errors")" \
     grep -q '^incode: qemu: no such board' "$errors"
 # Half an image: the emulator's registers do not hide what it says, and the image
 # is named.
-mkdir -p "$scratch/bin/firmware"
-head -c 100000 "$BUILD/firmware/mps2-an500.img" \
-    > "$scratch/bin/firmware/mps2-an500.img"
+mkdir -p "$scratch/bin/firmware/loader"
+half() { # FILE: but for the other, which is whole
+    cp "$BUILD/firmware/mps2-an500.img" "$scratch/bin/firmware/"
+    cp "$BUILD/firmware/loader/mps2-an500.img" "$scratch/bin/firmware/loader/"
+    head -c 20000 "$BUILD/firmware/$1" > "$scratch/bin/firmware/$1"
+}
+half mps2-an500.img
+refuses 'boards/half an image' 4 "mps2-an500.img: not a board's image, or not \
+all of it; make it with: make firmware$" within "$scratch/bin/incode" run \
+    "$points" --no-progress --board mps2-an500 --nodes 2
+half loader/mps2-an500.img
 within "$scratch/bin/incode" run "$points" --no-progress --board mps2-an500 \
     --nodes 2 > /dev/null 2> "$errors"
-check 'boards/half an image: exit 4' "exit $?" [ $? = 4 ]
-check 'boards/half an image: is named' "$(last "$errors")" \
-    grep -q '^incode: qemu: fatal: .*/mps2-an500.img whole?' "$errors"
+check 'boards/half a loader: exit 4' "exit $?" [ $? = 4 ]
+check 'boards/half a loader: is named' "$(last "$errors")" \
+    grep -q '^incode: qemu: fatal: .*loader/mps2-an500.img whole?' "$errors"
 
 # What a board says of a fault is told while the run goes on.
 cat > "$scratch/bin/qemu-system-arm" << 'END'
@@ -193,6 +201,30 @@ full_disk() { ( # whose files end at 1 MB
 refuses 'boards/emulate: a full disk' 3 'flash0: cannot be written' full_disk
 check 'boards/emulate: a full disk is left' "$(ls "$scratch/full.cube.d")" \
     [ -z "$(ls "$scratch/full.cube.d")" ]
+# A person at the console of a node that computes over other wires.
+asks() { # NAME WORD PATTERN
+    "$BUILD/tests/ask" "$cube.d/console3.socket" "$2" > "$scratch/said"
+    check "boards/console: $1" "$(tr '\n' '|' < "$scratch/said")" \
+        grep -qE "$3" "$scratch/said"
+}
+asks 'who' who '^incode: mps2-an500: program, version .*, image [0-9a-f]{16},'
+asks 'memory' memory '^of the stack at most [0-9]+ in use so far'
+asks 'fault' fault '^started after '
+asks 'Enter alone' '' '^node 3 of 4, |^no neighbour has said yet'
+is_up() {
+    "$BUILD/tests/ask" "$cube.d/console3.socket" links > "$scratch/links"
+    grep -q '^UART 1, node 2: up, frames in' "$scratch/links" ||
+        ! kill -0 $host 2> /dev/null
+}
+incode run "$points" -q --cube "$cube" --strategy spatial \
+    --stats "$stats" 2> "$errors" &
+host=$!
+await is_up
+wait $host
+check 'boards/console: in mid-run' "exit $?: $(last "$errors")" \
+    [ "$(stat_of "$stats" digest)" = "$expected" ]
+check 'boards/console: links' "$(tr '\n' '|' < "$scratch/links")" \
+    grep -q '^UART 1, node 2: up, frames in' "$scratch/links"
 # A board loses its power.
 pkill -KILL -o -P $emulator
 await grep -q 'started again' "$scratch/emulate.errors"

@@ -32,7 +32,7 @@ in_time() { # FILE MOST
 
 # looks NAME BOARD FILE OPTION...: of a run of these points on that board.
 looks() {
-    local name="looks/$2 $1" board=$2 file=$3 most=4000
+    local name="looks/$2 $1" board=$2 file=$3 most=4500
     shift 3
     [ "$board" = mps2-an500 ] || most=40000
     rm -f "$stats"

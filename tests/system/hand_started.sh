@@ -120,7 +120,7 @@ kill -STOP $host
 held=$host
 begin --patience 60
 told 'held by an earlier host' \
-    "node 0 at 127.0.0.1:$base: is with another host.*; it is free "
+    "127.0.0.1:$base: in use by incode run .*, process $held of .*; waits "
 kill -KILL $held $host
 wait $held $host 2> /dev/null
 

@@ -312,7 +312,7 @@ END
     check 'links/a second host: exit 4' "exit $status" \
         test $status = 4 -a $((SECONDS - began)) -lt $soon
     check 'links/a second host: it is told' "$(last "$scratch/errors")" \
-        grep -q '^incode: node 0 link 1: the cube is in use .*; ' \
+        grep -q '^incode: 127.0.0.1:.*: in use by incode run .*; ' \
         "$scratch/errors"
     at_work 'a second host'
     wait $host

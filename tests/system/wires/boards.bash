@@ -29,10 +29,10 @@ make_points() {
 
 # --- the boards -----------------------------------------------------------------
 
-# emulate BOARD NODES: boards that are not joined; $emulator.
+# emulate BOARD NODES OPTION...: boards that are not joined; $emulator.
 emulate() {
     nodes=$2
-    "$INCODE" emulate --board "$1" --nodes "$2" --open -o "$cube" \
+    "$INCODE" emulate --board "$1" --nodes "$2" --open "${@:3}" -o "$cube" \
         > "$scratch/emulate" 2> "$scratch/emulate.errors" &
     emulator=$!
     await test -s "$cube"
@@ -76,7 +76,8 @@ suffered() {
 emulator_of() {
     local pid
     for pid in $(pgrep -P "$emulator"); do
-        tr '\0' '\n' < "/proc/$pid/cmdline" | grep -q "/qmp$1.socket" &&
+        { tr '\0' '\n' < "/proc/$pid/cmdline"; } 2> /dev/null |
+            grep -q "/qmp$1.socket" &&
             echo "$pid"
     done
 }
