@@ -53,7 +53,7 @@ freestanding := $(call files,incode node transport/tuples) \
 drivers      := $(filter-out %/mpi.c,$(wildcard transport/drivers/*.c))
 # Those that need what a static node has not.
 host_drivers := transport/drivers/serial_port.c \
-	transport/drivers/loader_sodium.c
+	transport/drivers/sign_sodium.c
 node_drivers := $(filter-out $(host_drivers),$(drivers))
 # A folder a board.  Its program is incode-node-NAME, that of linux incode-node;
 # mpi's is no static one.
@@ -256,7 +256,7 @@ $(tools): $(BUILD)/tests/%: $(obj)/tests/system/%.o
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(tool_libs) -lm -o $@
 # A board's flash chip, as its loader has it.
-$(BUILD)/tests/chip: $(obj)/transport/drivers/loader_sodium.o $(BUILD)/libcore.a
+$(BUILD)/tests/chip: $(obj)/transport/drivers/sign_sodium.o $(BUILD)/libcore.a
 $(BUILD)/tests/chip: tool_libs = -lsodium
 
 $(BUILD)/tests/test_mpi: $(obj)/tests/unit/transport/drivers/test_mpi.o \

@@ -73,7 +73,7 @@ $(call bare_compile,$(1),loader/$(1))
 $(BUILD)/firmware/loader/$(1)/%.o: private BARE_OPT = -Os
 $(BUILD)/firmware/loader/$(1)/transport/drivers/%.o: private BARE += -isystem \
 	$$(sodium)/include
-$(BUILD)/firmware/loader/$(1)/transport/drivers/loader_sodium.o: \
+$(BUILD)/firmware/loader/$(1)/transport/drivers/sign_sodium.o: \
 	$$(sodium)/small
 $$(bare_sodium_$(1)): $(BUILD)/firmware/loader/$(1)/sodium/%.o: \
 		$$(sodium)/small $(BUILD)/firmware/flags
@@ -142,7 +142,7 @@ bare_sign = $(bare_copy_$(1)) -O binary $< $@ && \
 # The parts of the freestanding rooms that a loader needs; what of the
 # distribution's libsodium, made small (boards/bare/libsodium).
 loader_parts := boards/bare/loader.c boards/sodium_utils.c \
-	transport/drivers/loader_sodium.c $(wildcard node/loader/*.c transport/*.c) \
+	transport/drivers/sign_sodium.c $(wildcard node/loader/*.c transport/*.c) \
 	$(addprefix node/,answers.c configure.c counted.c identity.c looks.c)
 sodium       := $(BUILD)/libsodium
 sodium_parts := crypto_generichash/blake2b/ref/blake2b-compress-ref \
@@ -171,7 +171,7 @@ $(BUILD)/firmware/sign: FORCE $(if $(SIGN),,$(BUILD)/firmware/development.sign)
 	@cmp -s '$(sign_key).pub' $@ || cp '$(sign_key).pub' $@
 $(BUILD)/firmware/sign_key.c: $(BUILD)/firmware/sign
 	@{ echo '#include "boards/bare/sign_key.h"'; \
-		echo 'const uint8_t bare_sign_key[LOADER_PUBLIC_BYTES] = {'; \
+		echo 'const uint8_t bare_sign_key[SIGN_PUBLIC_BYTES] = {'; \
 		tr -d '[:space:]' < $< | sed 's/../0x&, /g'; echo '};'; } > $@
 
 $(foreach b,$(bare_boards),$(eval $(call bare_board,$(b))))

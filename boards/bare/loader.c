@@ -13,7 +13,7 @@
 #include "node/loader/look.h"
 #include "node/version.h"
 #include "sign_key.h"
-#include "transport/drivers/loader_sodium.h"
+#include "transport/drivers/sign_sodium.h"
 
 static struct bare_node bare;
 static struct loader_rules rules;
@@ -81,7 +81,7 @@ static void begin(void)
         bare_fault("the flash takes no record of this start", NULL, 0, 0);
     }
     rules = (struct loader_rules){.flash = board_facts.flash,
-                                  .suite = &loader_sodium,
+                                  .suite = &sign_sodium,
                                   .key = bare_sign_key,
                                   .board = board_facts.name,
                                   .address = board_facts.image_at,

@@ -3,13 +3,13 @@
  *
  * Memory: 32 bytes, of code.  Work: none.
  *
- *     bool ours = memcmp(image.key, bare_sign_key, LOADER_PUBLIC_BYTES) == 0;
+ *     bool ours = memcmp(image.key, bare_sign_key, SIGN_PUBLIC_BYTES) == 0;
  */
 #ifndef BOARDS_BARE_SIGN_KEY_H
 #define BOARDS_BARE_SIGN_KEY_H
 
-#include "node/loader/suite.h"
+#include "transport/sign_suite.h"
 
-extern const uint8_t bare_sign_key[LOADER_PUBLIC_BYTES];
+extern const uint8_t bare_sign_key[SIGN_PUBLIC_BYTES];
 
 #endif

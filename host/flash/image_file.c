@@ -3,7 +3,7 @@
 #include <stdalign.h>
 #include <string.h>
 
-#include "transport/drivers/loader_sodium.h"
+#include "transport/drivers/sign_sodium.h"
 
 int host_image_open(struct host_image *file, const char *path,
                     struct host_error *error)
@@ -40,22 +40,22 @@ void host_image_close(struct host_image *file)
 }
 
 void host_image_digest(const uint8_t *header, const uint8_t *code, size_t size,
-                       uint8_t digest[LOADER_DIGEST_BYTES])
+                       uint8_t digest[SIGN_DIGEST_BYTES])
 {
-    alignas(64) uint8_t hash[LOADER_HASH_BYTES];
-    loader_sodium.begin(hash);
-    loader_sodium.add(hash, header, LOADER_NAMED_BYTES);
-    loader_sodium.add(hash, code, size);
-    loader_sodium.end(hash, digest);
+    alignas(64) uint8_t hash[SIGN_HASH_BYTES];
+    sign_sodium.begin(hash);
+    sign_sodium.add(hash, header, LOADER_NAMED_BYTES);
+    sign_sodium.add(hash, code, size);
+    sign_sodium.end(hash, digest);
 }
 
 enum loader_fault host_image_fault(const struct host_image *file)
 {
-    uint8_t digest[LOADER_DIGEST_BYTES];
+    uint8_t digest[SIGN_DIGEST_BYTES];
     const uint8_t *header = file->source.data;
     host_image_digest(header, header + LOADER_HEADER_BYTES, file->image.bytes,
                       digest);
     return memcmp(digest, file->image.digest, sizeof digest) != 0
                ? LOADER_WRONG_DIGEST
-               : loader_image_signed(header, &loader_sodium, file->image.key);
+               : loader_image_signed(header, &sign_sodium, file->image.key);
 }

@@ -31,6 +31,6 @@ enum loader_fault host_image_fault(const struct host_image *file);
 
 /* Of a header's first LOADER_NAMED_BYTES, and the code. */
 void host_image_digest(const uint8_t *header, const uint8_t *code, size_t size,
-                       uint8_t digest[LOADER_DIGEST_BYTES]);
+                       uint8_t digest[SIGN_DIGEST_BYTES]);
 
 #endif

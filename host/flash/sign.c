@@ -15,7 +15,7 @@
 #include "node/loader/messages.h"
 #include "node/version.h"
 #include "sign_key.h"
-#include "transport/drivers/loader_sodium.h"
+#include "transport/drivers/sign_sodium.h"
 
 enum {
     KEY_KEY = 256,
@@ -294,7 +294,7 @@ int host_sign(int argc, char **argv, struct host_error *error)
 
 static void print_hex(const char *name, const uint8_t *bytes, size_t size)
 {
-    char text[2 * LOADER_SIGNATURE_BYTES + 1];
+    char text[2 * SIGN_BYTES + 1];
     host_sign_hex(text, bytes, size);
     printf("%-10s %s\n", name, text);
 }
@@ -314,7 +314,7 @@ static void print_image(const struct loader_image *image)
 
 /* What to do about it, and the exit status. */
 static int judge(const struct sign *s, const struct host_image *file,
-                 const uint8_t wanted[LOADER_PUBLIC_BYTES])
+                 const uint8_t wanted[SIGN_PUBLIC_BYTES])
 {
     enum loader_fault fault = host_image_fault(file);
     if (fault == LOADER_UNSIGNED) {
@@ -323,7 +323,7 @@ static int judge(const struct sign *s, const struct host_image *file,
         print_hex("signed by", file->image.key, sizeof file->image.key);
     }
     if (fault == LOADER_GOOD && s->key != NULL) {
-        fault = loader_image_signed(file->source.data, &loader_sodium, wanted);
+        fault = loader_image_signed(file->source.data, &sign_sodium, wanted);
     }
     if (fault == LOADER_GOOD || (fault == LOADER_UNSIGNED && s->key == NULL)) {
         return 0;
@@ -349,7 +349,7 @@ int host_image_show(int argc, char **argv, struct host_error *error)
         NULL};
     struct sign s = {.error = error};
     struct host_image file;
-    uint8_t wanted[LOADER_PUBLIC_BYTES];
+    uint8_t wanted[SIGN_PUBLIC_BYTES];
     if (host_options_parse(&argp, argc, argv, 0, &s, error) != 0 ||
         (s.key != NULL && host_sign_public_read(wanted, s.key, error) != 0) ||
         host_image_open(&file, s.path, error) != 0) {

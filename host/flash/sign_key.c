@@ -19,14 +19,14 @@ enum {
     SEED_BYTES = SECURE_KEY_BYTES,
     MARK_BYTES = sizeof MARK - 1,
     SECRET_TEXT = MARK_BYTES + 2 * SEED_BYTES + 1,
-    PUBLIC_TEXT = 2 * LOADER_PUBLIC_BYTES + 1
+    PUBLIC_TEXT = 2 * SIGN_PUBLIC_BYTES + 1
 };
 
 static_assert(MARK_BYTES <= (int)KEY_FILE_MARK_MAX, "a mark fits");
 static_assert(SEED_BYTES == crypto_sign_ed25519_SEEDBYTES, "bytes of a seed");
 static_assert((int)HOST_SIGN_SECRET_BYTES == crypto_sign_ed25519_SECRETKEYBYTES,
               "bytes of a secret half");
-static_assert((int)SECURE_KEY_BYTES == (int)LOADER_PUBLIC_BYTES,
+static_assert((int)SECURE_KEY_BYTES == (int)SIGN_PUBLIC_BYTES,
               "a key's file holds a public half");
 
 void host_sign_hex(char *text, const uint8_t *bytes, size_t size)
@@ -154,7 +154,7 @@ int host_sign_key_read(struct host_sign_key *pair, const char *path,
     return status;
 }
 
-int host_sign_public_read(uint8_t public[LOADER_PUBLIC_BYTES], const char *path,
+int host_sign_public_read(uint8_t public[SIGN_PUBLIC_BYTES], const char *path,
                           struct host_error *error)
 {
     uint8_t seed[SEED_BYTES];
@@ -175,7 +175,7 @@ int host_sign_public_read(uint8_t public[LOADER_PUBLIC_BYTES], const char *path,
 }
 
 void host_sign_key_sign(const struct host_sign_key *pair, const uint8_t *bytes,
-                        size_t size, uint8_t signature[LOADER_SIGNATURE_BYTES])
+                        size_t size, uint8_t signature[SIGN_BYTES])
 {
     (void)crypto_sign_ed25519_detached(signature, NULL, bytes, size,
                                        pair->secret);

@@ -16,13 +16,13 @@
 #include <stdint.h>
 
 #include "host/base/error.h"
-#include "node/loader/suite.h"
+#include "transport/sign_suite.h"
 
 enum { HOST_SIGN_SECRET_BYTES = 64 };
 
 struct host_sign_key {
     uint8_t secret[HOST_SIGN_SECRET_BYTES]; /* as libsodium has it */
-    uint8_t public[LOADER_PUBLIC_BYTES];
+    uint8_t public[SIGN_PUBLIC_BYTES];
 };
 
 /* `incode key --sign FILE`: neither file may be there already.  0, HOST_INPUT
@@ -35,12 +35,12 @@ int host_sign_key_read(struct host_sign_key *pair, const char *path,
 void host_sign_key_wipe(struct host_sign_key *pair);
 
 /* The public half alone, from FILE.pub. */
-int host_sign_public_read(uint8_t public[LOADER_PUBLIC_BYTES], const char *path,
+int host_sign_public_read(uint8_t public[SIGN_PUBLIC_BYTES], const char *path,
                           struct host_error *error);
 
 /* The signature of these bytes. */
 void host_sign_key_sign(const struct host_sign_key *pair, const uint8_t *bytes,
-                        size_t size, uint8_t signature[LOADER_SIGNATURE_BYTES]);
+                        size_t size, uint8_t signature[SIGN_BYTES]);
 
 /* As text: 2 * size digits, and 0. */
 void host_sign_hex(char *text, const uint8_t *bytes, size_t size);

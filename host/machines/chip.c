@@ -7,7 +7,7 @@
 #include "host/files/source.h"
 #include "node/loader/flash_ram.h"
 #include "node/loader/slots.h"
-#include "transport/drivers/loader_sodium.h"
+#include "transport/drivers/sign_sodium.h"
 
 enum { BYTES = LOADER_RAM_SECTORS * LOADER_RAM_SECTOR };
 
@@ -16,7 +16,7 @@ static bool has(const struct loader_flash *flash,
                 const struct loader_image *image)
 {
     const struct loader_rules rules = {.flash = flash,
-                                       .suite = &loader_sodium,
+                                       .suite = &sign_sodium,
                                        .key = image->key,
                                        .board = image->board,
                                        .address = image->address,

@@ -14,13 +14,13 @@ enum {
     AT_BOARD = 24,
     AT_VERSION = AT_BOARD + LOADER_BOARD_BYTES,
     AT_DIGEST = LOADER_NAMED_BYTES,
-    AT_KEY = AT_DIGEST + LOADER_DIGEST_BYTES,
+    AT_KEY = AT_DIGEST + SIGN_DIGEST_BYTES,
     AT_SIGNATURE = LOADER_SIGNED_BYTES,
     AT_CRC = LOADER_HEADER_BYTES - 4
 };
 
 static_assert(AT_VERSION + LOADER_VERSION_BYTES == LOADER_NAMED_BYTES &&
-                  AT_KEY + LOADER_PUBLIC_BYTES == LOADER_SIGNED_BYTES,
+                  AT_KEY + SIGN_PUBLIC_BYTES == LOADER_SIGNED_BYTES,
               "header layout");
 
 static const uint8_t magic[AT_BYTES] = {'i', 'n', 'c', 'o', 'd', 'e', 'I', '1'};
@@ -71,14 +71,14 @@ void loader_image_pack(const struct loader_image *image,
 }
 
 enum loader_fault loader_image_signed(const uint8_t bytes[LOADER_HEADER_BYTES],
-                                      const struct loader_suite *suite,
-                                      const uint8_t key[LOADER_PUBLIC_BYTES])
+                                      const struct sign_suite *suite,
+                                      const uint8_t key[SIGN_PUBLIC_BYTES])
 {
-    static const uint8_t nobody[LOADER_PUBLIC_BYTES];
+    static const uint8_t nobody[SIGN_PUBLIC_BYTES];
     if (memcmp(bytes + AT_KEY, nobody, sizeof nobody) == 0) {
         return LOADER_UNSIGNED;
     }
-    if (memcmp(bytes + AT_KEY, key, LOADER_PUBLIC_BYTES) != 0) {
+    if (memcmp(bytes + AT_KEY, key, SIGN_PUBLIC_BYTES) != 0) {
         return LOADER_WRONG_KEY;
     }
     return suite->good(bytes + AT_SIGNATURE, bytes, LOADER_SIGNED_BYTES, key)

@@ -26,7 +26,7 @@
 #ifndef NODE_LOADER_IMAGE_H
 #define NODE_LOADER_IMAGE_H
 
-#include "suite.h"
+#include "transport/sign_suite.h"
 
 enum {
     LOADER_HEADER_BYTES = 256,
@@ -57,9 +57,9 @@ struct loader_image {
     uint32_t bytes, address, number, flags;
     char board[LOADER_BOARD_BYTES + 1];
     char version[LOADER_VERSION_BYTES + 1];
-    uint8_t digest[LOADER_DIGEST_BYTES];
-    uint8_t key[LOADER_PUBLIC_BYTES];
-    uint8_t signature[LOADER_SIGNATURE_BYTES];
+    uint8_t digest[SIGN_DIGEST_BYTES];
+    uint8_t key[SIGN_PUBLIC_BYTES];
+    uint8_t signature[SIGN_BYTES];
 };
 
 /* LOADER_NO_IMAGE: these are not the header of one that has code. */
@@ -70,8 +70,8 @@ void loader_image_pack(const struct loader_image *image,
 
 /* LOADER_UNSIGNED, LOADER_WRONG_KEY, LOADER_WRONG_SIGNATURE, or LOADER_GOOD. */
 enum loader_fault loader_image_signed(const uint8_t bytes[LOADER_HEADER_BYTES],
-                                      const struct loader_suite *suite,
-                                      const uint8_t key[LOADER_PUBLIC_BYTES]);
+                                      const struct sign_suite *suite,
+                                      const uint8_t key[SIGN_PUBLIC_BYTES]);
 
 /* "it is signed with another key", for a message; NULL: LOADER_GOOD. */
 const char *loader_fault_text(enum loader_fault fault);

@@ -15,7 +15,7 @@ void loader_look_hash(struct loader_look *look,
                       const uint8_t header[LOADER_HEADER_BYTES],
                       const struct loader_image *image, unsigned slot)
 {
-    const struct loader_suite *suite = slots->rules->suite;
+    const struct sign_suite *suite = slots->rules->suite;
     look->code = loader_slots_code(slots, slot);
     look->bytes = image->bytes;
     look->done = 0;
@@ -27,7 +27,7 @@ void loader_look_hash(struct loader_look *look,
 static bool ends_well(struct loader_look *look,
                       const struct loader_slots *slots)
 {
-    uint8_t digest[LOADER_DIGEST_BYTES];
+    uint8_t digest[SIGN_DIGEST_BYTES];
     slots->rules->suite->end(look->hash, digest);
     return memcmp(digest, look->digest, sizeof digest) == 0;
 }
@@ -44,7 +44,7 @@ static void read_header(const struct loader_slots *slots, unsigned slot,
 bool loader_look_slice(struct loader_look *look,
                        const struct loader_slots *slots, bool *good)
 {
-    const struct loader_suite *suite = slots->rules->suite;
+    const struct sign_suite *suite = slots->rules->suite;
     const struct loader_flash *flash = slots->rules->flash;
     uint32_t left = look->bytes - look->done;
     uint8_t slice[LOADER_SLICE_BYTES];
@@ -62,7 +62,7 @@ bool loader_look_slice(struct loader_look *look,
 bool loader_look_copy(struct loader_look *look, struct loader_slots *slots,
                       unsigned slot, const uint8_t *copy)
 {
-    const struct loader_suite *suite = slots->rules->suite;
+    const struct sign_suite *suite = slots->rules->suite;
     uint8_t header[LOADER_HEADER_BYTES];
     read_header(slots, slot, header);
     loader_look_hash(look, slots, header, &slots->image[slot], slot);

@@ -15,10 +15,10 @@
 #include "slots.h"
 
 struct loader_look {
-    alignas(64) uint8_t hash[LOADER_HASH_BYTES];
+    alignas(64) uint8_t hash[SIGN_HASH_BYTES];
     unsigned slot;
     uint32_t code, bytes, done; /* of the code: where it is in the flash */
-    uint8_t digest[LOADER_DIGEST_BYTES]; /* that it should have */
+    uint8_t digest[SIGN_DIGEST_BYTES]; /* that it should have */
     bool begun;
 };
 

@@ -9,7 +9,7 @@
  * byte for byte, its header's page written last; the last sectors of a slot are
  * the journal of what is coming (incoming.h).
  *
- * Memory: struct loader_slots; a hash of LOADER_HASH_BYTES on the stack.
+ * Memory: struct loader_slots; a hash of SIGN_HASH_BYTES on the stack.
  * Work: loader_slots_choose reads the image that it chooses once for its
  * digest, and proves its signature; the others program one record.
  *
@@ -35,8 +35,8 @@ enum {
 /* What the board takes, and from whom. */
 struct loader_rules {
     const struct loader_flash *flash;
-    const struct loader_suite *suite;
-    const uint8_t *key; /* LOADER_PUBLIC_BYTES */
+    const struct sign_suite *suite;
+    const uint8_t *key; /* SIGN_PUBLIC_BYTES */
     const char *board;  /* as --board names it */
     uint32_t address;   /* that images are linked for, */
     uint32_t room;      /* and bytes of code that fit there */

@@ -17,7 +17,7 @@
 #include "node/loader/layout.h"
 #include "node/loader/messages.h"
 #include "node/loader/slots.h"
-#include "transport/drivers/loader_sodium.h"
+#include "transport/drivers/sign_sodium.h"
 
 enum { CHIP = 16 << 20, IMAGE_MAX = 1 << 20 };
 
@@ -121,8 +121,7 @@ int main(int argc, char **argv)
     }
     uint8_t *chip = open_chip(argv[1]);
     const struct loader_flash flash = LOADER_RAM(chip);
-    const struct loader_rules rules = {.flash = &flash,
-                                       .suite = &loader_sodium};
+    const struct loader_rules rules = {.flash = &flash, .suite = &sign_sodium};
     struct loader_slots slots;
     bool good = true;
     loader_slots_open(&slots, &rules);

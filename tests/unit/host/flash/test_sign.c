@@ -17,7 +17,7 @@
 #include "host/flash/sign.h"
 #include "host/flash/sign_key.h"
 #include "host/machines/cube_key.h"
-#include "transport/drivers/loader_sodium.h"
+#include "transport/drivers/sign_sodium.h"
 
 enum { CODE = 5000, WORDS_MAX = 16 };
 
@@ -97,13 +97,13 @@ static void make_image(const char *key)
 static enum loader_fault signed_by(const char *public)
 {
     struct host_image file;
-    uint8_t key[LOADER_PUBLIC_BYTES];
+    uint8_t key[SIGN_PUBLIC_BYTES];
     error = (struct host_error){0};
     assert_int_equal(host_sign_public_read(key, in(public), &error), 0);
     assert_int_equal(host_image_open(&file, in("image"), &error), 0);
     enum loader_fault fault = host_image_fault(&file);
     if (fault == LOADER_GOOD) {
-        fault = loader_image_signed(file.source.data, &loader_sodium, key);
+        fault = loader_image_signed(file.source.data, &sign_sodium, key);
     }
     host_image_close(&file);
     return fault;
@@ -146,17 +146,17 @@ static void an_image_is_signed_anew_in_its_place(void **unused)
 /* "abc", as b2sum -l 256 has it. */
 static void the_digest_is_blake2b_of_name_and_code(void **unused)
 {
-    static const uint8_t expected[LOADER_DIGEST_BYTES] = {
+    static const uint8_t expected[SIGN_DIGEST_BYTES] = {
         0xbd, 0xdd, 0x81, 0x3c, 0x63, 0x42, 0x39, 0x72, 0x31, 0x71, 0xef,
         0x3f, 0xee, 0x98, 0x57, 0x9b, 0x94, 0x96, 0x4e, 0x3b, 0xb1, 0xcb,
         0x3e, 0x42, 0x72, 0x62, 0xc8, 0xc0, 0x68, 0xd5, 0x23, 0x19};
-    _Alignas(64) uint8_t hash[LOADER_HASH_BYTES];
-    uint8_t digest[LOADER_DIGEST_BYTES];
+    _Alignas(64) uint8_t hash[SIGN_HASH_BYTES];
+    uint8_t digest[SIGN_DIGEST_BYTES];
     (void)unused;
-    loader_sodium.begin(hash);
-    loader_sodium.add(hash, "a", 1);
-    loader_sodium.add(hash, "bc", 2);
-    loader_sodium.end(hash, digest);
+    sign_sodium.begin(hash);
+    sign_sodium.add(hash, "a", 1);
+    sign_sodium.add(hash, "bc", 2);
+    sign_sodium.end(hash, digest);
     assert_memory_equal(digest, expected, sizeof digest);
 }
 
@@ -221,7 +221,7 @@ static void refuses_key(const char *name, const char *what)
 
 static void keys_of_the_other_kind_are_refused(void **unused)
 {
-    uint8_t public[LOADER_PUBLIC_BYTES];
+    uint8_t public[SIGN_PUBLIC_BYTES];
     (void)unused;
     make_image("lab");
     refuses_key("cube", "a cube's key");

@@ -148,7 +148,7 @@ static void chip_make(struct chip *c, uint32_t sector, uint32_t page,
  */
 
 struct quick_hash {
-    uint32_t lane[LOADER_DIGEST_BYTES / 4], count;
+    uint32_t lane[SIGN_DIGEST_BYTES / 4], count;
 };
 
 static void quick_begin(void *hash)
@@ -160,40 +160,40 @@ static void quick_add(void *hash, const void *bytes, size_t size)
 {
     struct quick_hash *h = hash;
     for (size_t i = 0; i < size; i++, h->count++) {
-        uint32_t *lane = &h->lane[h->count % (LOADER_DIGEST_BYTES / 4)];
+        uint32_t *lane = &h->lane[h->count % (SIGN_DIGEST_BYTES / 4)];
         *lane =
             (*lane ^ ((const uint8_t *)bytes)[i] ^ h->count << 8) * 16777619u;
     }
 }
 
-static void quick_end(void *hash, uint8_t digest[LOADER_DIGEST_BYTES])
+static void quick_end(void *hash, uint8_t digest[SIGN_DIGEST_BYTES])
 {
-    memcpy(digest, ((struct quick_hash *)hash)->lane, LOADER_DIGEST_BYTES);
+    memcpy(digest, ((struct quick_hash *)hash)->lane, SIGN_DIGEST_BYTES);
 }
 
-static void quick_sign(uint8_t signature[LOADER_SIGNATURE_BYTES],
-                       const uint8_t *bytes, size_t size, const uint8_t *key)
+static void quick_sign(uint8_t signature[SIGN_BYTES], const uint8_t *bytes,
+                       size_t size, const uint8_t *key)
 {
     struct quick_hash hash;
     quick_begin(&hash);
-    quick_add(&hash, key, LOADER_PUBLIC_BYTES);
+    quick_add(&hash, key, SIGN_PUBLIC_BYTES);
     quick_add(&hash, bytes, size);
     quick_end(&hash, signature);
-    memset(signature + LOADER_DIGEST_BYTES, 7, LOADER_DIGEST_BYTES);
+    memset(signature + SIGN_DIGEST_BYTES, 7, SIGN_DIGEST_BYTES);
 }
 
-static bool quick_good(const uint8_t signature[LOADER_SIGNATURE_BYTES],
+static bool quick_good(const uint8_t signature[SIGN_BYTES],
                        const uint8_t *bytes, size_t size,
-                       const uint8_t key[LOADER_PUBLIC_BYTES])
+                       const uint8_t key[SIGN_PUBLIC_BYTES])
 {
-    uint8_t right[LOADER_SIGNATURE_BYTES];
+    uint8_t right[SIGN_BYTES];
     quick_sign(right, bytes, size, key);
     return memcmp(signature, right, sizeof right) == 0;
 }
 
-static const struct loader_suite quick = {quick_begin, quick_add, quick_end,
-                                          quick_good};
-static const uint8_t quick_key[LOADER_PUBLIC_BYTES] = {1, 2, 3};
+static const struct sign_suite quick = {quick_begin, quick_add, quick_end,
+                                        quick_good};
+static const uint8_t quick_key[SIGN_PUBLIC_BYTES] = {1, 2, 3};
 
 static const struct loader_rules chip_rules = {
     &chip.flash, &quick,         quick_key, "mps2-an385",

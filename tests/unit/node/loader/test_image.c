@@ -84,9 +84,8 @@ static struct {
     bool word;
 } judge;
 
-static bool good(const uint8_t signature[LOADER_SIGNATURE_BYTES],
-                 const uint8_t *bytes, size_t size,
-                 const uint8_t key[LOADER_PUBLIC_BYTES])
+static bool good(const uint8_t signature[SIGN_BYTES], const uint8_t *bytes,
+                 size_t size, const uint8_t key[SIGN_PUBLIC_BYTES])
 {
     judge.asked++;
     judge.size = size;
@@ -98,9 +97,9 @@ static bool good(const uint8_t signature[LOADER_SIGNATURE_BYTES],
 
 static void a_signer_is_known_by_key_and_signature(void **unused)
 {
-    static const struct loader_suite suite = {.good = good};
+    static const struct sign_suite suite = {.good = good};
     struct loader_image image = sample();
-    uint8_t bytes[LOADER_HEADER_BYTES], key[LOADER_PUBLIC_BYTES];
+    uint8_t bytes[LOADER_HEADER_BYTES], key[SIGN_PUBLIC_BYTES];
     (void)unused;
     memcpy(key, image.key, sizeof key);
     loader_image_pack(&image, bytes);
@@ -110,7 +109,7 @@ static void a_signer_is_known_by_key_and_signature(void **unused)
     judge.word = false;
     assert_int_equal(loader_image_signed(bytes, &suite, key),
                      LOADER_WRONG_SIGNATURE);
-    key[LOADER_PUBLIC_BYTES - 1] ^= 1;
+    key[SIGN_PUBLIC_BYTES - 1] ^= 1;
     assert_int_equal(loader_image_signed(bytes, &suite, key), LOADER_WRONG_KEY);
     memset(image.key, 0, sizeof image.key);
     loader_image_pack(&image, bytes);
