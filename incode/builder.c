@@ -41,15 +41,16 @@ void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
     memcpy(points.lo, setup->lo, sizeof points.lo);
     memcpy(points.hi, setup->hi, sizeof points.hi);
     memcpy(points.cells, setup->cells, sizeof points.cells);
+    struct incode_pause began = *pause;
     memset(b, 0, sizeof *b);
+    incode_breathe(&began, INCODE_PAUSE_UNITS);
     b->lent = memory;
     b->lists = lists;
     b->bytes = places + incode_maker_bytes(&share);
     for (uint32_t i = 0; i < lists; i++)
         b->lent[i].born = 0;
     incode_maker_init(&b->maker, (uint8_t *)memory + places, &share, &points,
-                      source);
-    b->maker.counts.tally.pause = *pause;
+                      source, &began);
 }
 
 /* ---- lists ---- */

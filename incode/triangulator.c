@@ -83,7 +83,9 @@ incode_triangulator_init(void *arena, size_t bytes,
     memcpy(points.lo, setup->lo, sizeof points.lo);
     memcpy(points.hi, setup->hi, sizeof points.hi);
     memcpy(points.cells, setup->cells, sizeof points.cells);
+    struct incode_pause pause = outside->pause;
     memset(t, 0, sizeof *t);
+    incode_breathe(&pause, INCODE_PAUSE_UNITS);
     t->map = map;
     t->shares = shares;
     size_t bits = incode_arena_bits(setup, bytes);
@@ -96,8 +98,7 @@ incode_triangulator_init(void *arena, size_t bytes,
     t->phase = INCODE_PHASE_IDLE;
     size_t maker = incode_maker_bytes(&shares.maker);
     incode_maker_init(&t->maker, t->arena, &shares.maker, &points,
-                      &outside->pages);
-    t->maker.counts.tally.pause = outside->pause;
+                      &outside->pages, &pause);
     incode_maker_breathe(&t->maker, INCODE_PAUSE_UNITS);
     incode_front_init(&t->front, t->arena + maker, &shares.front, setup->bricks,
                       (enum incode_face_rule)setup->face_rule, &outside->front,

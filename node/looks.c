@@ -60,6 +60,24 @@ static void measure(struct node_looks *looks, uint64_t passed_us)
                                                   : (uint32_t)fit;
 }
 
+/* Returns the time afterwards. */
+static uint64_t tend(struct node_looks *looks, uint64_t now_us)
+{
+    if (now_us - looks->polled_us < TEND_US) {
+        return now_us;
+    }
+    note_poll(looks, now_us);
+    (void)cube_tend(looks->cube, now_us);
+    return looks->board->now_us(looks->board->context);
+}
+
+void node_looks_between(struct node_looks *looks)
+{
+    if (looks->tends) {
+        (void)tend(looks, looks->board->now_us(looks->board->context));
+    }
+}
+
 static uint32_t at_pause(void *context)
 {
     struct node_looks *looks = context;
@@ -70,11 +88,7 @@ static uint32_t at_pause(void *context)
     if (looks->working) {
         measure(looks, now_us - looks->paused_us);
     }
-    if (now_us - looks->polled_us >= TEND_US) {
-        note_poll(looks, now_us);
-        (void)cube_tend(looks->cube, now_us);
-        now_us = looks->board->now_us(looks->board->context);
-    }
+    now_us = tend(looks, now_us);
     looks->working = true;
     looks->paused_us = now_us;
     return looks->units;

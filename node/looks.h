@@ -51,6 +51,9 @@ struct incode_pause node_looks_pause(struct node_looks *looks);
 /* The node sleeps now: the time until the next poll is no matter of its. */
 void node_looks_idle(struct node_looks *looks);
 
+/* Between two messages, and before what the role sends: likewise. */
+void node_looks_between(struct node_looks *looks);
+
 /* Whether other links than at the last look have been silent for long; 20 times
  * a second at most. */
 bool node_looks_silent(struct node_looks *looks, uint64_t now_us);

@@ -464,6 +464,7 @@ static unsigned read_link(struct node *n, unsigned d)
         }
         take_message(n, &message);
         cube_release(n->cube);
+        node_looks_between(&n->looks);
         moved++;
     }
     return moved;
@@ -495,6 +496,7 @@ unsigned node_work(struct node *node)
 enum node_event node_send(struct node *node, unsigned moved)
 {
     bool sound = is_sound(node);
+    node_looks_between(&node->looks);
     if (node_fault_is_set(&node->fault) && !node->fault_sent) {
         send_fault(node);
     } else if (node->owes_pong) {

@@ -74,7 +74,7 @@ size_t incode_horizon_bytes(uint32_t boxes, uint32_t copies);
 /* memory: so many bytes, aligned to 64.  boxes: INCODE_HORIZON_MIN to
  * INCODE_HORIZON_MAX, a multiple of 64; copies: 1 to INCODE_HORIZON_COPIES. */
 void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
-                         uint32_t copies);
+                         uint32_t copies, struct incode_pause *pause);
 
 /* Boxes that are listed from the start, at most; the others are for splitting.
  */

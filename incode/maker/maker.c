@@ -47,7 +47,10 @@ static void take(struct incode_maker *m, void *memory,
                  const struct incode_maker_share *share, uint32_t bricks)
 {
     INCODE_ASSERT(share->frames >= INCODE_FRAMES_MIN);
-    incode_horizon_init(&m->horizon, memory, share->boxes, share->copies);
+    incode_maker_breathe(m, INCODE_PAUSE_UNITS);
+    incode_horizon_init(&m->horizon, memory, share->boxes, share->copies,
+                        &m->counts.tally.pause);
+    incode_maker_breathe(m, INCODE_PAUSE_UNITS);
     incode_pager_init(&m->pager, (uint8_t *)memory + horizon_bytes(share),
                       share->frames, bricks);
     m->lookahead = lookahead_of(m);
@@ -58,10 +61,12 @@ static void take(struct incode_maker *m, void *memory,
 void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
-                       const struct incode_page_source *source)
+                       const struct incode_page_source *source,
+                       const struct incode_pause *pause)
 {
     INCODE_ASSERT(points->bricks > 0);
     memset(m, 0, sizeof *m);
+    m->counts.tally.pause = *pause;
     m->index = points->index;
     memcpy(m->lo, points->lo, sizeof m->lo);
     memcpy(m->hi, points->hi, sizeof m->hi);

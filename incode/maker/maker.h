@@ -17,7 +17,7 @@
  * indexes `naive` and `grid` it looks at no more than 256 pages of points or
  * about 4,096 rows of cells and points.
  *
- *     incode_maker_init(&maker, memory, &share, &points, &source);
+ *     incode_maker_init(&maker, memory, &share, &points, &source, &pause);
  *     happened = incode_maker_apexes(&maker, 0, faces, count, answers, &done);
  *     if (happened == INCODE_WAIT)
  *         page = maker.search[0].page;   // deliver it and ask again
@@ -152,11 +152,13 @@ size_t incode_maker_bytes(const struct incode_maker_share *share);
 uint32_t incode_maker_frames(const struct incode_maker_share *share,
                              size_t bytes);
 
-/* memory: aligned to 64 bytes, incode_maker_bytes of the share. */
+/* memory: aligned to 64 bytes, incode_maker_bytes of the share.  pause: is told
+ * of what takes long, from now on; the maker has a copy. */
 void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
-                       const struct incode_page_source *source);
+                       const struct incode_page_source *source,
+                       const struct incode_pause *pause);
 
 /* Moves to other memory, of another share: what was there is forgotten, counts
  * stay.  No page may be on its way. */

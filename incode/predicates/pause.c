@@ -1,6 +1,10 @@
 #include "pause.h"
 
+#include <string.h>
+
 #include "check.h"
+
+enum { CLEARED = 8192, CLEARED_UNITS = 16 }; /* bytes at once, and their work */
 
 void incode_pause_look(struct incode_pause *pause)
 {
@@ -9,4 +13,14 @@ void incode_pause_look(struct incode_pause *pause)
         units = pause->look(pause->context);
     INCODE_ASSERT(units >= 1 && units <= INCODE_PAUSE_UNITS_MAX);
     pause->left = (int32_t)units;
+}
+
+void incode_pause_clear(struct incode_pause *pause, void *memory, size_t bytes)
+{
+    uint8_t *at = memory;
+    for (size_t done; bytes > 0; at += done, bytes -= done) {
+        done = bytes < CLEARED ? bytes : CLEARED;
+        incode_breathe(pause, CLEARED_UNITS);
+        memset(at, 0, done);
+    }
 }

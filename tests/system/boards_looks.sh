@@ -8,17 +8,10 @@
 # the limits are four fifths of these.
 . tests/system/lib.sh
 
-for board in mps2-an500 mps2-an385; do
-    if [ ! -r "$BUILD/firmware/$board.img" ]; then
-        skip looks "there is no $BUILD/firmware: make firmware"
-        exit 0
-    fi
-done
+need_boards looks mps2-an500
+need_boards looks mps2-an385
 stats=$scratch/stats.json
-qemu=$(command -v qemu-system-arm) || {
-    skip looks 'qemu-system-arm is not there: make deps'
-    exit 0
-}
+qemu=$(command -v qemu-system-arm)
 mkdir "$scratch/bin"
 cat > "$scratch/bin/qemu-system-arm" << EOF
 #!/bin/sh
@@ -32,7 +25,7 @@ in_time() { # FILE MOST
 
 # looks NAME BOARD FILE OPTION...: of a run of these points on that board.
 looks() {
-    local name="looks/$2 $1" board=$2 file=$3 most=4500
+    local name="looks/$2 $1" board=$2 file=$3 most=4000
     shift 3
     [ "$board" = mps2-an500 ] || most=40000
     rm -f "$stats"

@@ -164,6 +164,21 @@ static void work_that_differs_is_seen_in_time(void **unused)
     tear_down();
 }
 
+/* A window of messages, each of which takes a while. */
+static void many_messages_are_looked_between(void **unused)
+{
+    (void)unused;
+    set_up();
+    world.looks.tends = true;
+    node_looks_poll(&world.looks, now_us(NULL));
+    for (unsigned i = 0; i < 100; i++) {
+        pass(200000);
+        node_looks_between(&world.looks);
+    }
+    assert_in_range(world.looks.poll_us_max, 1250, 1500);
+    tear_down();
+}
+
 /* Nobody's clock may go on: nothing is tended then. */
 static void who_steps_in_parts_is_not_tended(void **unused)
 {
@@ -172,6 +187,7 @@ static void who_steps_in_parts_is_not_tended(void **unused)
     node_looks_poll(&world.looks, now_us(NULL));
     world.asked = 0;
     work(2000000, 50, 64);
+    node_looks_between(&world.looks);
     assert_int_equal(world.asked, 0);
     assert_true(cube_link_state(world.cube[1], 0) == LINK_OPENING);
     tear_down();
@@ -210,6 +226,7 @@ int main(void)
         cmocka_unit_test(looks_come_in_time),
         cmocka_unit_test(work_that_gets_slower_is_seen),
         cmocka_unit_test(work_that_differs_is_seen_in_time),
+        cmocka_unit_test(many_messages_are_looked_between),
         cmocka_unit_test(who_steps_in_parts_is_not_tended),
         cmocka_unit_test(what_is_told_of_it),
     };

@@ -241,7 +241,8 @@ static inline void open_scene(struct scene *s, making *make, size_t n)
     s->frames = aligned(incode_pager_bytes(s->order.tree.pages));
     s->memory = aligned(incode_horizon_bytes(BOXES, COPIES));
     s->h = aligned(sizeof *s->h);
-    incode_horizon_init(s->h, s->memory, BOXES, COPIES);
+    struct incode_pause nobody = {NULL, NULL, 0};
+    incode_horizon_init(s->h, s->memory, BOXES, COPIES, &nobody);
     s->walker = (struct incode_walker){&s->pager, &s->order.tree, &s->tally,
                                        &s->candidates, UINT32_MAX};
     forget_pages(s);
