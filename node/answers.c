@@ -122,11 +122,14 @@ static uint32_t least(uint64_t value)
     return value < UINT32_MAX ? (uint32_t)value : UINT32_MAX;
 }
 
-static void put_name(uint8_t *bytes, size_t size, const char *name)
+void node_who_name(uint8_t *field, size_t size, const char *name)
 {
-    for (size_t i = 0; i < size && name[i] != '\0'; i++) {
-        bytes[i] = (uint8_t)name[i];
+    size_t length = 0;
+    while (length < size && name[length] != '\0') {
+        length++;
     }
+    memset(field, 0, size);
+    memcpy(field, name, length);
 }
 
 static size_t tell_who(const struct node_answers *a,
@@ -138,8 +141,8 @@ static size_t tell_who(const struct node_answers *a,
     memset(&who, 0, sizeof who);
     who.protocol = NODE_PROTOCOL;
     who.kind = NODE_KIND_PROCESS;
-    put_name(who.board, sizeof who.board, "linux");
-    put_name(who.version, sizeof who.version, NODE_VERSION);
+    node_who_name(who.board, sizeof who.board, "linux");
+    node_who_name(who.version, sizeof who.version, NODE_VERSION);
     who.epoch = board->identity.epoch;
     who.uptime_s = least((now_us - a->start_us) / 1000000);
     who.memory = (uint32_t)(board->arena_bytes + board->fixed_bytes);

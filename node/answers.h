@@ -74,6 +74,9 @@ void node_answers_take(struct node_answers *answers,
 unsigned node_answers_send(struct node_answers *answers,
                            const struct node_teller *teller, uint64_t now_us);
 
+/* A field of struct node_who: the name, cut to `size`, zeros behind it. */
+void node_who_name(uint8_t *field, size_t size, const char *name);
+
 /* What is answered to NODE_LINKS: of how many links. */
 unsigned node_answers_links(const struct node_answers *answers,
                             struct node_link_state state[CUBE_LINKS_MAX]);

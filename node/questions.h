@@ -62,7 +62,8 @@ struct node_who {
     uint8_t digest[NODE_DIGEST_BYTES]; /* of the image that runs; a loader's: of
                                           the one that it would start */
     uint32_t number;                   /* of that image, as its signer counts */
-    uint32_t boot;  /* number of this start; 0: the board counts none */
+    uint32_t boot;  /* number of this start; 0: the board counts none, or its
+                       loader waits, as the flash takes no record any more */
     uint32_t epoch; /* of this start */
     uint32_t uptime_s;
     uint32_t role;   /* enum node_role_number; 0: none */

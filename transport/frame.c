@@ -366,3 +366,12 @@ enum frame_result frame_take(struct frame_reader *reader,
     uint32_t crc = frame_crc32c(reader->crc, payload, header->size);
     return crc == bytes_get32(tail) ? FRAME_GOOD : FRAME_BAD_CRC;
 }
+
+bool frame_decode(const uint8_t *in, size_t size, struct frame_header *header,
+                  void *payload, size_t most)
+{
+    struct frame_reader reader;
+    return frame_open(&reader, in, size, header) == FRAME_GOOD &&
+           header->size <= most &&
+           frame_take(&reader, header, payload) == FRAME_GOOD;
+}

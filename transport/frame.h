@@ -13,6 +13,7 @@
 #ifndef TRANSPORT_FRAME_H
 #define TRANSPORT_FRAME_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -77,5 +78,10 @@ enum frame_result frame_open(struct frame_reader *reader, const uint8_t *in,
  * result is FRAME_GOOD, payload holds nothing to be believed. */
 enum frame_result frame_take(struct frame_reader *reader,
                              const struct frame_header *header, void *payload);
+
+/* Both of one frame that has the bytes between two zeros to itself; true: it is
+ * good, and its payload, which is at most `most` bytes. */
+bool frame_decode(const uint8_t *in, size_t size, struct frame_header *header,
+                  void *payload, size_t most);
 
 #endif

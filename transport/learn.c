@@ -150,12 +150,9 @@ static void take_hello(struct learner *learner, unsigned d,
 static void take_frame(struct learner *learner, unsigned d,
                        const uint8_t *bytes, size_t size)
 {
-    struct frame_reader reader;
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
-    if (frame_open(&reader, bytes, size, &header) != FRAME_GOOD ||
-        header.size > sizeof hello ||
-        frame_take(&reader, &header, hello) != FRAME_GOOD) {
+    if (!frame_decode(bytes, size, &header, hello, sizeof hello)) {
         return;
     }
     if (header.kind == LINK_HELLO && header.size == LINK_HELLO_SIZE) {

@@ -25,12 +25,10 @@ static void pack_hello(const struct link *link, uint8_t *hello)
 
 static bool is_greeting(const uint8_t *bytes, size_t size)
 {
-    struct frame_reader reader;
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
-    return frame_open(&reader, bytes, size, &header) == FRAME_GOOD &&
-           header.kind == LINK_HELLO && header.size == LINK_HELLO_SIZE &&
-           frame_take(&reader, &header, hello) == FRAME_GOOD;
+    return frame_decode(bytes, size, &header, hello, sizeof hello) &&
+           header.kind == LINK_HELLO && header.size == sizeof hello;
 }
 
 bool link_greets(const uint8_t *bytes, size_t size)

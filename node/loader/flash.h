@@ -23,6 +23,18 @@ struct loader_flash {
     /* Within a page.  False: the flash does not hold these bytes now. */
     bool (*program)(void *context, uint32_t at, const void *bytes, size_t size);
     bool (*erase)(void *context, uint32_t sector);
+    /* A power of two, a page at most: a program that loses power may take with
+     * it all between two multiples of this.  0: nothing but its own bytes. */
+    uint32_t torn_bytes;
+    const char *worn; /* why it may take nothing any more, for its user */
 };
+
+/* How far apart things of so many bytes are, of which one must not take others
+ * with it. */
+static inline uint32_t loader_flash_apart(const struct loader_flash *flash,
+                                          uint32_t bytes)
+{
+    return bytes > flash->torn_bytes ? bytes : flash->torn_bytes;
+}
 
 #endif

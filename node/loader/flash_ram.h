@@ -24,8 +24,11 @@ bool loader_ram_erase(void *context, uint32_t sector);
 
 #define LOADER_RAM(memory)                                                     \
     {                                                                          \
-        memory, LOADER_RAM_SECTOR, LOADER_RAM_PAGE, LOADER_RAM_SECTORS,        \
-            loader_ram_read, loader_ram_program, loader_ram_erase              \
+        .context = (memory), .sector_bytes = LOADER_RAM_SECTOR,                \
+        .page_bytes = LOADER_RAM_PAGE, .sectors = LOADER_RAM_SECTORS,          \
+        .read = loader_ram_read, .program = loader_ram_program,                \
+        .erase = loader_ram_erase,                                             \
+        .worn = "it is worn: replace it, or the board"                         \
     }
 
 #endif

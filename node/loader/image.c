@@ -16,6 +16,7 @@ enum {
     AT_DIGEST = LOADER_NAMED_BYTES,
     AT_KEY = AT_DIGEST + SIGN_DIGEST_BYTES,
     AT_SIGNATURE = LOADER_SIGNED_BYTES,
+    AT_ZEROS = AT_SIGNATURE + SIGN_BYTES,
     AT_CRC = LOADER_HEADER_BYTES - 4
 };
 
@@ -25,12 +26,22 @@ static_assert(AT_VERSION + LOADER_VERSION_BYTES == LOADER_NAMED_BYTES &&
 
 static const uint8_t magic[AT_BYTES] = {'i', 'n', 'c', 'o', 'd', 'e', 'I', '1'};
 
+/* The signature covers what is before it; what is behind it says nothing. */
+static bool is_unsaid(const uint8_t bytes[LOADER_HEADER_BYTES])
+{
+    uint8_t all = 0;
+    for (unsigned i = AT_ZEROS; i < AT_CRC; i++) {
+        all |= bytes[i];
+    }
+    return all == 0;
+}
+
 enum loader_fault loader_image_unpack(struct loader_image *image,
                                       const uint8_t bytes[LOADER_HEADER_BYTES])
 {
     if (memcmp(bytes, magic, sizeof magic) != 0 ||
         bytes_get32(bytes + AT_CRC) != frame_crc32c(0, bytes, AT_CRC) ||
-        bytes_get32(bytes + AT_BYTES) == 0) {
+        !is_unsaid(bytes) || bytes_get32(bytes + AT_BYTES) == 0) {
         return LOADER_NO_IMAGE;
     }
     *image = (struct loader_image){.bytes = bytes_get32(bytes + AT_BYTES),

@@ -14,7 +14,7 @@
  * | 64 | 32 | digest: BLAKE2b-256 of bytes 0 .. 63 and the code |
  * | 96 | 32 | public key of its signer; zeros: it is not signed |
  * | 128 | 64 | Ed25519 signature of bytes 0 .. 127 |
- * | 192 | 60 | zeros |
+ * | 192 | 60 | zeros, or it is no header: no signature covers them |
  * | 252 | 4 | CRC-32C of bytes 0 .. 251 |
  *
  * Memory: the struct.  Work: a pass over the header.

@@ -10,7 +10,6 @@
 enum {
     COUNT = 4,        /* blocks that are looked at in a step */
     FAILURES_MAX = 3, /* blocks that the flash may not hold at first */
-    MARK_BYTES = 4,
     ERASED_MARK = -1
 };
 
@@ -39,7 +38,7 @@ static uint32_t journal_at(const struct loader_incoming *in, unsigned slot)
 static uint32_t mark_at(const struct loader_incoming *in, uint32_t block)
 {
     return journal_at(in, in->slot) + loader_marks_in(flash_of(in)) +
-           MARK_BYTES * block;
+           loader_mark_apart(flash_of(in)) * block;
 }
 
 static uint32_t bytes_of(const struct loader_incoming *in)
@@ -122,7 +121,9 @@ void loader_incoming_begin(struct loader_incoming *incoming,
     memcpy(in->header, header, LOADER_HEADER_BYTES);
     memset(in->map, 0, sizeof in->map);
     in->blocks = in->held = in->failures = in->inherited = 0;
-    in->fault = loader_slots_suits(in->slots, header, &in->image);
+    in->fault = in->slots->worn
+                    ? LOADER_WORN
+                    : loader_slots_suits(in->slots, header, &in->image);
     if (in->fault == LOADER_GOOD && bytes != bytes_of(in)) {
         in->fault = LOADER_NO_IMAGE;
     }
@@ -226,7 +227,6 @@ static void ready(struct loader_incoming *in)
         if (begins_with_header(in, slot_at(in))) { /* and is whole */
             memset(in->map, 0xff, sizeof in->map);
             in->held = in->blocks;
-            in->inherited = in->blocks;
             go_on(in, LOADER_COUNTS);
             in->next = in->blocks;
         } else if (!loader_flash_blank(flash, slot_at(in),
@@ -251,7 +251,7 @@ static void ready(struct loader_incoming *in)
 static bool is_marked(struct loader_incoming *in, uint32_t block)
 {
     const struct loader_flash *flash = flash_of(in);
-    uint8_t mark[MARK_BYTES];
+    uint8_t mark[LOADER_MARK_BYTES];
     flash->read(flash->context, mark_at(in, block), mark, sizeof mark);
     if (bytes_get32(mark) == (uint32_t)ERASED_MARK) {
         return false;
@@ -348,7 +348,7 @@ static void erase(struct loader_incoming *in, uint32_t sector)
 static void program(struct loader_incoming *in)
 {
     uint32_t skip = in->number == 0 ? LOADER_HEADER_BYTES : 0;
-    uint8_t mark[MARK_BYTES];
+    uint8_t mark[LOADER_MARK_BYTES];
     in->work = LOADER_NO_WORK;
     if (!put(in, slot_at(in) + in->number * LOADER_BLOCK_BYTES + skip,
              in->block + skip, in->size - skip)) {

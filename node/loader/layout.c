@@ -23,6 +23,11 @@ uint32_t loader_marks_in(const struct loader_flash *flash)
                                                    : LOADER_HEADER_BYTES;
 }
 
+uint32_t loader_mark_apart(const struct loader_flash *flash)
+{
+    return loader_flash_apart(flash, LOADER_MARK_BYTES);
+}
+
 struct loader_layout loader_layout(const struct loader_flash *flash)
 {
     struct loader_layout layout;
@@ -35,7 +40,8 @@ struct loader_layout loader_layout(const struct loader_flash *flash)
     layout.sectors = (flash->sectors - layout.first) / LOADER_SLOTS;
     layout.sectors = layout.sectors < most ? layout.sectors : most;
     uint32_t blocks = layout.sectors * flash->sector_bytes / LOADER_BLOCK_BYTES;
-    uint32_t marks = loader_marks_in(flash) + 4 * (blocks + 1);
+    uint32_t marks =
+        loader_marks_in(flash) + loader_mark_apart(flash) * (blocks + 1);
     layout.journal = (marks + flash->sector_bytes - 1) / flash->sector_bytes;
     if (layout.sectors > layout.journal) {
         layout.bytes = (layout.sectors - layout.journal) * flash->sector_bytes;

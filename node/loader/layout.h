@@ -15,7 +15,8 @@
 
 enum {
     LOADER_STATE_SECTOR = 2, /* and the next */
-    LOADER_SERIAL_SECTOR = 4
+    LOADER_SERIAL_SECTOR = 4,
+    LOADER_MARK_BYTES = 4 /* of a block, in a journal */
 };
 
 struct loader_layout {
@@ -34,8 +35,9 @@ uint32_t loader_slot_at(const struct loader_layout *layout,
 uint32_t loader_journal_at(const struct loader_layout *layout,
                            const struct loader_flash *flash, unsigned slot);
 
-/* From the journal's beginning to the first mark. */
+/* From the journal's beginning to the first mark, and from one to the next. */
 uint32_t loader_marks_in(const struct loader_flash *flash);
+uint32_t loader_mark_apart(const struct loader_flash *flash);
 
 /* Programs bytes page by page.  False: the flash does not hold them then. */
 bool loader_flash_put(const struct loader_flash *flash, uint32_t at,

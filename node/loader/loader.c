@@ -10,6 +10,7 @@
 #include "node/fault.h"
 #include "node/looks.h"
 #include "node/version.h"
+#include "transport/text.h"
 #include "transport/wiring.h"
 
 enum { IDLE_MAX_US = 100000 };
@@ -30,14 +31,6 @@ struct loader {
     enum loader_phase phase; /* at the last step */
     uint64_t now_us;
 };
-
-size_t loader_arena_needed(const struct node_identity *identity, size_t memory)
-{
-    struct cube_config config = node_configure(identity, memory);
-    size_t cube = cube_arena_bytes(&config);
-    return cube == 0 ? 0
-                     : node_aligned(sizeof(struct loader)) + node_aligned(cube);
-}
 
 struct loader *loader_start(const struct node_board *board,
                             struct loader_slots *slots, const char **why)
@@ -254,12 +247,22 @@ static bool send_pong(struct loader *l)
     return say(l, NODE_PONG, &l->pong, sizeof l->pong);
 }
 
+static const char no_record[] =
+    "the flash takes no record of a start, and no image is started or taken: ";
+
 /* An image is no role's: the run ends, and tells its user this. */
 static bool send_fault(struct loader *l)
 {
-    static const char text[] = "waits in its boot loader, with no program "
-                               "running; incode flash IMAGE brings it one";
-    return say(l, NODE_FAULT, text, sizeof text - 1);
+    char room[NODE_FAULT_TEXT_MAX + 1];
+    struct cube_text text = cube_text_in(room, sizeof room);
+    cube_text_put(&text, "waits in its boot loader: ");
+    if (l->slots->worn) {
+        cube_text_put(&text, no_record);
+        cube_text_put(&text, l->slots->rules->flash->worn);
+    } else {
+        cube_text_put(&text, "no program is running");
+    }
+    return say(l, NODE_FAULT, text.data, text.size);
 }
 
 static bool send_state(struct loader *l)
@@ -284,8 +287,7 @@ static void tell_who(void *context, struct node_who *who)
     const struct loader *l = context;
     unsigned slot = l->slots->state.slot;
     who->kind = NODE_KIND_LOADER;
-    memset(who->version, 0, sizeof who->version);
-    memcpy(who->version, NODE_VERSION, sizeof NODE_VERSION - 1);
+    node_who_name(who->version, sizeof who->version, NODE_VERSION);
     memcpy(who->loader, who->version, sizeof who->loader);
     (void)loader_slots_serial(l->slots->rules->flash, who->serial);
     memset(who->digest, 0, sizeof who->digest);
@@ -295,11 +297,25 @@ static void tell_who(void *context, struct node_who *who)
         memcpy(who->digest, l->slots->image[slot].digest, sizeof who->digest);
         who->number = l->slots->image[slot].number;
     }
+    who->boot = l->slots->worn ? 0 : who->boot;
+}
+
+static size_t tell_log(void *context, char *text, size_t size)
+{
+    const struct loader *l = context;
+    struct cube_text log = cube_text_in(text, size);
+    if (l->slots->worn) {
+        cube_text_put(&log, no_record);
+        cube_text_put(&log, l->slots->rules->flash->worn);
+        cube_text_put(&log, "\n");
+    }
+    return log.size;
 }
 
 static void send(struct loader *l)
 {
-    const struct node_teller teller = {.context = l, .who = tell_who};
+    const struct node_teller teller = {
+        .context = l, .who = tell_who, .log = tell_log};
     if (l->owes_fault) {
         l->owes_fault = !send_fault(l);
     } else if (l->owes_pong) {

@@ -23,13 +23,9 @@
 
 struct loader; /* opaque: lives at the start of the arena */
 
-/* Bytes of arena that a loader of this identity needs, whose board has
- * `memory` in all; 0: the identity breaks a limit of the cube. */
-size_t loader_arena_needed(const struct node_identity *identity, size_t memory);
-
 /* The board as for node_start: its `who` fills in board, loader, serial number
  * and boot number; kind, version, digest and number are the loader's to say.
- * loader_slots_choose has been called.  NULL: the arena does not suffice, or
+ * loader_slots_start has been called.  NULL: the arena does not suffice, or
  * the identity breaks a limit of the cube: *why. */
 struct loader *loader_start(const struct node_board *board,
                             struct loader_slots *slots, const char **why);

@@ -20,6 +20,7 @@ enum {
     LOADER_BLOCK_BYTES = 1536, /* of an image, the last may have fewer; a whole
                                   number of a flash's pages */
     LOADER_BLOCKS_MAX = 2048,  /* of an image */
+    LOADER_IMAGE_MAX = LOADER_BLOCKS_MAX * LOADER_BLOCK_BYTES, /* its bytes */
     LOADER_MAP_BYTES = LOADER_BLOCKS_MAX / 8
 };
 

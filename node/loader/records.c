@@ -61,14 +61,15 @@ static struct sector look(const struct loader_records *records, unsigned sector)
     const struct loader_flash *flash = records->flash;
     struct sector found = {0, 0, 0, 0};
     uint8_t record[LOADER_RECORD_MAX];
-    for (uint32_t at = 0; at < flash->sector_bytes; at += records->bytes) {
+    uint32_t apart = loader_flash_apart(flash, records->bytes);
+    for (uint32_t at = 0; at < flash->sector_bytes; at += apart) {
         flash->read(flash->context, begin_of(records, sector) + at, record,
                     records->bytes);
         if (erased(record, records->bytes)) {
             continue;
         }
         uint32_t number = number_of(records, record);
-        found.end = at + records->bytes;
+        found.end = at + apart;
         found.torn++;
         if (number > found.largest) {
             found.largest = number;
@@ -135,7 +136,7 @@ bool loader_records_append(const struct loader_records *records,
             *number = next;
             return true;
         }
-        end += records->bytes;
+        end += loader_flash_apart(flash, records->bytes);
     }
     return false;
 }

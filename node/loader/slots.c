@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "boots.h"
 #include "layout.h"
 #include "look.h"
 #include "records.h"
@@ -158,35 +159,67 @@ unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly)
     return LOADER_SLOTS;
 }
 
+unsigned loader_slots_start(struct loader_slots *slots,
+                            const struct loader_rules *rules, bool ended_badly,
+                            uint32_t *boot)
+{
+    loader_slots_open(slots, rules);
+    slots->worn = !loader_boots_next(rules->flash, boot);
+    if (slots->worn) {
+        *boot = 0;
+        return LOADER_SLOTS;
+    }
+    return loader_slots_choose(slots, ended_badly);
+}
+
 bool loader_slots_try(struct loader_slots *slots)
 {
     struct loader_state next = slots->state;
     next.tries++;
     if (next.trial && !write_state(slots->rules->flash, &next)) {
+        slots->worn = true;
         return false;
     }
     slots->state.tries += slots->state.trial;
     return true;
 }
 
-bool loader_slots_confirm(const struct loader_flash *flash, unsigned slot)
+bool loader_slots_unconfirmed(const struct loader_flash *flash, unsigned slot,
+                              struct loader_state *up)
 {
     const struct loader_layout layout = loader_layout(flash);
-    struct loader_state before = read_state(flash), next = before;
+    const struct loader_state before = read_state(flash);
     uint8_t header[LOADER_HEADER_BYTES];
     struct loader_image image;
+    *up = before;
     if (slot >= LOADER_SLOTS || before.slot != slot) {
-        return true; /* of an image that was not started from there */
+        return false; /* of an image that was not started from there */
     }
     flash->read(flash->context, loader_slot_at(&layout, flash, slot), header,
                 sizeof header);
-    next.trial = next.tries = 0;
+    up->trial = up->tries = 0;
     if (loader_image_unpack(&image, header) == LOADER_GOOD &&
-        (image.flags & LOADER_NO_WAY_BACK) != 0 && image.number > next.floor) {
-        next.floor = image.number;
+        (image.flags & LOADER_NO_WAY_BACK) != 0 && image.number > up->floor) {
+        up->floor = image.number;
     }
-    bool same = next.trial == before.trial && next.floor == before.floor;
-    return same || write_state(flash, &next);
+    return up->trial != before.trial || up->floor != before.floor;
+}
+
+bool loader_slots_confirm(const struct loader_flash *flash,
+                          const struct loader_state *up)
+{
+    return write_state(flash, up);
+}
+
+bool loader_slots_lived(const struct loader_flash *flash, unsigned slot)
+{
+    struct loader_state state = read_state(flash);
+    if (slot >= LOADER_SLOTS || state.slot != slot || !state.trial ||
+        state.tries <= 1) {
+        return true;
+    }
+    state.tries = 1; /* this start: it may still end badly */
+    return write_state(flash, &state);
 }
 
 bool loader_slots_install(const struct loader_flash *flash,

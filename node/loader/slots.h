@@ -1,7 +1,8 @@
 /* Two slots for images in a board's flash, one of them in use, and which of
  * them the next start is of.  An image that was brought is on trial: a start of
- * it that ends in a fault, or the third that confirms nothing, falls back to
- * the other.  What is confirmed is left only when it is good no more.
+ * it that ends in a fault, or the third in a row that neither confirms it nor
+ * lasts, falls back to the other.  What is confirmed is left only when it is
+ * good no more.
  *
  * Of the flash, sectors 0 and 1 are boots.h's, 2 and 3 hold this state, 4 the
  * board's serial number; slots begin at sector 16, where there are 64, else at
@@ -13,8 +14,7 @@
  * Work: loader_slots_choose reads the image that it chooses once for its
  * digest, and proves its signature; the others program one record.
  *
- *     loader_slots_open(&slots, &rules);
- *     unsigned slot = loader_slots_choose(&slots, ended_badly);
+ *     unsigned slot = loader_slots_start(&slots, &rules, ended_badly, &boot);
  *     if (slot < LOADER_SLOTS && loader_slots_try(&slots))
  *         flash->read(flash->context, loader_slots_code(&slots, slot),
  *                     to, slots.image[slot].bytes); // loader_look_copy
@@ -27,7 +27,8 @@
 
 enum {
     LOADER_SLOTS = 2, /* and for none */
-    LOADER_TRIES = 3, /* starts of an image on trial */
+    LOADER_TRIES = 3, /* starts of an image on trial, each shorter than */
+    LOADER_LIVED_US = 10000000, /* that: power that comes and goes */
     LOADER_SERIAL_BYTES = 8,
     LOADER_SLICE_BYTES = 1024 /* that are hashed at a time */
 };
@@ -56,6 +57,8 @@ struct loader_state {
 struct loader_slots {
     const struct loader_rules *rules;
     struct loader_state state;
+    bool worn; /* the flash takes no record of a start: no image is started, and
+                  none taken */
     /* Of each slot, once it was looked at: what keeps it from being started,
      * and its header. */
     bool known[LOADER_SLOTS];
@@ -73,9 +76,17 @@ static inline void loader_slots_alive(const struct loader_slots *slots)
     }
 }
 
+/* A board's start, before all else: counts it (boots.h), opens, and chooses.
+ * LOADER_SLOTS as well where the flash takes no record of it: *boot is 0 then,
+ * and the board waits in its loader, which says why, as it would do nothing but
+ * restart without a number of its own. */
+unsigned loader_slots_start(struct loader_slots *slots,
+                            const struct loader_rules *rules, bool ended_badly,
+                            uint32_t *boot);
+
 /* The slot of the next start; LOADER_SLOTS: none is good.  ended_badly: the
  * last start was of an image, and ended in a fault or by the watchdog; it falls
- * back then, if it is on trial.  To be called once a start, before all else. */
+ * back then, if it is on trial.  Once a start. */
 unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly);
 
 /* What a loader with these rules has against a header, its signature apart; the
@@ -92,13 +103,25 @@ bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial);
  * False: the flash does not take the record; it must not be started. */
 bool loader_slots_try(struct loader_slots *slots);
 
-/* Of the image that runs, from this slot: it has come up.  It needs nothing
- * else of the loader.  Nothing is written where it is so already.  False: the
- * flash does not take the record. */
-bool loader_slots_confirm(const struct loader_flash *flash, unsigned slot);
+/* Of the image that runs, from this slot, and before it is on its links, as it
+ * reads two sectors: whether it has to tell that it has come up, and the state
+ * that says so.  It needs nothing else of the loader. */
+bool loader_slots_unconfirmed(const struct loader_flash *flash, unsigned slot,
+                              struct loader_state *up);
+
+/* It has come up.  False: the flash does not take the record. */
+bool loader_slots_confirm(const struct loader_flash *flash,
+                          const struct loader_state *up);
 
 /* Where its code is in the flash. */
 uint32_t loader_slots_code(const struct loader_slots *slots, unsigned slot);
+
+/* Of the same, as soon as it has run for so long that no start of it can be
+ * called one that failed: those before count no more, as a person may turn a
+ * board off and on that is not wired yet.  It is still on trial, and a start
+ * that ends in a fault falls back.  False: the flash does not take the record.
+ */
+bool loader_slots_lived(const struct loader_flash *flash, unsigned slot);
 
 /* Puts an image, checked by the caller, into slot 0 of a flash that no board
  * is using, and makes it the one in use: for who makes boards' chips.  False:

@@ -169,14 +169,17 @@ static int find(struct serial_port *port)
     sp_free_port_list(list);
     if (count != 1) {
         snprintf(port->fault, sizeof port->fault,
-                 count == 0 ? "%s: no such port; is the adapter plugged in?"
-                            : "%s: fits several ports; give one as at:BUS-PORT",
+                 count == 0
+                     ? "%s: no such port; plug the adapter in, or give another"
+                     : "%s: fits several ports; give one as at:BUS-PORT",
                  name);
     }
     return count == 1 ? 0 : -1;
 }
 
 /* --- opening ------------------------------------------------------------- */
+
+#define PLUG_IN "plug it in, or give another: ls /dev/serial/by-id"
 
 static int refuse(struct serial_port *port, const char *why, const char *help)
 {
@@ -199,10 +202,10 @@ static int refuse_used(struct serial_port *port)
 
 static int refuse_errno(struct serial_port *port, int reason)
 {
-    return reason == EBUSY ? refuse_used(port)
-           : reason == EACCES
-               ? refuse(port, strerror(reason), "are you in its group?")
-               : refuse(port, strerror(reason), "is it plugged in?");
+    return reason == EBUSY    ? refuse_used(port)
+           : reason == EACCES ? refuse(port, strerror(reason),
+                                       "join its group, and log in anew")
+                              : refuse(port, strerror(reason), PLUG_IN);
 }
 
 /* For this process alone, also against one that may override TIOCEXCL. */
@@ -246,7 +249,7 @@ static int open_by_library(struct serial_port *port, const char *path)
     struct sp_port *library = NULL;
     int fd = -1;
     if (sp_get_port_by_name(path, &library) != SP_OK) {
-        return refuse(port, "no such serial port", "is it plugged in?");
+        return refuse(port, "no such serial port", PLUG_IN);
     }
     if (sp_open(library, SP_MODE_READ_WRITE) != SP_OK) {
         int reason = sp_last_error_code();
@@ -333,7 +336,7 @@ static void recover(void *context)
     if (port->pipe.fd >= 0) {
         serial_close(port->pipe.fd);
         port->pipe.fd = -1;
-        refuse(port, "the port is gone", "is it plugged in?");
+        refuse(port, "the port is gone", "plug it in");
     }
     if (clock_us() - port->look_us >= SERIAL_LOOK_US && look(port) == 0) {
         port->returned++;

@@ -204,6 +204,11 @@ static enum frame_result decode(const uint8_t *encoded, size_t size,
             assert_int_equal(header->size, want->header.size);
             assert_memory_equal(payload, want->payload, header->size);
         }
+        assert_true(frame_decode(copy, size, header, payload, header->size) ==
+                    (result == FRAME_GOOD));
+        assert_false(
+            header->size > 0 &&
+            frame_decode(copy, size, header, payload, header->size - 1u));
         free(payload);
     }
     free(copy);

@@ -35,6 +35,7 @@ struct chip {
     uint32_t programs; /* and pages or parts of one */
     uint32_t random;
     uint32_t worn;         /* the sector that takes nothing; 0: none */
+    bool worn_out;         /* no sector takes anything */
     uint32_t sacred;       /* bytes from here on, */
     uint32_t sacred_bytes; /* so many, must not change */
     jmp_buf lost;
@@ -58,6 +59,34 @@ static void chip_read(void *context, uint32_t at, void *bytes, size_t size)
     const struct chip *c = context;
     assert_true(at + size <= chip_size(c));
     memcpy(bytes, c->bytes + at, size);
+}
+
+/* Where a program rewrites all of a block: it may hold anything then, or what
+ * was there, or what was to be. */
+static void chip_tear_block(struct chip *c, uint32_t at, const uint8_t *to,
+                            uint32_t size)
+{
+    uint32_t begin = at / c->flash.torn_bytes * c->flash.torn_bytes;
+    uint32_t kind = chip_draw(c) % 4;
+    if (kind != 0) {
+        memcpy(c->bytes + at, to, size);
+    }
+    for (uint32_t i = 0; kind > 1 && i < c->flash.torn_bytes; i++) {
+        c->bytes[begin + i] = kind == 2 ? 0 : (uint8_t)chip_draw(c);
+    }
+    longjmp(c->lost, 1);
+}
+
+/* So many blocks of a sector are erased, the next may hold anything. */
+static void chip_tear_sector(struct chip *c, uint32_t at)
+{
+    uint32_t block = c->flash.torn_bytes;
+    uint32_t whole = chip_draw(c) % (c->flash.sector_bytes / block);
+    memset(c->bytes + at, 0xff, (size_t)whole * block);
+    for (uint32_t i = 0; i < block; i++) {
+        c->bytes[at + whole * block + i] = (uint8_t)chip_draw(c);
+    }
+    longjmp(c->lost, 1);
 }
 
 /* So many bytes have changed, the word behind them is torn. */
@@ -98,11 +127,15 @@ static bool chip_program(void *context, uint32_t at, const void *bytes,
     c->programs++;
     for (size_t i = 0; i < size; i++) {
         to[i] = c->bytes[at + i] & in[i];
-        if (c->worn != 0 && at / c->flash.sector_bytes == c->worn) {
+        if (c->worn_out ||
+            (c->worn != 0 && at / c->flash.sector_bytes == c->worn)) {
             to[i] = c->bytes[at + i] & (uint8_t)~1u;
         }
     }
     if (chip_loses(c)) {
+        if (c->flash.torn_bytes != 0) {
+            chip_tear_block(c, at, to, (uint32_t)size);
+        }
         chip_tear(c, at, to, (uint32_t)size);
     }
     memcpy(c->bytes + at, to, size);
@@ -118,6 +151,9 @@ static bool chip_erase(void *context, uint32_t sector)
     chip_spare(c, at, size);
     c->erased++;
     bool loses = chip_loses(c);
+    if (loses && c->flash.torn_bytes != 0) {
+        chip_tear_sector(c, at);
+    }
     uint32_t kind = chip_draw(c) % 4;
     for (uint32_t i = 0; i < size; i++) {
         uint8_t set = !loses || kind == 0             ? 0xff
@@ -137,8 +173,14 @@ static void chip_make(struct chip *c, uint32_t sector, uint32_t page,
 {
     assert_true(sector * sectors <= CHIP_BYTES);
     memset(c, 0, offsetof(struct chip, lost));
-    c->flash = (struct loader_flash){
-        c, sector, page, sectors, chip_read, chip_program, chip_erase};
+    c->flash = (struct loader_flash){.context = c,
+                                     .sector_bytes = sector,
+                                     .page_bytes = page,
+                                     .sectors = sectors,
+                                     .read = chip_read,
+                                     .program = chip_program,
+                                     .erase = chip_erase,
+                                     .worn = "it is worn"};
     memset(c->bytes, 0xff, chip_size(c));
     c->until_loss = -1;
     c->random = 1;
@@ -238,6 +280,14 @@ static inline void made_make(struct made *made, uint32_t bytes, uint32_t number)
         made->all[i] = (uint8_t)(random >> 24);
     }
     made_seal(made);
+}
+
+/* As an image does that comes up, from its start to its first neighbour. */
+static inline bool chip_confirm(const struct chip *c, unsigned slot)
+{
+    struct loader_state up;
+    return !loader_slots_unconfirmed(&c->flash, slot, &up) ||
+           loader_slots_confirm(&c->flash, &up);
 }
 
 /* --- a transfer ------------------------------------------------------------

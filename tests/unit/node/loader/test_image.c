@@ -9,6 +9,8 @@
 #include <cmocka.h>
 
 #include "node/loader/image.h"
+#include "transport/bytes.h"
+#include "transport/frame.h"
 
 static struct loader_image sample(void)
 {
@@ -77,6 +79,21 @@ static void every_false_bit_is_found(void **unused)
     assert_int_equal(loader_image_unpack(&image, bytes), LOADER_NO_IMAGE);
 }
 
+/* Nothing can be hidden where no signature covers it. */
+static void what_says_nothing_is_zero(void **unused)
+{
+    struct loader_image image = sample();
+    uint8_t bytes[LOADER_HEADER_BYTES];
+    (void)unused;
+    loader_image_pack(&image, bytes);
+    for (unsigned bit = 8 * 192; bit < 8 * 252; bit++) {
+        bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
+        bytes_put32(bytes + 252, frame_crc32c(0, bytes, 252));
+        assert_int_equal(loader_image_unpack(&image, bytes), LOADER_NO_IMAGE);
+        bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
+    }
+}
+
 /* Stands for Ed25519: what it is asked, and its word. */
 static struct {
     unsigned asked;
@@ -134,6 +151,7 @@ int main(void)
         cmocka_unit_test(what_is_packed_comes_back),
         cmocka_unit_test(texts_fill_their_fields),
         cmocka_unit_test(every_false_bit_is_found),
+        cmocka_unit_test(what_says_nothing_is_zero),
         cmocka_unit_test(a_signer_is_known_by_key_and_signature),
         cmocka_unit_test(every_fault_has_its_text),
     };

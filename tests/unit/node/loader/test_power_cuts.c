@@ -42,7 +42,7 @@ static void live(const struct made *made, bool confirms)
     assert_true(is_image(&slots, slot, made));
     assert_true(loader_slots_try(&slots));
     if (confirms) {
-        assert_true(loader_slots_confirm(&chip.flash, slot));
+        assert_true(chip_confirm(&chip, slot));
     }
 }
 
@@ -89,8 +89,12 @@ static void fail_new_slowly(void)
 }
 
 static const struct {
-    uint32_t sector, page, sectors;
-} geometries[] = {{512, 64, 45}, {4096, 256, 13}, {2048, 512, 64}};
+    uint32_t sector, page, sectors, torn;
+} geometries[] = {{512, 64, 45, 0},
+                  {4096, 256, 13, 0},
+                  {2048, 512, 64, 0},
+                  {4096, 512, 15, 512}, /* a card's blocks */
+                  {512, 512, 80, 512}};
 
 /* What is behind a loss: the board starts one of the two, whole; what it held
  * it holds; and the transfer ends as if nothing had been. */
@@ -136,6 +140,7 @@ static void each_geometry(bool empty, void (*act)(void))
     for (size_t g = 0; g < sizeof geometries / sizeof geometries[0]; g++) {
         chip_make(&chip, geometries[g].sector, geometries[g].page,
                   geometries[g].sectors);
+        chip.flash.torn_bytes = geometries[g].torn;
         if (!empty) {
             live(&third, true);
             live(&old, true);

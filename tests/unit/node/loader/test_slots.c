@@ -33,7 +33,7 @@ static void bring_and_confirm(const struct made *made)
     bring(made);
     unsigned slot = starts(false);
     assert_true(loader_slots_try(&slots));
-    assert_true(loader_slots_confirm(&chip.flash, slot));
+    assert_true(chip_confirm(&chip, slot));
 }
 
 static void spare_slot(unsigned slot)
@@ -128,13 +128,44 @@ static void test_slots_fall_back(void **state)
     assert_int_equal(starts(true), 0);
 }
 
+/* Who turns a board off and on that is not wired yet, and each time lets it run
+ * for a while, does not lose the image; one that crashes still falls back. */
+static void test_slots_outlive_power_cycles(void **state)
+{
+    (void)state;
+    bring_and_confirm(&old);
+    bring(&new);
+    for (unsigned i = 0; i < 4 * LOADER_TRIES; i++) {
+        assert_int_equal(starts(false), 1);
+        assert_true(loader_slots_try(&slots));
+        long done = chip.done;
+        assert_true(loader_slots_lived(&chip.flash, 0)); /* not in use */
+        assert_int_equal(chip.done, done);
+        assert_true(loader_slots_lived(&chip.flash, 1));
+        assert_int_equal(chip.done != done, i > 0);
+    }
+    for (unsigned i = 1; i < LOADER_TRIES; i++) { /* then some short ones */
+        assert_int_equal(starts(false), 1);
+        assert_int_equal(slots.state.trial, 1);
+        assert_true(loader_slots_try(&slots));
+    }
+    assert_int_equal(starts(false), 0);
+    blank_board(state);
+    bring_and_confirm(&old);
+    bring(&new);
+    assert_int_equal(starts(false), 1);
+    assert_true(loader_slots_try(&slots));
+    assert_true(loader_slots_lived(&chip.flash, 1));
+    assert_int_equal(starts(true), 0); /* it hung, however late */
+}
+
 static void test_slots_confirm_once(void **state)
 {
     (void)state;
     bring_and_confirm(&old);
     long done = chip.done;
-    assert_true(loader_slots_confirm(&chip.flash, 0));
-    assert_true(loader_slots_confirm(&chip.flash, 1)); /* not in use */
+    assert_true(chip_confirm(&chip, 0));
+    assert_true(chip_confirm(&chip, 1)); /* not in use */
     assert_int_equal(chip.done, done);
     (void)starts(false);
     assert_true(loader_slots_try(&slots)); /* no trial: no record */
@@ -179,7 +210,7 @@ static void test_slots_are_spared(void **state)
     chip_verify(&in);
     unsigned slot = starts(false);
     assert_true(loader_slots_try(&slots));
-    assert_true(loader_slots_confirm(&chip.flash, slot));
+    assert_true(chip_confirm(&chip, slot));
     spare_slot(1);
     bring(&third);
     chip.sacred_bytes = 0;
@@ -288,7 +319,7 @@ static void test_slots_have_no_way_back(void **state)
     chip_bring(&in, &strict);
     chip_verify(&in);
     unsigned slot = starts(false);
-    assert_true(loader_slots_confirm(&chip.flash, slot));
+    assert_true(chip_confirm(&chip, slot));
     refuses(&old, LOADER_TOO_OLD); /* and then no more */
     chip.bytes[loader_slots_code(&slots, slot)] ^= 1;
     assert_int_equal(starts(false), 1 - slot); /* 7 after 6 */
@@ -317,7 +348,7 @@ static void test_slots_take_blocks_in_any_order(void **state)
 
 static void test_slots_pass_over_bad_blocks(void **state)
 {
-    uint8_t block[LOADER_BLOCK_BYTES + 1];
+    uint8_t block[LOADER_BLOCK_BYTES + 1] = {0};
     (void)state;
     begin(&old);
     memcpy(block, old.all + LOADER_BLOCK_BYTES, LOADER_BLOCK_BYTES);
@@ -327,6 +358,10 @@ static void test_slots_pass_over_bad_blocks(void **state)
     loader_incoming_block(&in, in.blocks, block, LOADER_BLOCK_BYTES, crc);
     loader_incoming_block(&in, UINT32_MAX, block, LOADER_BLOCK_BYTES, crc);
     loader_incoming_block(&in, 0, block, LOADER_BLOCK_BYTES, crc);
+    loader_incoming_block(&in, 1, block, 0, 0);
+    loader_incoming_block(&in, 1, block, LOADER_BLOCK_BYTES + 1,
+                          frame_crc32c(0, block, LOADER_BLOCK_BYTES + 1));
+    loader_incoming_block(&in, in.blocks - 1, block, LOADER_BLOCK_BYTES, crc);
     assert_false(loader_incoming_busy(&in));
     assert_int_equal(in.held, 0);
     loader_incoming_verify(&in); /* too early */
@@ -368,6 +403,42 @@ static void test_slots_go_on(void **state)
     assert_int_equal(starts(false), 0);
 }
 
+/* Without a restart: the same again changes nothing; what is refused costs
+ * nothing of what has come; another image takes its place. */
+static void test_slots_begin_in_the_midst(void **state)
+{
+    (void)state;
+    bring_and_confirm(&old);
+    begin(&new);
+    chip_block(&in, &new, 2);
+    uint32_t erased = in.erased, programmed = in.programmed;
+    loader_incoming_begin(&in, new.all, new.bytes);
+    assert_false(loader_incoming_busy(&in));
+    assert_int_equal(in.held, 1);
+    struct made bad = new;
+    bad.image.signature[0] ^= 1;
+    loader_image_pack(&bad.image, bad.all);
+    chip_begin(&in, &bad);
+    assert_int_equal(in.phase, LOADER_REFUSES);
+    chip_block(&in, &new, 1);
+    chip_verify(&in);
+    assert_int_equal(in.phase, LOADER_REFUSES);
+    assert_int_equal(in.erased, erased);
+    assert_int_equal(in.programmed, programmed);
+    chip_begin(&in, &new);
+    assert_int_equal(in.phase, LOADER_TAKES);
+    assert_int_equal(in.held, 1);
+    chip_begin(&in, &third);
+    assert_int_equal(in.held, 0);
+    chip_bring(&in, &third);
+    chip_verify(&in);
+    assert_int_equal(in.phase, LOADER_VERIFIED);
+    assert_int_equal(starts(false), 1);
+    assert_int_equal(slots.image[1].number, 7);
+    begin(&old); /* it was not touched */
+    assert_int_equal(in.phase, LOADER_THERE);
+}
+
 /* What runs is what was signed, also where the flash gives something else by
  * then, of code or header. */
 static void test_slots_look_at_the_copy(void **state)
@@ -400,6 +471,47 @@ static void test_slots_tell_of_a_worn_flash(void **state)
     assert_int_equal(starts(false), 0);
 }
 
+/* It would only restart, again and again, and lose what it had. */
+static void test_slots_wait_where_no_start_is_recorded(void **state)
+{
+    uint32_t boot = 0, programs;
+    (void)state;
+    bring_and_confirm(&old);
+    assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot), 0);
+    assert_int_equal(boot, 1);
+    chip.worn_out = true;
+    for (unsigned i = 0; i < 100; i++) {
+        boot = 7;
+        assert_int_equal(loader_slots_start(&slots, &chip_rules, i % 2, &boot),
+                         LOADER_SLOTS);
+        assert_int_equal(boot, 0);
+        assert_true(slots.worn);
+    }
+    programs = chip.programs;
+    loader_incoming_init(&in, &slots);
+    chip_begin(&in, &new);
+    assert_int_equal(in.phase, LOADER_REFUSES);
+    assert_int_equal(in.fault, LOADER_WORN);
+    assert_int_equal(chip.programs, programs);
+    chip.worn_out = false;
+    assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot), 0);
+    assert_true(boot > 1);
+    assert_false(slots.worn);
+}
+
+/* A trial that cannot be counted would have no end. */
+static void test_slots_wait_where_no_trial_is_counted(void **state)
+{
+    (void)state;
+    bring(&old);
+    chip.worn_out = true;
+    for (unsigned i = 0; i < 2 * LOADER_TRIES; i++) {
+        assert_int_equal(starts(i > 0), 0);
+        assert_false(loader_slots_try(&slots));
+        assert_true(slots.worn);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -407,6 +519,7 @@ int main(void)
         cmocka_unit_test_setup(test_slots_of_an_empty_board, blank_board),
         cmocka_unit_test_setup(test_slots_install, blank_board),
         cmocka_unit_test_setup(test_slots_fall_back, blank_board),
+        cmocka_unit_test_setup(test_slots_outlive_power_cycles, blank_board),
         cmocka_unit_test_setup(test_slots_confirm_once, blank_board),
         cmocka_unit_test_setup(test_slots_leave_what_has_rotted, blank_board),
         cmocka_unit_test_setup(test_slots_are_spared, blank_board),
@@ -418,8 +531,13 @@ int main(void)
         cmocka_unit_test_setup(test_slots_pass_over_bad_blocks, blank_board),
         cmocka_unit_test_setup(test_slots_refuse_another_code, blank_board),
         cmocka_unit_test_setup(test_slots_go_on, blank_board),
+        cmocka_unit_test_setup(test_slots_begin_in_the_midst, blank_board),
         cmocka_unit_test_setup(test_slots_look_at_the_copy, blank_board),
         cmocka_unit_test_setup(test_slots_tell_of_a_worn_flash, blank_board),
+        cmocka_unit_test_setup(test_slots_wait_where_no_start_is_recorded,
+                               blank_board),
+        cmocka_unit_test_setup(test_slots_wait_where_no_trial_is_counted,
+                               blank_board),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

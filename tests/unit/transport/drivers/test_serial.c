@@ -260,7 +260,7 @@ static void ports_that_are_not_there(void **unused)
         /* Without /sys there is no list of ports to look a number up in. */
         const char *what = i < 2 && access("/sys/class/tty", F_OK) != 0
                                ? "is /sys mounted?"
-                               : "plugged";
+                               : "plug ";
         assert_non_null(strstr(port.fault, what));
         serial_port_close(&port);
     }
