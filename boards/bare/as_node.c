@@ -5,6 +5,7 @@
 #include "bare.h"
 #include "console.h"
 #include "fault_text.h"
+#include "node/answers.h"
 #include "node/version.h"
 #include "sections.h"
 #include "stack.h"
@@ -56,6 +57,10 @@ static void put_start(struct cube_text *text, const struct bare_node *bare)
     cube_text_put(text, bare_reason_name(bare->reason.kind));
     if (board_facts.flash == NULL) {
         cube_text_put(text, "; no flash, a neighbour tells the epoch");
+    } else if (bare->boot == 0) {
+        cube_text_put(text, "; the flash takes no record of it: ");
+        cube_text_put(text, board_facts.flash->worn);
+        cube_text_put(text, "; a neighbour tells the epoch");
     } else {
         tell(text, "; boot ", bare->boot);
     }
@@ -157,19 +162,12 @@ void bare_node_end(enum node_reset why)
                                                 : BARE_RUN_OVER);
 }
 
-static void put_bytes(uint8_t *bytes, size_t size, const char *name)
-{
-    for (size_t i = 0; i < size && name[i] != '\0'; i++) {
-        bytes[i] = (uint8_t)name[i];
-    }
-}
-
 static void tell_who(void *context, struct node_who *who)
 {
     const struct bare_node *bare = context;
     const struct bare_handover *from = &bare->handover;
     who->kind = bare->loader ? NODE_KIND_LOADER : NODE_KIND_PROGRAM;
-    put_bytes(who->board, sizeof who->board, board_facts.name);
+    node_who_name(who->board, sizeof who->board, board_facts.name);
     memcpy(who->loader, from->loader, sizeof who->loader);
     memcpy(who->serial, from->serial, sizeof who->serial);
     memcpy(who->digest, from->digest, sizeof who->digest);
@@ -251,6 +249,9 @@ void bare_node_learn(struct bare_node *bare)
     while (!node_identity_hear(&bare->learner, identity)) {
         node_identity_ask(&bare->learner, board_now_us());
         bare_node_console(bare);
+        if (bare->waits != NULL) {
+            bare->waits();
+        }
         bare_node_idle(bare, LOOK_US);
     }
     bare->known = true;

@@ -28,6 +28,7 @@ struct bare_node {
     uint32_t boot;                 /* 0: the board counts none */
     bool known;                    /* who the node is */
     uint64_t idle_us;
+    void (*waits)(void); /* is called while it is not known; NULL: nobody is */
     struct learner learner;
     struct bare_shell shell;
     /* For the console, once the node has begun: state of its links, of how

@@ -9,7 +9,6 @@
 #include "as_node.h"
 #include "bare.h"
 #include "fault_text.h"
-#include "node/loader/boots.h"
 #include "node/loader/look.h"
 #include "node/version.h"
 #include "sign_key.h"
@@ -77,9 +76,6 @@ static void begin(void)
     bool ended_badly =
         bare_handover_drop() &&
         (bare.reason.kind == BARE_FAULT || bare.reason.kind == BARE_HUNG);
-    if (!loader_boots_next(board_facts.flash, &bare.boot)) {
-        bare_fault("the flash takes no record of this start", NULL, 0, 0);
-    }
     rules = (struct loader_rules){.flash = board_facts.flash,
                                   .suite = &sign_sodium,
                                   .key = bare_sign_key,
@@ -87,8 +83,7 @@ static void begin(void)
                                   .address = board_facts.image_at,
                                   .room = board_facts.image_bytes,
                                   .alive = board_feed};
-    loader_slots_open(&slots, &rules);
-    unsigned slot = loader_slots_choose(&slots, ended_badly);
+    unsigned slot = loader_slots_start(&slots, &rules, ended_badly, &bare.boot);
     describe(slot);
     if (slot < LOADER_SLOTS && bare.reason.kind != BARE_STAY) {
         start(slot);

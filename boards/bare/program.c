@@ -10,6 +10,8 @@ enum { DEAD_US = 30000000 /* as nodes of a cube file have it */ };
 
 static struct bare_node bare;
 static struct node *node;
+static struct loader_state up; /* what the flash is to say of this image, */
+static bool unconfirmed;       /* once a neighbour has been met */
 
 static unsigned links(struct node_link_state state[CUBE_LINKS_MAX])
 {
@@ -24,11 +26,12 @@ static void begin(void)
     if (bare_handover_take(&bare.handover)) {
         bare.boot = bare.handover.boot;
         bare.reason = bare_reason_taken(bare.handover.reason);
+        unconfirmed = loader_slots_unconfirmed(board_facts.flash,
+                                               bare.handover.slot, &up);
     } else {
         bare.reason = bare_reason_take();
-        if (board_facts.flash != NULL &&
-            !loader_boots_next(board_facts.flash, &bare.boot)) {
-            bare_fault("the flash takes no record of this start", NULL, 0, 0);
+        if (board_facts.flash != NULL) {
+            (void)loader_boots_next(board_facts.flash, &bare.boot);
         }
     }
     bare_node_fill_in(&bare);
@@ -38,31 +41,45 @@ static void begin(void)
 
 /* A neighbour has been met: the image is good enough to be told another, and
  * starts from now on whatever happens. */
-static bool confirm(void)
+static void confirm(void)
 {
-    if (!loader_slots_confirm(board_facts.flash, bare.handover.slot)) {
+    if (!loader_slots_confirm(board_facts.flash, &up)) {
         bare_fault("the flash takes no record of this image", NULL, 0, 0);
     }
-    return true;
+    unconfirmed = false;
+}
+
+/* Without neighbours, as it is before a board is wired: this start has not
+ * failed. */
+static void wait_unwired(void)
+{
+    static bool lived;
+    if (!lived && bare.handover.magic != 0 &&
+        board_now_us() >= LOADER_LIVED_US) {
+        lived = true;
+        (void)loader_slots_lived(board_facts.flash, bare.handover.slot);
+    }
 }
 
 _Noreturn void bare_main(void)
 {
     const char *why = NULL;
     begin();
+    bare.waits = wait_unwired;
     bare_node_learn(&bare);
     node = node_start(&bare.board, &why);
     if (node == NULL) {
         bare_fault(why, NULL, 0, 0);
     }
     bare.links = links;
-    bool confirmed = bare.handover.magic == 0;
     for (enum node_event event = NODE_BUSY; event != NODE_STOPPED;) {
         event = node_step(node);
         board_feed();
         bare_node_console(&bare);
-        if (!confirmed && node_has_met(node)) {
-            confirmed = confirm();
+        if (unconfirmed && node_has_met(node)) {
+            confirm();
+        } else if (unconfirmed) {
+            wait_unwired();
         }
         if (event == NODE_IDLE) {
             bare_node_idle(&bare, node_wait_us(node));

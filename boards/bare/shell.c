@@ -184,6 +184,8 @@ bool bare_shell_line(struct bare_shell *shell, char line[BARE_SHELL_LINE + 1],
     bool silent = now_us - s->heard_us >= BARE_SHELL_SILENCE_US;
     if (silent && s->held_size == 1 && is_end(s->held[0])) {
         end_line(s, 0);
+    } else if (silent && s->at == BARE_SHELL_TYPED) {
+        s->hush_us = s->heard_us + BARE_SHELL_HUSH_US; /* it is being typed */
     } else if (silent && s->at == BARE_SHELL_FRAME) {
         s->at =
             BARE_SHELL_BETWEEN; /* its end was lost, or its begin was noise */

@@ -1,5 +1,5 @@
 /* Raspberry Pi 3: UART 0 is the PL011 (GPIO 14, 15), UART 1, which is dimension
- * 0, the mini UART (GPIO 32, 33).  It has no flash that a program may write. */
+ * 0, the mini UART (GPIO 32, 33).  Its flash is a partition of its card. */
 #include "boards/bare/bare.h"
 #include "registers.h"
 
@@ -7,7 +7,9 @@ const struct board_facts board_facts = {.name = "raspi3b",
                                         .ports = 1,
                                         .baud = 115200,
                                         .data_bytes = 4u << 20,
-                                        .flash = NULL};
+                                        .flash = &raspi3b_flash,
+                                        .image_at = 2u << 20,
+                                        .image_bytes = 2u << 20};
 
 enum { PENDING_1 = 1, PENDING_2 = 2 }; /* words behind RASPI3B_INTERRUPTS */
 enum { AUX_PENDING = 1 << 29, PL011_PENDING = 1 << 25 };

@@ -4,9 +4,13 @@ prefix  = aarch64-linux-gnu-
 machine = -mcpu=cortex-a53 -mno-outline-atomics -fno-pie -no-pie \
 	-fno-stack-protector -fno-asynchronous-unwind-tables
 sources =
-$(BUILD)/firmware/raspi3b/boards/raspi3b/%.o: private BARE += \
+$(BUILD)/firmware/raspi3b/boards/raspi3b/%.o \
+$(BUILD)/firmware/loader/raspi3b/boards/raspi3b/%.o: private BARE += \
 	-mgeneral-regs-only
 # Of the handlers' stack, what start.S takes first.
 exception_bytes = 192
-# How tests start it.
-emulator = qemu-system-aarch64 -M raspi3b
+# Where the firmware loads what it starts, and where that runs images.
+code_at = 0x80000
+image_at = 0x200000
+# How tests start it, with a file for its card.
+emulator = qemu-system-aarch64 -M raspi3b -drive if=sd,format=raw,file=$(flash)

@@ -1,7 +1,10 @@
 /* What a node may reach: its code to read and run, its 4 MB of data, and the
- * devices; nothing before or behind its data.  Blocks of 2 MB, and pages of 4
- * KB where the data end, the last of which is .noinit's: it is not cached, as a
- * reset leaves nothing of a cache. */
+ * devices; nothing before or behind its data.  The loader writes images behind
+ * itself, and runs nothing there; no image reaches the loader.  Blocks of 2 MB,
+ * and pages of 4 KB where the data end, the last of which is .noinit's: it is
+ * not cached, as a reset leaves nothing of a cache. */
+#include "boards/bare/bare.h"
+#include "boards/bare/sections.h"
 #include "registers.h"
 
 enum {
@@ -9,6 +12,7 @@ enum {
     PAGE = 1 << 12,
     ENTRIES = 512,
     CODE_BLOCKS = 2,
+    IMAGE = 1, /* of these, and of one that a loader has started its only */
     DATA = 0x00800000 / BLOCK, /* as in board.ld */
     DEVICES = 0x3F000000 / BLOCK
 };
@@ -38,8 +42,13 @@ void raspi3b_tables(void)
 {
     const uint64_t data = CACHED | SHARED | USED | NEVER_RUN;
     const uint64_t device = DEVICE | USED | NEVER_RUN;
-    for (uint64_t i = 0; i < CODE_BLOCKS; i++) {
+    bool image = (uintptr_t)bare_code == board_facts.image_at;
+    bool loader = (uintptr_t)bare_code_room == board_facts.image_at;
+    for (uint64_t i = image ? IMAGE : 0; i < CODE_BLOCKS; i++) {
         level2[i] = i * BLOCK | A_BLOCK | CACHED | SHARED | USED | READ_ONLY;
+    }
+    if (loader) {
+        level2[IMAGE] = (uint64_t)IMAGE * BLOCK | A_BLOCK | data;
     }
     for (uint64_t i = DEVICES; i < ENTRIES; i++) {
         level2[i] = i * BLOCK | A_BLOCK | device;

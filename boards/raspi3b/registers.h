@@ -11,11 +11,14 @@
 
 #include <stdint.h>
 
+#include "node/loader/flash_card.h"
+
 #define RASPI3B_INTERRUPTS UINT32_C(0x3F00B200)
 #define RASPI3B_PM UINT32_C(0x3F100000)
 #define RASPI3B_GPIO UINT32_C(0x3F200000)
 #define RASPI3B_PL011 UINT32_C(0x3F201000)
 #define RASPI3B_AUX UINT32_C(0x3F215000)
+#define RASPI3B_CARD UINT32_C(0x3F300000)
 #define RASPI3B_LOCAL UINT32_C(0x40000000)
 
 /* What interrupts' handlers consist of: tests/firmware counts it. */
@@ -61,6 +64,18 @@ void raspi3b_interrupt(void);
 
 void raspi3b_uarts_start(void);
 void raspi3b_time_start(void);
+
+/* --- the pins --------------------------------------------------------------
+ */
+
+enum { RASPI3B_FUNCTION_0 = 4, RASPI3B_FUNCTION_3 = 7, RASPI3B_FUNCTION_5 = 2 };
+void raspi3b_pin(unsigned number, uint32_t function);
+void raspi3b_pull_up(uint64_t pins); /* a bit each */
+
+/* --- the card --------------------------------------------------------------
+ */
+
+extern const struct loader_flash raspi3b_flash;
 
 /* --- handlers ---------------------------------------------------------------
  */

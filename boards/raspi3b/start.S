@@ -209,6 +209,47 @@ raspi3b_irq:
     eret
 
     .text
+/* Runs the image at x0: as after a reset, no interrupt on or due, no memory
+ * protected, caches written back and off.  From there on nothing is written
+ * before each line of both memories has left the caches. */
+function board_launch
+    msr daifset, #15
+    msr cntp_ctl_el0, xzr
+    msr cntv_ctl_el0, xzr
+    ldr x1, =0x3F00B21C            /* interrupts 0 .. 31, 32 .. 63: off */
+    mov w2, #-1
+    str w2, [x1]
+    str w2, [x1, #4]
+    ldr x1, =0x40000040            /* nor of a timer */
+    str wzr, [x1]
+    dsb sy
+    ldr x1, =0x30D00800            /* SCTLR: all off */
+    ldr x2, =0x400000
+    ldr x3, =0x800000
+    ldr x4, =0xC00000
+    mrs x5, ctr_el0
+    ubfx x5, x5, #16, #4           /* a line's words, by power of two */
+    mov x6, #4
+    lsl x5, x6, x5
+    msr sctlr_el1, x1
+    isb
+    mov x1, xzr
+1:  dc civac, x1
+    add x1, x1, x5
+    cmp x1, x2
+    b.lo 1b
+2:  dc civac, x3
+    add x3, x3, x5
+    cmp x3, x4
+    b.lo 2b
+    dsb sy
+    tlbi vmalle1
+    ic iallu
+    dsb sy
+    isb
+    br x0
+    .ltorg
+
 function board_lock
     mrs x0, daif
     msr daifset, #2

@@ -49,12 +49,6 @@ enum { IER_RECEIVE = 1 | 3 << 2, IER_SEND = 2 };
 enum { EIGHT_BITS = 3, CLEAR_BOTH = 0xC6, BOTH_WAYS = 3 };
 enum { CORE_HZ = 250000000 }; /* enable_uart=1 in config.txt holds it there */
 
-/* --- the pins
- * ----------------------------------------------------------------- */
-
-enum { FSEL1 = 0x04 / 4, FSEL3 = 0x0C / 4, PUD = 0x94 / 4, PUDCLK = 0x98 / 4 };
-enum { FUNCTION_0 = 4, FUNCTION_5 = 2, PULL_UP = 2, SETTLE_US = 10 };
-
 /* Bytes that come leave the interrupt when they are taken; it is never cleared,
  * as that would hide those that are left. */
 RASPI3B_HANDLER void raspi3b_pl011_receive(void)
@@ -154,36 +148,14 @@ bool board_console_put(uint8_t byte)
     return true;
 }
 
-static void settle(void)
-{
-    uint64_t until_us = board_now_us() + SETTLE_US;
-    while (board_now_us() < until_us) {
-    }
-}
-
-/* A pin's function: three bits each, ten pins a word. */
-static void pin(unsigned number, uint32_t function)
-{
-    volatile uint32_t *select = &raspi3b_at(RASPI3B_GPIO)[number / 10];
-    unsigned at = number % 10 * 3;
-    *select = (*select & ~(UINT32_C(7) << at)) | function << at;
-}
-
 /* Inputs that lead nowhere are held high, as a silent wire is. */
 static void pins(void)
 {
-    volatile uint32_t *gpio = raspi3b_at(RASPI3B_GPIO);
-    pin(14, FUNCTION_0);
-    pin(15, FUNCTION_0);
-    pin(32, FUNCTION_5);
-    pin(33, FUNCTION_5);
-    gpio[PUD] = PULL_UP;
-    settle();
-    gpio[PUDCLK] = 1u << 15;
-    gpio[PUDCLK + 1] = 1u << (33 - 32);
-    settle();
-    gpio[PUD] = 0;
-    gpio[PUDCLK] = gpio[PUDCLK + 1] = 0;
+    raspi3b_pin(14, RASPI3B_FUNCTION_0);
+    raspi3b_pin(15, RASPI3B_FUNCTION_0);
+    raspi3b_pin(32, RASPI3B_FUNCTION_5);
+    raspi3b_pin(33, RASPI3B_FUNCTION_5);
+    raspi3b_pull_up(UINT64_C(1) << 15 | UINT64_C(1) << 33);
 }
 
 /* What has called for an interrupt and is gone with the change of the buffers

@@ -10,12 +10,23 @@ fact() {
         --eval "print: ; @echo '\$($2)'" print
 }
 
+# make_flash BOARD: $flash, if it is not there: a chip is what the emulator
+# makes of a file, a card is made here.
+make_flash() {
+    case $(fact "$1" emulator) in
+        *if=sd,*)
+            [ -s "$flash" ] || "$BUILD/tests/chip" "$flash" card - > /dev/null
+            ;;
+    esac
+}
+
 # begin BOARD IMAGE: starts it; its console is read and written by the two
 # numbers of `wire`, as ${wire[0]} and ${wire[1]}.  $flash: a file, which
 # need not be there.
 begin() {
     local command
     command=$(fact "$1" emulator)
+    make_flash "$1"
     # shellcheck disable=SC2086
     coproc wire { exec timeout -k 1 30 $command -kernel "$2" -display none \
         -nic none -monitor none -serial stdio 2> /dev/null; }

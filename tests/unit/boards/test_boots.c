@@ -60,10 +60,13 @@ static bool erase(void *context, uint32_t sector)
     return true;
 }
 
-static const struct loader_flash flash = {
-    chip.bytes, LOADER_RAM_SECTOR, LOADER_RAM_PAGE,
-    SECTORS,    loader_ram_read,   program,
-    erase};
+static const struct loader_flash flash = {.context = chip.bytes,
+                                          .sector_bytes = LOADER_RAM_SECTOR,
+                                          .page_bytes = LOADER_RAM_PAGE,
+                                          .sectors = SECTORS,
+                                          .read = loader_ram_read,
+                                          .program = program,
+                                          .erase = erase};
 
 /* 0: power was lost before the number was told. */
 static uint32_t start(long until_loss)
