@@ -67,10 +67,8 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
         s->sign = true;
         return 0;
     case 's':
-        if (host_parse_number(value, 0, UINT64_MAX, &s->seed) != 0) {
-            host_fail(s->error, HOST_USAGE,
-                      "--seed %s: not a number; give 0 or more", value);
-        }
+        (void)host_option_number("seed", value, 0, UINT64_MAX, &s->seed,
+                                 s->error);
         return 0;
     case ARGP_KEY_ARG:
         if (s->count == s->most) {
@@ -274,7 +272,7 @@ static int command_convert(int argc, char **argv, struct host_error *error)
 
 static int command_draw(int argc, char **argv, struct host_error *error)
 {
-    struct host_draw_options options;
+    struct host_draw_options options = {0};
     if (host_draw_arguments(argc, argv, &options, error) != 0) {
         return error->code;
     }
@@ -304,7 +302,7 @@ static int command_key(int argc, char **argv, struct host_error *error)
 
 static int command_sim(int argc, char **argv, struct host_error *error)
 {
-    struct host_sim_options options;
+    struct host_sim_options options = {0};
     if (host_sim_arguments(argc, argv, &options, error) != 0) {
         return error->code;
     }

@@ -1,10 +1,12 @@
 #include "node_set.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "parse.h"
+#include "text.h"
 
 enum { PART_BYTES = 16 };
 
@@ -52,7 +54,7 @@ int host_node_set_parse(struct host_node_set *set, const char *text,
             return host_fail(error, HOST_USAGE,
                              "%s: not nodes of this cube; give numbers from 0 "
                              "to %u and ranges of them, as in 0-3,7, or all",
-                             text, nodes - 1);
+                             *text == '\0' ? "an empty set" : text, nodes - 1);
         }
         at = end + 1;
     } while (*end == ',');
@@ -101,4 +103,13 @@ void host_node_set_print(const struct host_node_set *set, char *text,
         }
         used += (size_t)snprintf(text + used, size - used, "%s", part);
     }
+}
+
+void host_node_set_name(const struct host_node_set *set, char *text,
+                        size_t size)
+{
+    int used =
+        snprintf(text, size, "node%s ", host_text_s(host_node_set_count(set)));
+    assert((size_t)used < size);
+    host_node_set_print(set, text + used, size - (size_t)used);
 }

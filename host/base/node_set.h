@@ -50,4 +50,8 @@ unsigned host_node_set_count(const struct host_node_set *set);
 void host_node_set_print(const struct host_node_set *set, char *text,
                          size_t size);
 
+/* The same for a sentence: "node 3", "nodes 4-7". */
+void host_node_set_name(const struct host_node_set *set, char *text,
+                        size_t size);
+
 #endif

@@ -6,12 +6,13 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "parse.h"
 #include "text.h"
 
 enum {
     KEY_ANSWER = 1,
     KEY_LONG = 256, /* and beyond: getopt takes names of one key for one */
-    SHORT_MAX = 2 * HOST_OPTIONS_MAX + 8,
+    SHORT_MAX = 3 * HOST_OPTIONS_MAX + 8,
     NAMES_MAX = 160
 };
 
@@ -43,13 +44,16 @@ static void fill(struct table *t, const struct argp_option *options,
             break;
         }
         assert(i < HOST_OPTIONS_MAX - 1);
+        int value = o->arg == NULL                          ? no_argument
+                    : (o->flags & OPTION_ARG_OPTIONAL) != 0 ? optional_argument
+                                                            : required_argument;
         if (o->name != NULL) {
-            t->name[n++] = (struct option){o->name, o->arg != NULL, NULL,
-                                           KEY_LONG + (int)i};
+            t->name[n++] =
+                (struct option){o->name, value, NULL, KEY_LONG + (int)i};
         }
         if (o->key > ' ' && o->key < 0x7f) {
             t->letters[letters++] = (char)o->key;
-            if (o->arg != NULL) {
+            for (int colons = 0; colons < value; colons++) { /* or two */
                 t->letters[letters++] = ':';
             }
         }
@@ -183,4 +187,41 @@ int host_options_parse(const struct argp *argp, int argc, char **argv,
                            argv[0], argv[0]);
     }
     return status != 0 ? status : error->code;
+}
+
+int host_option_number(const char *option, const char *value, uint64_t least,
+                       uint64_t most, uint64_t *number,
+                       struct host_error *error)
+{
+    if (host_parse_number(value, least, most, number) == 0) {
+        return 0;
+    }
+    return most == UINT64_MAX
+               ? host_fail(error, HOST_USAGE,
+                           "--%s %s: not a number; give %llu or more", option,
+                           value, (unsigned long long)least)
+               : host_fail(error, HOST_USAGE,
+                           "--%s %s: not a number that is allowed; give %llu "
+                           "to %llu",
+                           option, value, (unsigned long long)least,
+                           (unsigned long long)most);
+}
+
+int host_option_argument(int key, const char *name, const char *value,
+                         const char **argument, struct host_error *error)
+{
+    if (key == ARGP_KEY_END) {
+        return *argument != NULL
+                   ? 0
+                   : host_fail(error, HOST_USAGE,
+                               "%s: not given; give its file, see --help",
+                               name);
+    }
+    if (*argument != NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "%s: one argument too many; give %s alone", value,
+                         name);
+    }
+    *argument = value;
+    return 0;
 }

@@ -11,6 +11,7 @@
 #define HOST_OPTIONS_H
 
 #include <argp.h>
+#include <stdint.h>
 
 #include "error.h"
 
@@ -23,5 +24,17 @@ enum { HOST_OPTIONS_MAX = 96 }; /* rows of a table, groups and end included */
  * --version end the program themselves. */
 int host_options_parse(const struct argp *argp, int argc, char **argv,
                        unsigned flags, void *input, struct host_error *error);
+
+/* For such a parser: the value of --`option`, a whole number from least to most
+ * as host_parse_number has it.  0, or HOST_USAGE: *number stays as it is. */
+int host_option_number(const char *option, const char *value, uint64_t least,
+                       uint64_t most, uint64_t *number,
+                       struct host_error *error);
+
+/* The one argument of a command, which its help calls `name`, at ARGP_KEY_ARG;
+ * where the command needs it, at ARGP_KEY_END too.  0, or HOST_USAGE: there is
+ * one too many, or none. */
+int host_option_argument(int key, const char *name, const char *value,
+                         const char **argument, struct host_error *error);
 
 #endif

@@ -13,6 +13,7 @@
 #define HOST_TEXT_H
 
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 enum { HOST_SAY_BYTES = 4096 };
@@ -29,6 +30,12 @@ int host_text_quote(char *out, size_t size, const char *text);
 /* Prints a line, made printable; a line feed at the end of `format` stays. */
 void host_say(FILE *stream, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
+
+/* What a noun of so many has at its end: "s", or nothing for one. */
+static inline const char *host_text_s(uint64_t count)
+{
+    return count == 1 ? "" : "s";
+}
 
 /* Of the names that `name` gives from 0 up to NULL, the one that may have been
  * meant by `word`, by the fewest letters changed, left out, put in or swapped

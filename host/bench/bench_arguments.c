@@ -72,10 +72,7 @@ static void parse_whole(struct arguments *a, const char *name,
                         const char *value, unsigned most, unsigned *number)
 {
     uint64_t n = 0;
-    if (host_parse_number(value, 1, most, &n) != 0) {
-        host_fail(a->error, HOST_USAGE, "%s %s: not a number; give 1 to %u",
-                  name, value, most);
-    }
+    (void)host_option_number(name, value, 1, most, &n, a->error);
     *number = (unsigned)n;
 }
 
@@ -144,12 +141,12 @@ static error_t parse_bench(int key, char *value, struct argp_state *state)
     switch (key) {
     case KEY_ROUNDS:
         a->of_peers = "--rounds";
-        parse_whole(a, "--rounds", value, HOST_BENCH_ROUNDS_MAX,
+        parse_whole(a, "rounds", value, HOST_BENCH_ROUNDS_MAX,
                     &a->peers.rounds);
         return 0;
     case KEY_LIMIT:
         a->of_peers = "--limit";
-        parse_whole(a, "--limit", value, 1000000, &a->peers.limit_s);
+        parse_whole(a, "limit", value, 1000000, &a->peers.limit_s);
         return 0;
     case KEY_CLASS:
         a->of_peers = "--class";

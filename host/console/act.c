@@ -1,4 +1,5 @@
 /* reset, run, abort, wait: what changes what the cube does. */
+#include <stdio.h>
 #include <string.h>
 
 #include "commands.h"
@@ -96,9 +97,37 @@ int host_shell_reset(struct host_shell *shell, unsigned count,
 
 /* --- run, abort, wait ----------------------------------------------------- */
 
+const char *host_shell_unnamed(const char *text)
+{
+    static const char name[] = "incode: ";
+    return strncmp(text, name, sizeof name - 1) == 0 ? text + sizeof name - 1
+                                                     : text;
+}
+
+/* Where answers are objects, what a run says is noted but for the last line,
+ * which tells why it failed, if it has. */
 static void say_text(void *context, const char *text)
 {
-    host_shell_say(context, "%s", text);
+    struct host_shell *shell = context;
+    if (!shell->json) {
+        host_shell_say(shell, "%s", text);
+        return;
+    }
+    if (shell->said[0] != '\0') {
+        host_shell_note(shell, "%s", shell->said);
+    }
+    snprintf(shell->said, sizeof shell->said, "%s", host_shell_unnamed(text));
+}
+
+static int fail_run(struct host_shell *shell, int status)
+{
+    if (shell->said[0] != '\0') {
+        return host_fail(&shell->error, status, "%s", shell->said);
+    }
+    return host_fail(&shell->error, status,
+                     "run: it ended with status %d; what it says above tells "
+                     "why",
+                     status);
 }
 
 static int finish_run(struct host_shell *shell, int status)
@@ -110,11 +139,12 @@ static int finish_run(struct host_shell *shell, int status)
     if (statistics != NULL) {
         (void)json_object_set_new(shell->object, "statistics", statistics);
     }
-    return status == 0 ? 0
-                       : host_fail(&shell->error, status,
-                                   "run: it ended with status %d; what it says "
-                                   "above tells why",
-                                   status);
+    int code = status == 0 ? 0 : fail_run(shell, status);
+    if (status == 0 && shell->said[0] != '\0') {
+        host_shell_note(shell, "%s", shell->said);
+    }
+    shell->said[0] = '\0';
+    return code;
 }
 
 static int await_run(struct host_shell *shell)

@@ -62,8 +62,9 @@ int host_shell_ask(struct host_shell *shell, const struct host_node_set *set,
                                 HOST_SHELL_ANSWER_US, &shell->error);
 }
 
-const char *host_shell_reason(const struct host_shell *shell, unsigned node,
-                              char text[HOST_SHELL_REASON])
+/* Why a node has not answered, and what to do next. */
+static const char *reason_of(const struct host_shell *shell, unsigned node,
+                             char text[HOST_SHELL_REASON])
 {
     return shell->looking ? "no answer while another program has the cube; "
                             "look again in a moment"
@@ -75,7 +76,7 @@ static void tell_absent(struct host_shell *shell, unsigned node,
                         struct host_fold *fold, json_t *object)
 {
     char reason[HOST_SHELL_REASON];
-    const char *why = host_shell_reason(shell, node, reason);
+    const char *why = reason_of(shell, node, reason);
     host_fold_add(fold, node, why);
     (void)json_object_set_new(object, "error", json_string(why));
 }
@@ -89,22 +90,20 @@ int host_shell_fail_absent(struct host_shell *shell,
                            const struct host_node_set *set)
 {
     struct host_node_set absent = {{0}};
-    unsigned count = 0, first = 0;
-    char names[64], reason[HOST_SHELL_REASON];
+    unsigned first = CUBE_HOST;
+    char names[72], reason[HOST_SHELL_REASON];
     for (unsigned i = shell->machine.nodes; i-- > 0;) {
         if (host_node_set_has(set, i) && !shell->visit.node[i].answered) {
             host_node_set_add(&absent, i);
             first = i;
-            count++;
         }
     }
-    if (count == 0) {
+    if (first == CUBE_HOST) {
         return 0;
     }
-    host_node_set_print(&absent, names, sizeof names);
-    return host_fail(&shell->error, HOST_CUBE, "node%s %s: %s: %s",
-                     count == 1 ? "" : "s", names, shell->command->name,
-                     host_shell_reason(shell, first, reason));
+    host_node_set_name(&absent, names, sizeof names);
+    return host_fail(&shell->error, HOST_CUBE, "%s: %s: %s", names,
+                     shell->command->name, reason_of(shell, first, reason));
 }
 
 int host_shell_answers(struct host_shell *shell,

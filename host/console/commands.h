@@ -108,16 +108,16 @@ int host_shell_answers(struct host_shell *shell,
                        const struct host_node_set *set, const char *heading,
                        host_shell_tell *tell);
 
-/* Why a node has not answered, and what to do next. */
-const char *host_shell_reason(const struct host_shell *shell, unsigned node,
-                              char text[HOST_SHELL_REASON]);
-
 /* The cube for this command: its own, or a look at another program's. */
 int host_shell_reach(struct host_shell *shell);
 void host_shell_look_end(struct host_shell *shell);
 int host_shell_look_ask(struct host_shell *shell,
                         const struct host_node_set *set,
                         enum node_question what);
+
+/* What a run has said, without the name that a note and a failure have before
+ * them anyway. */
+const char *host_shell_unnamed(const char *text);
 
 /* HOST_CUBE where one of the set has not answered, and why; else 0. */
 int host_shell_fail_absent(struct host_shell *shell,

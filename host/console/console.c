@@ -57,9 +57,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
                   value);
         return 0;
     default:
-        return host_site_option(&o->site, key, value, o->error) == 0
-                   ? 0
-                   : ARGP_ERR_UNKNOWN;
+        return host_site_option(&o->site, key, value, o->error);
     }
 }
 
@@ -79,10 +77,11 @@ static int read_file(struct host_shell *shell, const char *path,
 static int do_script(struct host_shell *shell, const struct options *o,
                      struct host_error *error)
 {
-    for (unsigned i = 0; i < o->lines && !shell->leaves; i++) {
+    for (unsigned i = 0;
+         i < o->lines && !shell->leaves && host_script_ending() == 0; i++) {
         (void)host_shell_line(shell, o->line[i]);
     }
-    if (o->file != NULL && !shell->leaves) {
+    if (o->file != NULL && !shell->leaves && host_script_ending() == 0) {
         return read_file(shell, o->file, error);
     }
     return o->lines > 0 || o->file != NULL
@@ -110,9 +109,6 @@ int host_console_command(int argc, char **argv, struct host_error *error)
     if (host_options_parse(&argp, argc, argv, 0, &options, error) != 0) {
         return error->code;
     }
-    if (host_site_check(&options.site, error) != 0) {
-        return error->code;
-    }
     bool person = options.lines == 0 && options.file == NULL &&
                   isatty(STDIN_FILENO) && isatty(STDOUT_FILENO) &&
                   !options.json;
@@ -121,13 +117,21 @@ int host_console_command(int argc, char **argv, struct host_error *error)
     host_shell_init(&shell, &place.place,
                     person ? host_terminal_sink() : host_script_sink(),
                     options.json);
-    if (person) {
-        status = host_terminal_run(&shell, &ending, error);
-    } else {
-        status = do_script(&shell, &options, error);
+    status = host_site_check(&options.site, error);
+    if (status == 0) {
+        status = host_site_read(&options.site, error);
+    }
+    if (status == 0) {
+        status = person ? host_terminal_run(&shell, &ending, error)
+                        : do_script(&shell, &options, error);
+    }
+    if (status != 0 && options.json) {
+        status = host_shell_fail(&shell, NULL, error);
+        memset(error, 0, sizeof *error); /* it is told */
     }
     host_shell_close(&shell);
     host_console_place_end(&place);
+    ending = person ? ending : host_script_ending();
     if (ending != 0) {
         (void)signal(ending, SIG_DFL);
         (void)raise(ending);

@@ -22,7 +22,7 @@ struct place {
     int x, y;
 };
 
-char host_drawing_mark(enum host_wire_state state)
+static char mark_of(enum host_wire_state state)
 {
     static const char marks[] = {'+', '.', '!', 'x', '?'};
     return marks[state];
@@ -55,7 +55,7 @@ static void draw_wire(struct canvas *c, unsigned node, unsigned d,
         int y = a.y + (b.y - a.y) * i / steps;
         bool gap = state != HOST_WIRE_UP && d == 0 && i % 2 == 0;
         if (i == at && state != HOST_WIRE_UP) {
-            put(c, x, y, host_drawing_mark(state));
+            put(c, x, y, mark_of(state));
         } else if (c->cell[y][x] == ' ' || d == 0) {
             put(c, x, y, gap ? ' ' : line);
         }
@@ -77,7 +77,7 @@ static void draw_between(const struct host_drawing *drawing, FILE *out)
     fprintf(out, "\n    each node of the left to its counterpart:\n   ");
     for (unsigned i = 0; i < 8; i++) {
         enum host_wire_state state = drawing->wire[i][3];
-        char mark = state == HOST_WIRE_UP ? '-' : host_drawing_mark(state);
+        char mark = state == HOST_WIRE_UP ? '-' : mark_of(state);
         fprintf(out, " %u-%c-%u", i, mark, i + 8);
     }
     fputc('\n', out);
@@ -119,7 +119,7 @@ void host_drawing_draw(const struct host_drawing *drawing, FILE *out)
         draw_between(drawing, out);
     }
     enum host_wire_state host = drawing->wire[0][drawing->dimension];
-    char mark = host == HOST_WIRE_UP ? '|' : host_drawing_mark(host);
+    char mark = host == HOST_WIRE_UP ? '|' : mark_of(host);
     fprintf(out, "%*s%c\n%*shost\n", LEFT, "", mark, LEFT, "");
 }
 
@@ -127,7 +127,7 @@ void host_drawing_row(const struct host_drawing *drawing, unsigned node,
                       char text[CUBE_LINKS_MAX + 1])
 {
     for (unsigned d = 0; d < drawing->dimension; d++) {
-        text[d] = host_drawing_mark(drawing->wire[node & ~(1u << d)][d]);
+        text[d] = mark_of(drawing->wire[node & ~(1u << d)][d]);
     }
     text[drawing->dimension] = '\0';
 }

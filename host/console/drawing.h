@@ -34,9 +34,6 @@ struct host_drawing {
     bool absent[CUBE_NODES_MAX];
 };
 
-/* The letter that marks a wire in that state. */
-char host_drawing_mark(enum host_wire_state state);
-
 /* Up to HOST_DRAWING_MAX. */
 void host_drawing_draw(const struct host_drawing *drawing, FILE *out);
 

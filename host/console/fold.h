@@ -14,8 +14,12 @@
 
 #include "host/base/node_set.h"
 
+enum { HOST_FOLD_TIME_WIDTH = 9 };
+
 struct host_fold_row {
     char *text;
+    bool timed;           /* it has a time, of which it is known */
+    uint32_t least, most; /* seconds of it */
     struct host_node_set set;
     bool of_host; /* no node said it, the host did */
 };
@@ -29,6 +33,14 @@ struct host_fold {
 
 /* A row of a node, or of CUBE_HOST; of several lines, if need be. */
 void host_fold_add(struct host_fold *fold, unsigned node, const char *text);
+
+/* The same with a time, as of being up, which never is the same twice: one in
+ * `text` stands where HOST_FOLD_TIME does, HOST_FOLD_TIME_WIDTH wide.  Times
+ * that are near share a row, and are told from the least to the most; those of
+ * a node that has begun anew are not. */
+#define HOST_FOLD_TIME '\1'
+void host_fold_add_timed(struct host_fold *fold, unsigned node,
+                         const char *text, uint32_t time_s);
 
 /* A heading, unless it is NULL, and the rows in the order in which they came
  * first; those of several lines stand beneath their set. */

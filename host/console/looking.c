@@ -5,6 +5,9 @@
 #include "commands.h"
 #include "host/base/clock.h"
 
+/* How long a run that has just begun may take to have the cube's wires. */
+enum { HELD_US = 10000000, STEP_US = 50000 };
+
 static uint64_t now_us(void *context)
 {
     (void)context;
@@ -73,6 +76,21 @@ bool host_shell_is_held(const struct host_shell *shell,
     return is_held(shell, wire, holder);
 }
 
+/* The same, once a run that has just begun has the wire, or has ended. */
+static bool await_held(struct host_shell *shell, char wire[HOST_WIRE_NAME],
+                       struct host_holder *holder)
+{
+    const struct host_shell_sink *sink = shell->sink;
+    uint64_t end_us = host_now_us() + HELD_US;
+    bool held;
+    while (!(held = is_held(shell, wire, holder)) && shell->running &&
+           host_now_us() < end_us &&
+           (sink->interrupted == NULL || !sink->interrupted(sink->context))) {
+        host_shell_tend(shell, STEP_US);
+    }
+    return held;
+}
+
 int host_shell_reach(struct host_shell *shell)
 {
     char wire[HOST_WIRE_NAME];
@@ -80,7 +98,9 @@ int host_shell_reach(struct host_shell *shell)
     if (shell->open) {
         return 0;
     }
-    bool held = is_held(shell, wire, &holder);
+    bool held = shell->command->need == HOST_SHELL_LOOK
+                    ? await_held(shell, wire, &holder)
+                    : is_held(shell, wire, &holder);
     shell->in_use = held && !shell->running;
     if (held && shell->command->need == HOST_SHELL_LOOK) {
         return begin_look(shell, wire);

@@ -31,9 +31,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
                   value);
         return 0;
     default:
-        return host_site_option(&o->site, key, value, o->error) == 0
-                   ? 0
-                   : ARGP_ERR_UNKNOWN;
+        return host_site_option(&o->site, key, value, o->error);
     }
 }
 
@@ -76,19 +74,17 @@ int host_nodes_command(int argc, char **argv, struct host_error *error)
         NULL,
         NULL,
         NULL};
-    if (host_options_parse(&argp, argc, argv, 0, &options, error) != 0 ||
-        host_site_check(&options.site, error) != 0) {
+    if (host_options_parse(&argp, argc, argv, 0, &options, error) != 0) {
         return error->code;
     }
     host_console_place_init(&place, &options.site);
     host_shell_init(&shell, &place.place, host_script_sink(), options.json);
     struct host_error lost = {0};
-    int status = reach(&shell, &lost);
-    if (status != 0 && !shell.open && !shell.in_use) {
-        *error = lost;
-    } else {
-        status = host_shell_line(&shell, "nodes"); /* says what it is */
-    }
+    int status = host_site_check(&options.site, &lost);
+    status = status == 0 ? reach(&shell, &lost) : status;
+    status = status != 0 && !shell.open && !shell.in_use
+                 ? host_shell_fail(&shell, "nodes", &lost)
+                 : host_shell_line(&shell, "nodes"); /* says what it is */
     host_shell_close(&shell);
     host_console_place_end(&place);
     return status;

@@ -11,13 +11,17 @@
 
 enum { TEND_US = 20000, IDLE_MS = 1000 };
 
-static volatile sig_atomic_t interrupts;
+static volatile sig_atomic_t ending;
 
 /* A second one finds the default action. */
 static void interrupt(int number)
 {
-    (void)number;
-    interrupts = 1;
+    ending = number;
+}
+
+int host_script_ending(void)
+{
+    return ending;
 }
 
 static void show_line(void *context, const char *text)
@@ -43,7 +47,7 @@ static void show_failed(void *context, const char *text)
 static bool interrupted(void *context)
 {
     (void)context;
-    return interrupts > 0;
+    return ending != 0;
 }
 
 const struct host_shell_sink *host_script_sink(void)
@@ -52,7 +56,13 @@ const struct host_shell_sink *host_script_sink(void)
         NULL, show_line, show_note, show_failed, NULL, NULL, interrupted};
     const struct sigaction action = {.sa_handler = interrupt,
                                      .sa_flags = (int)SA_RESETHAND};
+    struct sigaction before;
     (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    if (sigaction(SIGHUP, NULL, &before) == 0 &&
+        before.sa_handler != SIG_IGN) { /* as nohup has it */
+        (void)sigaction(SIGHUP, &action, NULL);
+    }
     return &sink;
 }
 
@@ -63,7 +73,7 @@ static bool await_bytes(struct host_shell *shell, int file)
     for (;;) {
         bool tended = shell->open || shell->running;
         int n = poll(&input, 1, tended ? 0 : IDLE_MS);
-        if (interrupts > 0) {
+        if (ending != 0) {
             return false;
         }
         if (n > 0) {
@@ -79,7 +89,7 @@ static bool await_bytes(struct host_shell *shell, int file)
 static size_t do_lines(struct host_shell *shell, char *text, size_t used)
 {
     char *at = text, *end;
-    while (!shell->leaves && interrupts == 0 &&
+    while (!shell->leaves && ending == 0 &&
            (end = memchr(at, '\n', used - (size_t)(at - text))) != NULL) {
         *end = '\0';
         (void)host_shell_line(shell, at);

@@ -17,9 +17,12 @@ enum { HOST_SCRIPT_LINE = 65536 };
 
 const struct host_shell_sink *host_script_sink(void);
 
-/* Does the lines until the end, or `exit`.  0, or HOST_INPUT: it cannot be
- * read. */
+/* Does the lines until the end, `exit` or a signal.  0, or HOST_INPUT: it
+ * cannot be read. */
 int host_script_read(struct host_shell *shell, const char *name, int file,
                      struct host_error *error);
+
+/* The signal that ends it, for who has cleared away; 0: none came. */
+int host_script_ending(void);
 
 #endif

@@ -22,28 +22,33 @@ void host_shell_init(struct host_shell *shell,
     shell->json = json;
 }
 
+static void fill_in(char text[LINE], const char *format, va_list list)
+{
+    char raw[LINE];
+    (void)vsnprintf(raw, sizeof raw, format, list);
+    host_text_printable(text, LINE, raw);
+}
+
 void host_shell_say(struct host_shell *shell, const char *format, ...)
 {
-    char raw[LINE], text[LINE];
+    char text[LINE];
     va_list list;
     if (shell->json) {
         return;
     }
     va_start(list, format);
-    (void)vsnprintf(raw, sizeof raw, format, list);
+    fill_in(text, format, list);
     va_end(list);
-    host_text_printable(text, sizeof text, raw);
     shell->sink->line(shell->sink->context, text);
 }
 
 void host_shell_note(struct host_shell *shell, const char *format, ...)
 {
-    char raw[LINE], text[LINE];
+    char text[LINE];
     va_list list;
     va_start(list, format);
-    (void)vsnprintf(raw, sizeof raw, format, list);
+    fill_in(text, format, list);
     va_end(list);
-    host_text_printable(text, sizeof text, raw);
     shell->sink->note(shell->sink->context, text);
 }
 
@@ -125,14 +130,16 @@ static void note_wire(struct host_shell *shell, uint64_t now_us)
     host_watch_noise(&shell->watch, bytes, sizeof bytes);
     if (up) {
         host_shell_note(shell,
-                        "node 0 link %u: %" PRIu64 " damaged frames on the "
+                        "node 0 link %u: %" PRIu64 " damaged frame%s on the "
                         "host's wire, %" PRIu64 " in all",
-                        m->dimension, noise - shell->noise, noise);
+                        m->dimension, noise - shell->noise,
+                        host_text_s(noise - shell->noise), noise);
     } else {
         host_shell_note(shell,
                         "node 0 link %u: the host's wire brings what is no "
-                        "frame, %" PRIu64 " bytes so far; the last: \"%s\"",
-                        m->dimension, shell->watch.received, bytes);
+                        "frame, %" PRIu64 " byte%s so far; the last: \"%s\"",
+                        m->dimension, shell->watch.received,
+                        host_text_s(shell->watch.received), bytes);
     }
     shell->noise = noise;
     shell->noted_us = now_us + 1000000;
@@ -144,20 +151,17 @@ static void note_events(struct host_shell *shell)
     uint64_t now_us = shell->machine.now_us(shell->machine.context);
     note_wire(shell, now_us);
     struct host_node_set again = {{0}};
-    unsigned count = 0;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         uint32_t starts = shell->visit.node[i].starts;
         if (starts != shell->starts[i] && shell->starts[i] != 0) {
             host_node_set_add(&again, i);
-            count++;
         }
         shell->starts[i] = starts;
     }
-    if (count > 0) {
-        char text[64];
-        host_node_set_print(&again, text, sizeof text);
-        host_shell_note(shell, "node%s %s: begun anew", count == 1 ? "" : "s",
-                        text);
+    if (host_node_set_count(&again) > 0) {
+        char text[72];
+        host_node_set_name(&again, text, sizeof text);
+        host_shell_note(shell, "%s: begun anew", text);
     }
 }
 
@@ -176,7 +180,7 @@ static void lose_cube(struct host_shell *shell, const struct host_error *error)
 
 static void note_line(void *context, const char *text)
 {
-    host_shell_note(context, "%s", text);
+    host_shell_note(context, "%s", host_shell_unnamed(text));
 }
 
 /* Whether a run behind goes on. */
@@ -273,6 +277,17 @@ static void tell_status(struct host_shell *shell, int status)
     }
 }
 
+int host_shell_fail(struct host_shell *shell, const char *command,
+                    const struct host_error *error)
+{
+    shell->error = *error;
+    if (shell->json) {
+        shell->object = json_pack("{ss*}", "command", command);
+    }
+    tell_status(shell, error->code);
+    return error->code;
+}
+
 static int do_words(struct host_shell *shell, int count,
                     const char *const *words)
 {
@@ -335,9 +350,11 @@ int host_shell_line(struct host_shell *shell, const char *line)
 
 void host_shell_close(struct host_shell *shell)
 {
+    bool told = false;
     while (shell->running && tend_run(shell, RUN_WAIT_US)) {
-        if (shell->sink->interrupted != NULL &&
+        if (!told && shell->sink->interrupted != NULL &&
             shell->sink->interrupted(shell->sink->context)) {
+            told = true;
             shell->place->interrupt(shell->place->context);
         }
     }

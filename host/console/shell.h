@@ -75,6 +75,7 @@ struct host_shell {
     const struct host_shell_command *command; /* under way, or NULL */
     struct host_error error;                  /* of it */
     json_t *object;                           /* of it, where json */
+    char said[1024]; /* where json, of a run: its last line; "": none */
     /* The cube, while this console has it. */
     bool open;
     bool running; /* `run .. &` has it */
@@ -109,6 +110,11 @@ int host_shell_open(struct host_shell *shell, struct host_error *error);
 /* Does what the line says, and tells it: its status, which `first` keeps.  An
  * empty line, or one that is a remark behind #, is nothing. */
 int host_shell_line(struct host_shell *shell, const char *line);
+
+/* What is wrong beside all lines, told as if `command` had failed by it; NULL:
+ * none is meant.  Its status. */
+int host_shell_fail(struct host_shell *shell, const char *command,
+                    const struct host_error *error);
 
 /* A round without a line; sleeps up to wait_us. */
 void host_shell_tend(struct host_shell *shell, uint64_t wait_us);

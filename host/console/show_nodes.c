@@ -1,8 +1,11 @@
 /* nodes: who is there, what is missing, and what to do next. */
 #include <inttypes.h>
+#include <limits.h>
 #include <string.h>
 
 #include "commands.h"
+#include "host/base/text.h"
+#include "host/machines/emulator.h"
 #include "node/roles/roles.h"
 
 enum { WIRES_US = 10000000 }; /* for those of nodes that have just begun */
@@ -35,18 +38,6 @@ static const char *hex(const uint8_t *bytes, size_t size, char *text)
     return text;
 }
 
-static const char *since(uint32_t s, char text[24])
-{
-    if (s < 60) {
-        snprintf(text, 24, "%" PRIu32 " s", s);
-    } else if (s < 3600) {
-        snprintf(text, 24, "%" PRIu32 " min", s / 60);
-    } else {
-        snprintf(text, 24, "%" PRIu32 " h", s / 3600);
-    }
-    return text;
-}
-
 static void tell_who(struct host_shell *shell, unsigned node,
                      struct host_fold *fold, json_t *object)
 {
@@ -56,7 +47,7 @@ static void tell_who(struct host_shell *shell, unsigned node,
     char board[NODE_BOARD_BYTES + 1], version[NODE_VERSION_BYTES + 1];
     char loader[NODE_VERSION_BYTES + 1];
     char digest[2 * NODE_DIGEST_BYTES + 1], serial[2 * NODE_SERIAL_BYTES + 1];
-    char row[200], memory[HOST_SHELL_FIGURE], up[24], boot[12], wires[16];
+    char row[200], memory[HOST_SHELL_FIGURE], boot[12], wires[16];
     const char *kind = kinds[w->kind <= NODE_KIND_LOADER ? w->kind : 0];
     (void)field(w->board, sizeof w->board, board);
     (void)field(w->version, sizeof w->version, version);
@@ -80,13 +71,13 @@ static void tell_who(struct host_shell *shell, unsigned node,
     if (links_up == links) {
         snprintf(wires, sizeof wires, looking ? "-" : "all");
     }
-    snprintf(row, sizeof row, "%-12s %-8s %-10s %-8.8s %5s %7s %7s  %-8s %s",
+    snprintf(row, sizeof row, "%-12s %-8s %-10s %-8.8s %5s %c %7s  %-8s %s",
              board, kind, version,
              is_zero(w->digest, sizeof w->digest) ? "-" : digest,
-             w->boot == 0 ? "-" : boot, since(w->uptime_s, up),
+             w->boot == 0 ? "-" : boot, HOST_FOLD_TIME,
              host_shell_bytes(w->memory, memory), wires,
              role == NULL ? "-" : role->name);
-    host_fold_add(fold, node, row);
+    host_fold_add_timed(fold, node, row, w->uptime_s);
     json_t *fields = json_pack(
         "{ss ss ss ss ss ss sI sI sI sI sI si si ss?}", "board", board, "kind",
         kind, "version", version, "loader", loader, "digest", digest, "serial",
@@ -126,37 +117,77 @@ static unsigned tell_faults(struct host_shell *shell)
     return count;
 }
 
+/* The image that these boards would be given, where they are of one kind and it
+ * was built; what to put there, else. */
+static const char *name_image(const struct host_shell *shell,
+                              const struct host_node_set *set,
+                              char path[PATH_MAX])
+{
+    char board[NODE_BOARD_BYTES + 1] = "", quoted[PATH_MAX];
+    bool alike = true;
+    for (unsigned i = 0; i < shell->machine.nodes; i++) {
+        const struct node_who *w = &shell->visit.node[i].who;
+        if (host_node_set_has(set, i)) {
+            alike = alike &&
+                    (board[0] == '\0' || strncmp(board, (const char *)w->board,
+                                                 NODE_BOARD_BYTES) == 0);
+            memcpy(board, w->board, NODE_BOARD_BYTES);
+        }
+    }
+    if (!alike || !host_firmware_find(board, path) ||
+        host_text_quote(quoted, sizeof quoted, path) != 0) {
+        return "IMAGE";
+    }
+    return strcpy(path, quoted);
+}
+
 /* Nodes that are there, and would not run as they are. */
 static void tell_next(struct host_shell *shell)
 {
-    struct host_node_set loaders = {{0}};
+    struct host_node_set loaders = {{0}}, worn = {{0}}, programs = {{0}};
     const struct node_who *first = NULL;
-    bool mixed = false;
-    char names[64];
+    bool mixed = false, process = false;
+    const char *where = host_where(&shell->machine);
+    char names[72], image[PATH_MAX];
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         const struct node_who *w = &shell->visit.node[i].who;
         if (!shell->visit.node[i].there || w->protocol != NODE_PROTOCOL) {
             continue;
         }
         if (w->kind == NODE_KIND_LOADER) {
-            host_node_set_add(&loaders, i);
+            host_node_set_add(w->boot == 0 ? &worn : &loaders, i);
             continue;
         }
+        process = process || w->kind == NODE_KIND_PROCESS;
+        host_node_set_add(&programs, i);
         first = first == NULL ? w : first;
         mixed =
             mixed || memcmp(first->version, w->version, sizeof w->version) != 0;
     }
     if (host_node_set_count(&loaders) > 0) {
-        host_node_set_print(&loaders, names, sizeof names);
-        host_shell_say(
-            shell,
-            "node%s %s: in the boot loader, with no program running; "
-            "bring one with: incode flash IMAGE",
-            host_node_set_count(&loaders) == 1 ? "" : "s", names);
+        host_node_set_name(&loaders, names, sizeof names);
+        host_shell_say(shell,
+                       "%s: in the boot loader, with no program running; "
+                       "bring one with: incode flash %s %s",
+                       names, where, name_image(shell, &loaders, image));
     }
-    if (mixed) {
-        host_shell_say(shell, "the nodes run different versions; bring the "
-                              "same to all: incode flash, incode deploy");
+    if (host_node_set_count(&worn) > 0) {
+        host_node_set_name(&worn, names, sizeof names);
+        host_shell_say(shell,
+                       "%s: in the boot loader, as the flash takes no record "
+                       "of a start; why: incode console %s -c 'log %s'",
+                       names, where, strchr(names, ' ') + 1);
+    }
+    if (mixed && process) {
+        host_shell_say(shell,
+                       "the nodes run different versions; bring the same to "
+                       "all with: incode deploy %s",
+                       where);
+    } else if (mixed) {
+        host_shell_say(shell,
+                       "the nodes run different versions; bring the same to "
+                       "all with: incode flash %s %s",
+                       where, name_image(shell, &programs, image));
     }
 }
 
@@ -174,7 +205,7 @@ int host_shell_nodes(struct host_shell *shell, unsigned count,
     }
     int status = host_shell_ask_tell(
         shell, &set, NODE_WHO,
-        "BOARD        RUNS     VERSION    IMAGE     BOOT      UP  MEMORY  "
+        "BOARD        RUNS     VERSION    IMAGE     BOOT        UP  MEMORY  "
         "LINKS    ROLE",
         tell_who);
     if (count > 0 || shell->looking) {

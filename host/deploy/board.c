@@ -20,20 +20,13 @@ static _Noreturn void become_ssh(const struct host_deploy_job *job,
                                  const char *to, const char *command,
                                  int files[3], pid_t host)
 {
-    const char *argv[24] = {"ssh",
-                            "-T",
-                            "-x",
-                            "-o",
-                            "BatchMode=yes",
-                            "-o",
-                            "ConnectTimeout=10",
-                            "-o",
-                            "ServerAliveInterval=5",
-                            "-o",
-                            "ServerAliveCountMax=3",
-                            "-o",
-                            "LogLevel=ERROR"};
-    size_t n = 13;
+    const char *argv[24] = {"ssh", "-T", "-x", "-o", "BatchMode=yes", "-o",
+                            "ConnectTimeout=10", "-o", "ServerAliveInterval=5",
+                            "-o", "ServerAliveCountMax=3", "-o",
+                            "LogLevel=ERROR",
+                            /* A master that stays would hold the pipes. */
+                            "-o", "ControlPath=none"};
+    size_t n = 15;
     if (job->ssh_config != NULL) {
         argv[n++] = "-F";
         argv[n++] = job->ssh_config;
@@ -285,8 +278,8 @@ static const char *next_step(const char *said)
                               "ssh"},
         {"refused", "start its ssh service, then try: ssh"},
         {"No space left", "free some space there; look with: ssh"},
-        {"timed out", "is it on, and on the network? try: ssh"},
-        {"No route", "is it on, and on the network? try: ssh"},
+        {"timed out", "see that it is on, and on the network; then try: ssh"},
+        {"No route", "see that it is on, and on the network; then try: ssh"},
         {"No such file or directory",
          "install the package openssh-client, then try: ssh"}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {

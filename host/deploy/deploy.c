@@ -11,6 +11,7 @@
 #include "board.h"
 #include "host/base/node_set.h"
 #include "host/base/options.h"
+#include "host/base/text.h"
 #include "lines.h"
 
 enum {
@@ -184,7 +185,7 @@ static unsigned begin_more(struct boards *boards, struct deploy *d)
 }
 
 static void run(struct boards *boards, struct deploy *d,
-                struct host_deploy_lines *lines)
+                const struct host_deploy_lines *lines)
 {
     struct pollfd files[DEPLOY_AT_ONCE * HOST_BOARD_FILES];
     while (begin_more(boards, d) > 0) {
@@ -211,7 +212,7 @@ static void run(struct boards *boards, struct deploy *d,
 static int conclude(const struct boards *boards, const struct deploy *d)
 {
     struct host_node_set failed = {{0}}, stopped = {{0}};
-    char text[120];
+    char text[120], name[128];
     for (unsigned i = 0; i < boards->count; i++) {
         const struct host_deploy_board *board = &boards->board[i];
         if (board->error.code != 0) {
@@ -222,18 +223,22 @@ static int conclude(const struct boards *boards, const struct deploy *d)
     }
     if (host_node_set_count(&failed) > 0) {
         host_node_set_print(&failed, text, sizeof text);
+        host_node_set_name(&failed, name, sizeof name);
         return host_fail(d->error, HOST_CUBE,
-                         "%s: %u of %u boards failed, nodes %s; do what is "
-                         "said above, and repeat it with --nodes %s",
+                         "%s: %u of %u board%s failed, %s; do what is said "
+                         "above, and repeat it with --nodes %s",
                          d->cube, host_node_set_count(&failed), boards->count,
-                         text, text);
+                         host_text_s(boards->count), name, text);
     }
     if (host_node_set_count(&stopped) > 0) {
+        bool one = host_node_set_count(&stopped) == 1;
         host_node_set_print(&stopped, text, sizeof text);
+        host_node_set_name(&stopped, name, sizeof name);
         return host_fail(d->error, HOST_CUBE,
-                         "%s: nodes %s do not run; start them with: incode "
-                         "deploy --cube %s --nodes %s",
-                         d->cube, text, d->cube, text);
+                         "%s: %s %s not run; start %s with: incode deploy "
+                         "--cube %s --nodes %s",
+                         d->cube, name, one ? "does" : "do",
+                         one ? "it" : "them", d->cube, text);
     }
     return 0;
 }

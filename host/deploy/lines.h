@@ -1,6 +1,5 @@
-/* The boards' lines: on a terminal that has room for all of them each is drawn
- * anew as its board goes on; elsewhere it is printed once, when all are
- * done.
+/* The boards' lines: on a terminal that has room for all of them a row a board
+ * shows what it is at; what came of it is printed once, when all are done.
  *
  * Memory: none.  Work: a line a board, ten times a second at most.
  *
@@ -13,25 +12,21 @@
 #define HOST_DEPLOY_LINES_H
 
 #include <stdbool.h>
-#include <stdint.h>
 
 #include "board.h"
 
 struct host_deploy_lines {
     bool quiet, live;
-    unsigned drawn;   /* lines on the terminal */
-    unsigned columns; /* of the terminal */
-    uint64_t next_us;
 };
 
 void host_deploy_lines_begin(struct host_deploy_lines *lines, unsigned boards,
                              bool quiet);
 /* When anything may have changed. */
-void host_deploy_lines_show(struct host_deploy_lines *lines,
+void host_deploy_lines_show(const struct host_deploy_lines *lines,
                             const struct host_deploy_board *boards,
                             unsigned count);
 /* When all is done: last lines, what is wrong, and notes. */
-void host_deploy_lines_end(struct host_deploy_lines *lines,
+void host_deploy_lines_end(const struct host_deploy_lines *lines,
                            const struct host_deploy_board *boards,
                            unsigned count);
 

@@ -4,7 +4,6 @@
 
 #include "draw.h"
 #include "host/base/options.h"
-#include "host/base/parse.h"
 #include "picture.h"
 
 enum { KEY_AXIS = 256, KEY_AT, KEY_WIDTH, WIDTH = 640 };
@@ -39,11 +38,8 @@ static void parse_at(struct parse_draw *p, const char *value)
 static void parse_width(struct parse_draw *p, const char *value)
 {
     uint64_t n = 0;
-    if (host_parse_number(value, HOST_PICTURE_MIN, HOST_PICTURE_MAX, &n) != 0) {
-        host_fail(p->error, HOST_USAGE,
-                  "--width %s: not a number of pixels; give %d to %d", value,
-                  HOST_PICTURE_MIN, HOST_PICTURE_MAX);
-    }
+    (void)host_option_number("width", value, HOST_PICTURE_MIN, HOST_PICTURE_MAX,
+                             &n, p->error);
     p->options->width = (unsigned)n;
 }
 

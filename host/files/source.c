@@ -38,6 +38,14 @@ static size_t most_bytes(struct host_source *source, size_t bytes)
     return source->most;
 }
 
+static int too_long(const struct host_source *source, struct host_error *error)
+{
+    return host_fail(error, HOST_INPUT,
+                     "%s: more than %zu bytes, the most that %s has; give "
+                     "another file",
+                     source->path, source->bound, source->what);
+}
+
 static int too_large(const struct host_source *source, size_t bytes,
                      struct host_error *error)
 {
@@ -106,6 +114,9 @@ static int read_all(struct host_source *source, int file,
         }
         if (S_ISREG(status.st_mode) && status.st_size > 0) {
             hint = (size_t)status.st_size + 1;
+            if (source->bound > 0 && hint - 1 > source->bound) {
+                return too_long(source, error);
+            }
             if (hint > most_bytes(source, hint)) {
                 return too_large(source, hint - 1, error);
             }
@@ -129,6 +140,9 @@ static int read_all(struct host_source *source, int file,
             return 0;
         }
         source->bytes += (size_t)n;
+        if (source->bound > 0 && source->bytes > source->bound) {
+            return too_long(source, error);
+        }
         host_progress_add((uint64_t)n);
         hint = (size_t)1 << 16;
     }
@@ -211,11 +225,11 @@ static int finish(struct host_source *source, bool packed,
     return error->code;
 }
 
-int host_source_open(struct host_source *source, const char *path, bool packed,
-                     struct host_error *error)
+static int open_source(struct host_source *source, const char *path,
+                       bool packed, struct host_error *error)
 {
     bool standard = strcmp(path, "-") == 0;
-    *source = (struct host_source){.path = standard ? "stdin" : path};
+    source->path = standard ? "stdin" : path;
     host_progress_phase("reading", "MB");
     int file = standard ? 0 : open(path, O_RDONLY | O_CLOEXEC);
     if (file < 0) {
@@ -228,6 +242,21 @@ int host_source_open(struct host_source *source, const char *path, bool packed,
         (void)close(file);
     }
     return finish(source, packed, error);
+}
+
+int host_source_open(struct host_source *source, const char *path, bool packed,
+                     struct host_error *error)
+{
+    *source = (struct host_source){.bound = 0};
+    return open_source(source, path, packed, error);
+}
+
+int host_source_open_bounded(struct host_source *source, const char *path,
+                             size_t most, const char *what,
+                             struct host_error *error)
+{
+    *source = (struct host_source){.bound = most, .what = what};
+    return open_source(source, path, false, error);
 }
 
 int host_source_wrap(struct host_source *source, const char *path,

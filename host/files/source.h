@@ -26,6 +26,8 @@ struct host_source {
     size_t capacity;
     size_t most;   /* that it may grow to; 0: not looked up yet */
     size_t packed; /* that it comes from; 0: it was not packed */
+    size_t bound;  /* of what its caller takes; 0: none */
+    const char *what;
 };
 
 /* Whether a name ends in .gz, in letters of either case. */
@@ -36,6 +38,12 @@ bool host_is_packed(const char *path);
  * memory: HOST_INPUT. */
 int host_source_open(struct host_source *source, const char *path, bool packed,
                      struct host_error *error);
+
+/* The same, not unpacked, of a file of at most so many bytes, the most that
+ * `what` has; a longer one, or one without an end: HOST_INPUT. */
+int host_source_open_bounded(struct host_source *source, const char *path,
+                             size_t most, const char *what,
+                             struct host_error *error);
 
 /* Takes bytes of the caller, unpacks them if `path` ends in .gz. */
 int host_source_wrap(struct host_source *source, const char *path,

@@ -5,9 +5,9 @@
 #include <string.h>
 #include <sys/random.h>
 
+#include "flash_cut.h"
 #include "flash_show.h"
 #include "host/base/options.h"
-#include "host/base/parse.h"
 #include "host/base/progress.h"
 #include "host/base/text.h"
 #include "host/lines/lines.h"
@@ -26,6 +26,8 @@ enum {
 
 struct flash {
     struct host_site_options where;
+    int argc;
+    char **argv;
     const char *path, *nodes; /* NULL: all */
     uint64_t patience_s;
     bool quiet, dry_run, reset, force;
@@ -48,7 +50,8 @@ static const struct argp_option options_of_flash[] = {
     {"reset", KEY_RESET, NULL, 0,
      "Resets the boards first, by the lines that the cube file gives them", 3},
     {"force", KEY_FORCE, NULL, 0,
-     "Boards that run this image as well: they verify it, and start it anew",
+     "Boards that run this image as well: they prove its signature, verify "
+     "what they have of it, and start it anew",
      3},
     {"patience", KEY_PATIENCE, "SECONDS", 0,
      "Gives a node up that gets no further for so long. Default: 60", 3},
@@ -75,30 +78,15 @@ static error_t parse(int key, char *value, struct argp_state *state)
         f->quiet = true;
         return 0;
     case KEY_PATIENCE:
-        if (host_parse_number(value, 1, 86400, &f->patience_s) != 0) {
-            host_fail(f->error, HOST_USAGE,
-                      "--patience %s: not a number of seconds; give 1 to 86400",
-                      value);
-        }
+        (void)host_option_number("patience", value, 1, 86400, &f->patience_s,
+                                 f->error);
         return 0;
     case ARGP_KEY_ARG:
-        if (f->path != NULL) {
-            host_fail(f->error, HOST_USAGE,
-                      "%s: one argument too many; give IMAGE alone", value);
-        }
-        f->path = value;
-        return 0;
     case ARGP_KEY_END:
-        if (f->path == NULL) {
-            host_fail(f->error, HOST_USAGE,
-                      "%s: no IMAGE is given; give its file, see --help",
-                      state->name);
-        }
+        (void)host_option_argument(key, "IMAGE", value, &f->path, f->error);
         return 0;
     default:
-        return host_site_option(&f->where, key, value, f->error) == 0
-                   ? 0
-                   : ARGP_ERR_UNKNOWN;
+        return host_site_option(&f->where, key, value, f->error);
     }
 }
 
@@ -132,18 +120,25 @@ static int open_image(struct flash *f)
         return f->error->code;
     }
     enum loader_fault fault = host_image_fault(&f->file);
-    if (fault == LOADER_GOOD &&
-        f->file.source.bytes > (size_t)LOADER_BLOCKS_MAX * LOADER_BLOCK_BYTES) {
-        fault = LOADER_TOO_LARGE;
-    }
     if (fault == LOADER_GOOD) {
         return 0;
     }
     host_image_close(&f->file);
-    return host_fail(
-        f->error, HOST_INPUT, "%s: %s; %s", f->path, loader_fault_text(fault),
-        fault == LOADER_UNSIGNED ? "sign it: incode sign IMAGE --key FILE"
-                                 : "copy or build it anew");
+    if (fault == LOADER_UNSIGNED) {
+        return host_fail(f->error, HOST_INPUT,
+                         "%s: %s; sign it: incode sign %s --key FILE", f->path,
+                         loader_fault_text(fault), f->path);
+    }
+    return host_fail(f->error, HOST_INPUT, "%s: %s; copy or build it anew",
+                     f->path, loader_fault_text(fault));
+}
+
+/* What is no set in any cube is told before a port is opened. */
+static int check_nodes(struct flash *f)
+{
+    return f->nodes == NULL ? 0
+                            : host_node_set_parse(&f->set, f->nodes,
+                                                  CUBE_NODES_MAX, f->error);
 }
 
 static const char *board_in_file(void *context, unsigned node)
@@ -229,7 +224,6 @@ static void say(void *context, const char *line)
 static int plan(struct flash *f)
 {
     char why[HOST_SPREAD_TEXT];
-    host_flash_show_end(&f->show);
     host_flash_show_plan(&f->show);
     if (host_spread_result(&f->spread, f->error) != 0) {
         return f->error->code;
@@ -250,12 +244,20 @@ static int spread(struct flash *f)
     if (status == 0 && f->dry_run) {
         return plan(f);
     }
-    while (status == 0 && !host_spread_over(&f->spread)) {
+    host_flash_cut_begin();
+    while (status == 0 && host_flash_cut() == 0 &&
+           !host_spread_over(&f->spread)) {
         status = host_spread_step(&f->spread, STEP_US, f->error);
         host_flash_show_draw(&f->show);
     }
+    if (host_flash_cut() != 0) {
+        host_progress_end();
+        host_flash_cut_tell(stderr, &f->spread, f->argc, f->argv);
+        return HOST_CUBE;
+    }
+    host_flash_cut_end();
     status = status == 0 ? host_spread_run(&f->spread, f->error) : status;
-    host_flash_show_end(&f->show);
+    host_progress_end();
     if (status != 0) {
         return status;
     }
@@ -283,7 +285,6 @@ static int visit(struct flash *f)
     if (status == 0) {
         host_flash_show_begin(&f->show, &f->spread, f->quiet || f->dry_run);
         status = spread(f);
-        host_flash_show_end(&f->show);
         host_spread_close(&f->spread);
     }
     host_visit_close(&f->visit);
@@ -294,7 +295,9 @@ int host_flash(int argc, char **argv, struct host_error *error)
 {
     static struct flash f = {.patience_s = PATIENCE_S};
     f.error = error;
-    if (parse_all(&f, argc, argv) != 0 ||
+    f.argc = argc;
+    f.argv = argv;
+    if (parse_all(&f, argc, argv) != 0 || check_nodes(&f) != 0 ||
         host_site_check(&f.where, error) != 0 || open_image(&f) != 0) {
         return error->code;
     }
@@ -305,5 +308,6 @@ int host_flash(int argc, char **argv, struct host_error *error)
         host_site_close(&f.site);
     }
     host_image_close(&f.file);
+    host_flash_cut_finish();
     return status;
 }

@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "host/base/progress.h"
 #include "host/base/text.h"
 
 enum { LIST = 160, LINE = 600 };
@@ -32,21 +31,6 @@ void host_flash_show_begin(struct host_flash_show *show,
     }
 }
 
-void host_flash_show_end(const struct host_flash_show *show)
-{
-    (void)show;
-    host_progress_end();
-}
-
-/* "node 3", "nodes 4-7" */
-static void name_nodes(const struct host_node_set *set, char *text, size_t size)
-{
-    char list[LIST];
-    host_node_set_print(set, list, sizeof list);
-    snprintf(text, size, "node%s %s", host_node_set_count(set) == 1 ? "" : "s",
-             list);
-}
-
 /* Of several nodes, what the one says that is farthest behind. */
 static void draw_row(const struct host_flash_show *s, unsigned row)
 {
@@ -65,7 +49,7 @@ static void draw_row(const struct host_flash_show *s, unsigned row)
     }
     bool moves =
         phase >= HOST_SPREAD_BEGINS && phase <= HOST_SPREAD_DONE && count > 0;
-    name_nodes(&set, head, sizeof head);
+    host_node_set_name(&set, head, sizeof head);
     snprintf(tail, sizeof tail, "%s", host_spread_phase_text(phase));
     host_progress_row(row, head, moves ? part / count : -1.0, tail);
 }
@@ -122,7 +106,7 @@ static const char *name_image(const struct host_flash_show *s, char text[LIST])
 
 static void say_each(const struct host_flash_show *s,
                      void (*say)(const struct host_flash_show *s, unsigned i,
-                                 char line[LINE]))
+                                 bool one, char line[LINE]))
 {
     struct host_node_set told = {{0}};
     for (unsigned k = 0; k < s->wanted; k++) {
@@ -135,23 +119,23 @@ static void say_each(const struct host_flash_show *s,
         for (unsigned b = 0; b < sizeof told.bits; b++) {
             told.bits[b] |= set.bits[b];
         }
-        say(s, i, line);
+        say(s, i, host_node_set_count(&set) == 1, line);
         if (line[0] != '\0') {
-            name_nodes(&set, nodes, sizeof nodes);
+            host_node_set_name(&set, nodes, sizeof nodes);
             host_say(stdout, "%s: %s\n", nodes, line);
         }
     }
     (void)fflush(stdout);
 }
 
-static void say_result(const struct host_flash_show *s, unsigned i,
+static void say_result(const struct host_flash_show *s, unsigned i, bool one,
                        char line[LINE])
 {
     const struct host_spread_node *n = node_of(s, i);
     char image[LIST];
     name_image(s, image);
     if (n->phase == HOST_SPREAD_DONE) {
-        snprintf(line, LINE, "runs %s", image);
+        snprintf(line, LINE, "%s %s", one ? "runs" : "run", image);
     } else if (n->phase == HOST_SPREAD_HAS) {
         snprintf(line, LINE, "had %s already", image);
     } else if (n->phase == HOST_SPREAD_PASSED) {
@@ -166,7 +150,7 @@ void host_flash_show_result(const struct host_flash_show *show)
     }
 }
 
-static void say_plan(const struct host_flash_show *s, unsigned i,
+static void say_plan(const struct host_flash_show *s, unsigned i, bool one,
                      char line[LINE])
 {
     const struct host_spread_node *n = node_of(s, i);
@@ -179,7 +163,7 @@ static void say_plan(const struct host_flash_show *s, unsigned i,
     } else if (n->phase == HOST_SPREAD_BEGINS) {
         snprintf(line, LINE, "would be given %s: it is in its loader", image);
     } else {
-        say_result(s, i, line);
+        say_result(s, i, one, line);
     }
 }
 

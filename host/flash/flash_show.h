@@ -7,11 +7,12 @@
  *
  *     host_flash_show_begin(&show, &spread, quiet);
  *     host_flash_show_draw(&show);
- *     host_flash_show_end(&show);
+ *     host_progress_end();
  */
 #ifndef HOST_FLASH_SHOW_H
 #define HOST_FLASH_SHOW_H
 
+#include "host/base/progress.h"
 #include "spread.h"
 
 struct host_flash_show {
@@ -22,15 +23,13 @@ struct host_flash_show {
     uint16_t node[CUBE_NODES_MAX]; /* who is wanted */
 };
 
+/* host_progress_end takes the rows away. */
 void host_flash_show_begin(struct host_flash_show *show,
                            const struct host_spread *spread, bool quiet);
 void host_flash_show_draw(const struct host_flash_show *show);
 
 /* A node has changed: a line, where there are no rows. */
 void host_flash_show_change(const struct host_flash_show *show, unsigned node);
-
-/* Takes the rows away. */
-void host_flash_show_end(const struct host_flash_show *show);
 
 /* Who is well, and with what; and what would be done with whom, which has been
  * looked at alone. */

@@ -3,12 +3,14 @@
 #include <stdalign.h>
 #include <string.h>
 
+#include "node/loader/messages.h"
 #include "transport/drivers/sign_sodium.h"
 
 int host_image_open(struct host_image *file, const char *path,
                     struct host_error *error)
 {
-    if (host_source_open(&file->source, path, false, error) != 0) {
+    if (host_source_open_bounded(&file->source, path, LOADER_IMAGE_MAX,
+                                 "an image", error) != 0) {
         return error->code;
     }
     size_t bytes = file->source.bytes;

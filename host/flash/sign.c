@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "host/base/options.h"
-#include "host/base/parse.h"
 #include "host/base/text.h"
 #include "host/files/output.h"
 #include "host/machines/boards.h"
@@ -24,8 +23,7 @@ enum {
     KEY_NUMBER,
     KEY_ADDRESS,
     KEY_NO_WAY_BACK,
-    ADDRESS = 0x10000, /* that boards' images are linked for */
-    BYTES_MAX = LOADER_BLOCKS_MAX * LOADER_BLOCK_BYTES
+    ADDRESS = 0x10000 /* that boards' images are linked for */
 };
 
 struct sign {
@@ -67,12 +65,11 @@ static void parse_value(struct sign *s, const char *option, const char *value,
     bool hex = strncmp(value, "0x", 2) == 0 && value[2] != '\0';
     unsigned long long all = hex ? strtoull(value, &end, 16) : 0;
     *given = true;
-    *number = all;
-    bool good = hex ? *end == '\0' && all <= UINT32_MAX
-                    : host_parse_number(value, 0, UINT32_MAX, number) == 0;
-    if (!good) {
-        host_fail(s->error, HOST_USAGE,
-                  "--%s %s: not a number; give 0 to 4294967295", option, value);
+    if (hex && *end == '\0' && all <= UINT32_MAX) {
+        *number = all;
+    } else {
+        (void)host_option_number(option, value, 0, UINT32_MAX, number,
+                                 s->error);
     }
 }
 
@@ -118,18 +115,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
         s->output = value;
         return 0;
     case ARGP_KEY_ARG:
-        if (s->path != NULL) {
-            host_fail(s->error, HOST_USAGE,
-                      "%s: one argument too many; give IMAGE alone", value);
-        }
-        s->path = value;
-        return 0;
     case ARGP_KEY_END:
-        if (s->path == NULL) {
-            host_fail(s->error, HOST_USAGE,
-                      "%s: no IMAGE is given; give its file, see --help",
-                      state->name);
-        }
+        (void)host_option_argument(key, "IMAGE", value, &s->path, s->error);
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -158,6 +145,34 @@ static int check_board(const struct sign *s)
 
 /* --- sign ----------------------------------------------------------------- */
 
+/* What is no image is a board's binary, if that is said; but neither of these:
+ * what was made of one would pass for an image, and come up on no board. */
+static int check_binary(const struct sign *s, const struct host_source *source)
+{
+    static const char elf[] = "\177ELF", image[] = "incodeI1";
+    if (s->board == NULL) {
+        return host_fail(s->error, HOST_USAGE,
+                         "%s: no image, or one with a damaged header; if it is "
+                         "a board's binary, say which with --board NAME",
+                         s->path);
+    }
+    if (source->bytes >= sizeof elf - 1 &&
+        memcmp(source->data, elf, sizeof elf - 1) == 0) {
+        return host_fail(s->error, HOST_INPUT,
+                         "%s: an ELF file; make a binary of it with: objcopy "
+                         "-O binary",
+                         s->path);
+    }
+    if (source->bytes >= sizeof image - 1 &&
+        memcmp(source->data, image, sizeof image - 1) == 0) {
+        return host_fail(s->error, HOST_INPUT,
+                         "%s: an image with a damaged header; copy or build it "
+                         "anew",
+                         s->path);
+    }
+    return 0;
+}
+
 /* What the image is to be, and where its code begins in the file. */
 static int describe(const struct sign *s, const struct host_source *source,
                     struct loader_image *image, size_t *code)
@@ -171,17 +186,14 @@ static int describe(const struct sign *s, const struct host_source *source,
                          "anew",
                          s->path);
     }
-    if (!old && s->board == NULL) {
-        return host_fail(s->error, HOST_USAGE,
-                         "%s: no image, or one with a damaged header; if it is "
-                         "a board's binary, say which with --board NAME",
-                         s->path);
+    if (!old && check_binary(s, source) != 0) {
+        return s->error->code;
     }
-    if (source->bytes - *code > BYTES_MAX - LOADER_HEADER_BYTES) {
+    if (source->bytes - *code > LOADER_IMAGE_MAX - LOADER_HEADER_BYTES) {
         return host_fail(s->error, HOST_INPUT,
                          "%s: %zu bytes, and a board takes %d; give a board's "
                          "binary",
-                         s->path, source->bytes, BYTES_MAX);
+                         s->path, source->bytes, LOADER_IMAGE_MAX);
     }
     if (!old) {
         *image = (struct loader_image){.bytes = (uint32_t)source->bytes,
@@ -280,7 +292,9 @@ int host_sign(int argc, char **argv, struct host_error *error)
     if (host_sign_key_read(&pair, s.key, error) != 0) {
         return error->code;
     }
-    int status = host_source_open(&source, s.path, false, error);
+    /* An ELF file is longer than its binary, and is told apart. */
+    int status = host_source_open_bounded(
+        &source, s.path, 16 * LOADER_IMAGE_MAX, "an image", error);
     if (status == 0) {
         status = make(&s, &source, &pair, header, &code);
         status = status == 0 ? write_image(&s, &source, header, code) : status;
@@ -307,8 +321,8 @@ static void print_image(const struct loader_image *image)
            (image->flags & LOADER_NO_WAY_BACK) != 0
                ? ": a board that has run it takes none with a lower one"
                : "");
-    printf("code       %u bytes, for address 0x%08x\n", image->bytes,
-           image->address);
+    printf("code       %u byte%s, for address 0x%08x\n", image->bytes,
+           host_text_s(image->bytes), image->address);
     print_hex("digest", image->digest, sizeof image->digest);
 }
 
@@ -328,12 +342,14 @@ static int judge(const struct sign *s, const struct host_image *file,
     if (fault == LOADER_GOOD || (fault == LOADER_UNSIGNED && s->key == NULL)) {
         return 0;
     }
-    const char *next =
-        fault == LOADER_WRONG_DIGEST || fault == LOADER_WRONG_SIGNATURE
-            ? "copy or build it anew"
-            : "sign it with: incode sign IMAGE --key FILE";
-    return host_fail(s->error, HOST_UNVERIFIED, "%s: %s; %s", s->path,
-                     loader_fault_text(fault), next);
+    if (fault == LOADER_WRONG_DIGEST || fault == LOADER_WRONG_SIGNATURE) {
+        return host_fail(s->error, HOST_UNVERIFIED,
+                         "%s: %s; copy or build it anew", s->path,
+                         loader_fault_text(fault));
+    }
+    return host_fail(s->error, HOST_UNVERIFIED,
+                     "%s: %s; sign it with: incode sign %s --key FILE", s->path,
+                     loader_fault_text(fault), s->path);
 }
 
 int host_image_show(int argc, char **argv, struct host_error *error)

@@ -105,15 +105,6 @@ int host_spread_look(struct host_spread *spread, struct host_error *error)
 
 /* --- steps ---------------------------------------------------------------- */
 
-/* "node 3", "nodes 3,7" */
-static void name_nodes(const struct host_node_set *set, char *text, size_t size)
-{
-    char list[HOST_SPREAD_TEXT];
-    host_node_set_print(set, list, sizeof list);
-    snprintf(text, size, "node%s %s", host_node_set_count(set) == 1 ? "" : "s",
-             list);
-}
-
 static void say(const struct host_spread *spread, const char *line)
 {
     if (spread->options.say != NULL) {
@@ -140,10 +131,10 @@ static void say_who_is_awaited(struct host_spread *spread)
     if (first == spread->visit->machine->nodes) {
         return;
     }
-    name_nodes(&set, nodes, sizeof nodes);
+    host_node_set_name(&set, nodes, sizeof nodes);
     const char *reason =
         host_visit_reason(spread->visit, first, why, sizeof why);
-    snprintf(line, sizeof line, "%s: %.*s; up to %llu s are waited", nodes,
+    snprintf(line, sizeof line, "%s: %.*s; waits for up to %llu s", nodes,
              (int)strcspn(reason, ";"), reason,
              (unsigned long long)(spread->options.patience_us / 1000000));
     say(spread, line);
@@ -266,7 +257,7 @@ int host_spread_result(struct host_spread *spread, struct host_error *error)
         if (code != 0) {
             say(spread, line);
         }
-        name_nodes(&set, nodes, sizeof nodes);
+        host_node_set_name(&set, nodes, sizeof nodes);
         snprintf(line, sizeof line, "%s: %s", nodes, spread->node[i].text);
         bool refused = spread->node[i].phase == HOST_SPREAD_REFUSED;
         code = refused && code != HOST_CUBE ? HOST_INPUT : HOST_CUBE;

@@ -47,7 +47,7 @@ struct host_spread_node {
     /* Private. */
     uint32_t start, starts;   /* this one, and so many were seen */
     bool left, booted, named; /* was told to */
-    bool begin_due, verify_told, said;
+    bool begin_due, said;
     uint32_t boot_start;            /* the start that was told to */
     uint32_t asks, replies, silent; /* of this start */
     uint32_t homeward;              /* times it was told to start its own */

@@ -34,9 +34,6 @@ bool spread_goes_home(const struct host_spread *spread, unsigned i);
 
 void spread_set(struct host_spread *spread, unsigned i,
                 enum host_spread_phase phase);
-__attribute__((format(printf, 4, 5))) void
-spread_end(struct host_spread *spread, unsigned i, enum host_spread_phase phase,
-           const char *format, ...);
 
 /* By what the visit knows of it; by what its loader says. */
 void spread_judge(struct host_spread *spread, unsigned i);

@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "host/base/text.h"
+
 static const uint8_t nothing[NODE_DIGEST_BYTES];
 
 bool spread_in_loader(const struct host_spread *spread, unsigned i)
@@ -43,8 +45,9 @@ void spread_set(struct host_spread *spread, unsigned i,
     }
 }
 
-void spread_end(struct host_spread *spread, unsigned i,
-                enum host_spread_phase phase, const char *format, ...)
+__attribute__((format(printf, 4, 5))) static void
+end(struct host_spread *spread, unsigned i, enum host_spread_phase phase,
+    const char *format, ...)
 {
     struct host_spread_node *n = &spread->node[i];
     va_list list;
@@ -67,13 +70,13 @@ static void refuse(struct host_spread *spread, unsigned i,
         [LOADER_UNSIGNED] = "sign it: incode sign IMAGE --key FILE",
         [LOADER_WRONG_KEY] = "sign it with the pair whose public half is in "
                              "the board's loader: incode sign IMAGE --key FILE",
-        [LOADER_WORN] = "flash again; if that does not help, the board's flash "
-                        "is worn"};
+        [LOADER_WORN] = "reset the board and flash again; if that does not "
+                        "help, its log says why its flash takes nothing"};
     const char *what = loader_fault_text(fault);
     bool known = (unsigned)fault < LOADER_FAULTS && next[fault] != NULL;
-    spread_end(spread, i, HOST_SPREAD_REFUSED, "refuses the image: %s; %s",
-               what == NULL ? "it does not say why" : what,
-               known ? next[fault] : "build or copy it anew");
+    end(spread, i, HOST_SPREAD_REFUSED, "refuses the image: %s; %s",
+        what == NULL ? "it does not say why" : what,
+        known ? next[fault] : "build or copy it anew");
 }
 
 /* --- by who it is --------------------------------------------------------- */
@@ -85,7 +88,7 @@ static void begin_anew(struct host_spread *spread, unsigned i)
     n->start = seen->starts;
     n->starts++;
     n->begin_due = true;
-    n->named = n->verify_told = n->said = false;
+    n->named = n->said = false;
     n->asks = n->replies = n->silent = 0;
     n->told_us = 0;
     n->moved_us = spread->arrived_us = spread->now_us;
@@ -100,8 +103,8 @@ static bool pass_over(struct host_spread *spread, unsigned i)
     if (known == NULL || strcmp(known, spread->image.board) == 0) {
         return false;
     }
-    spread_end(spread, i, HOST_SPREAD_PASSED, "is no %s but %s",
-               spread->image.board, known);
+    end(spread, i, HOST_SPREAD_PASSED, "is no %s but %s", spread->image.board,
+        known);
     return true;
 }
 
@@ -112,16 +115,16 @@ static void judge_program(struct host_spread *spread, unsigned i)
     bool same =
         memcmp(who->digest, spread->image.digest, sizeof who->digest) == 0;
     if (memcmp(who->loader, nothing, sizeof who->loader) == 0) {
-        spread_end(spread, i, HOST_SPREAD_REFUSED,
-                   "has no loader in it; copy its image to where the board "
-                   "starts from: boards/README.md says how");
+        end(spread, i, HOST_SPREAD_REFUSED,
+            "has no loader in it; copy its image to where the board "
+            "starts from: boards/README.md says how");
     } else if (same && n->booted) {
         spread_set(spread, i, HOST_SPREAD_DONE);
     } else if (same && !spread->options.again) {
         spread_set(spread, i, n->left ? HOST_SPREAD_DONE : HOST_SPREAD_HAS);
     } else if (n->booted && n->start != n->boot_start) {
-        spread_end(spread, i, HOST_SPREAD_FELL_BACK,
-                   "did not come up with the image, and went back to the old");
+        end(spread, i, HOST_SPREAD_FELL_BACK,
+            "did not come up with the image, and went back to the old");
     } else {
         spread_set(spread, i, HOST_SPREAD_LEAVES);
     }
@@ -131,8 +134,8 @@ static void judge_loader(struct host_spread *spread, unsigned i)
 {
     struct host_spread_node *n = &spread->node[i];
     if (n->booted && n->start != n->boot_start) {
-        spread_end(spread, i, HOST_SPREAD_FELL_BACK,
-                   "did not come up with the image, and waits in its loader");
+        end(spread, i, HOST_SPREAD_FELL_BACK,
+            "did not come up with the image, and waits in its loader");
     } else if (n->phase < HOST_SPREAD_BEGINS) {
         spread_set(spread, i, HOST_SPREAD_BEGINS);
     }
@@ -144,14 +147,14 @@ static void judge_kind(struct host_spread *spread, unsigned i)
     char board[NODE_BOARD_BYTES + 1] = "";
     memcpy(board, who->board, sizeof who->board);
     if (who->kind == NODE_KIND_PROCESS) {
-        spread_end(spread, i, HOST_SPREAD_REFUSED,
-                   "is a process of a system; incode deploy brings its program "
-                   "there, or leave it out with --nodes");
+        end(spread, i, HOST_SPREAD_REFUSED,
+            "is a process of a system; incode deploy brings its program "
+            "there, or leave it out with --nodes");
     } else if (strcmp(board, spread->image.board) != 0) {
-        spread_end(spread, i, HOST_SPREAD_REFUSED,
-                   "is no %s but %s; give an image for that, or leave it out "
-                   "with --nodes",
-                   spread->image.board, board);
+        end(spread, i, HOST_SPREAD_REFUSED,
+            "is no %s but %s; give an image for that, or leave it out "
+            "with --nodes",
+            spread->image.board, board);
     } else if (who->kind == NODE_KIND_PROGRAM) {
         judge_program(spread, i);
     } else {
@@ -196,14 +199,14 @@ void spread_judge(struct host_spread *spread, unsigned i)
         begin_anew(spread, i);
     }
     if (n->starts > HOST_SPREAD_STARTS_MAX) {
-        spread_end(spread, i, HOST_SPREAD_LOST,
-                   "restarts again and again; look at its console, and at its "
-                   "power");
+        end(spread, i, HOST_SPREAD_LOST,
+            "restarts again and again; look at its console, and at its "
+            "power");
     } else if (seen->who.protocol != NODE_PROTOCOL) {
-        spread_end(spread, i, HOST_SPREAD_REFUSED,
-                   "speaks another version, %u, than this program, %d; take "
-                   "the program of that version",
-                   seen->who.protocol, NODE_PROTOCOL);
+        end(spread, i, HOST_SPREAD_REFUSED,
+            "speaks another version, %u, than this program, %d; take "
+            "the program of that version",
+            seen->who.protocol, NODE_PROTOCOL);
     } else {
         judge_kind(spread, i);
     }
@@ -330,11 +333,11 @@ void spread_expire(struct host_spread *spread, unsigned i)
         break;
     default:
         snprintf(text, sizeof text,
-                 "its loader got no further than %u of %u blocks; flash again, "
-                 "it keeps what it has",
-                 n->held, spread->blocks);
+                 "its loader got no further than %u of %u block%s; flash "
+                 "again, it keeps what it has",
+                 n->held, spread->blocks, host_text_s(spread->blocks));
         reason = text;
         break;
     }
-    spread_end(spread, i, HOST_SPREAD_LOST, "%s", reason);
+    end(spread, i, HOST_SPREAD_LOST, "%s", reason);
 }

@@ -25,8 +25,8 @@ static int set(const struct host_lines *lines, const struct host_cube_pin *pin,
     return status == 0
                ? 0
                : host_fail(error, HOST_CUBE,
-                           "%s:%u: the %s line of node %u (%s): %s; is it "
-                           "there, and plugged in?",
+                           "%s:%u: the %s line of node %u (%s): %s; see "
+                           "that it is there, and plugged in",
                            lines->file->path, pin->line,
                            host_line_name(pin->kind), pin->node,
                            pin->wire < 0 ? pin->chip : device(lines, pin),

@@ -1,5 +1,6 @@
 #include "holder.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <pwd.h>
 #include <sodium.h>
@@ -109,14 +110,22 @@ bool host_holder_of(struct host_holder *holder, int file)
     return true;
 }
 
+/* One that takes no calls for so long that its queue is full has the wire, and
+ * nobody is told who it is. */
 bool host_holder_find(struct host_holder *holder, const char *wire)
 {
     struct sockaddr_un address;
     socklen_t size = host_holder_address(wire, &address);
     int file = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    bool found = file >= 0 &&
-                 connect(file, (const struct sockaddr *)&address, size) == 0 &&
-                 host_holder_of(holder, file) && holder->pid != getpid();
+    bool found = file >= 0;
+    if (found && connect(file, (const struct sockaddr *)&address, size) == 0) {
+        found = host_holder_of(holder, file) && holder->pid != getpid();
+    } else if (found) {
+        found = errno == EAGAIN;
+        memset(holder, 0, sizeof *holder);
+        snprintf(holder->command, sizeof holder->command,
+                 "a program that stands still");
+    }
     if (file >= 0) {
         close(file);
     }
@@ -134,7 +143,11 @@ const char *host_holder_text(const struct host_holder *holder, char *text,
         (void)strftime(since, sizeof since,
                        today ? ", since %H:%M" : ", since %Y-%m-%d %H:%M", &tm);
     }
-    snprintf(text, size, "%s, process %ld of %s%s", holder->command,
-             (long)holder->pid, holder->user, since);
+    if (holder->pid == 0) {
+        snprintf(text, size, "%s", holder->command);
+    } else {
+        snprintf(text, size, "%s, process %ld of %s%s", holder->command,
+                 (long)holder->pid, holder->user, since);
+    }
     return text;
 }

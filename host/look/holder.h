@@ -26,7 +26,7 @@ enum {
 };
 
 struct host_holder {
-    pid_t pid;
+    pid_t pid; /* 0: not known, it takes no calls */
     uid_t uid;
     char user[40];     /* its name, or number */
     char command[200]; /* line, printable, as much of it as fits */

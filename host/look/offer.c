@@ -9,8 +9,12 @@
 #include "node/version.h"
 
 enum {
-    TRY_US = 1000000,  /* between two tries for a place that another has */
-    STALL_US = 5000000 /* of one who does not read */
+    TRY_US = 1000000,   /* between two tries for a place that another has */
+    STALL_US = 5000000, /* of one who does not read */
+    /* Who only finds out who has the cube calls too, and hangs up: their calls
+     * are not to keep those out who look. */
+    QUEUE_MAX = 64,
+    CALLS_A_LOOK = 16
 };
 
 /* --- the place ------------------------------------------------------------ */
@@ -25,7 +29,7 @@ static void take_place(struct host_offer *o, uint64_t now_us)
         socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (o->listener >= 0 &&
         (bind(o->listener, (struct sockaddr *)&address, size) != 0 ||
-         listen(o->listener, HOST_LOOKERS_MAX) != 0)) {
+         listen(o->listener, QUEUE_MAX) != 0)) {
         close(o->listener);
         o->listener = -1;
     }
@@ -122,28 +126,29 @@ static void turn_away(int file, const char *why)
     close(file);
 }
 
-/* At most one a call. */
-static void welcome(struct host_offer *o, uint64_t now_us)
+/* False: nobody else calls. */
+static bool welcome(struct host_offer *o, uint64_t now_us)
 {
     int file = accept4(o->listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
     struct ucred peer;
     socklen_t size = sizeof peer;
     if (file < 0) {
-        return;
+        return false;
     }
     if (getsockopt(file, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 ||
         (peer.uid != geteuid() && peer.uid != 0)) {
         turn_away(file, "it is another user's; ask them");
-        return;
+        return true;
     }
     for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++) {
         if (o->looker[i].file < 0) {
             o->looker[i].file = file;
             tell(o, i, greeting(o), now_us);
-            return;
+            return true;
         }
     }
     turn_away(file, "four programs look on already; end one of them");
+    return true;
 }
 
 /* --- what they ask -------------------------------------------------------- */
@@ -216,8 +221,10 @@ static bool ask(void *context, uint64_t now_us,
     if (o->listener < 0 && now_us - o->tried_us > TRY_US) {
         take_place(o, now_us);
     }
-    if (o->listener >= 0) {
-        welcome(o, now_us);
+    for (unsigned k = 0; k < CALLS_A_LOOK && o->listener >= 0; k++) {
+        if (!welcome(o, now_us)) {
+            break;
+        }
     }
     for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++) {
         serve(o, i, now_us);
@@ -239,14 +246,9 @@ static bool ask(void *context, uint64_t now_us,
 static void answer(void *context, unsigned node, const uint8_t *data,
                    size_t size)
 {
-    static const char digits[] = "0123456789abcdef";
     struct host_offer *o = context;
     char key[12], hex[2 * CUBE_PAYLOAD_MAX + 1];
-    for (size_t i = 0; i < size; i++) {
-        hex[2 * i] = digits[data[i] >> 4];
-        hex[2 * i + 1] = digits[data[i] & 15];
-    }
-    hex[2 * size] = '\0';
+    (void)sodium_bin2hex(hex, sizeof hex, data, size);
     snprintf(key, sizeof key, "%u", node);
     (void)json_object_set_new(o->answers, key, json_string(hex));
 }

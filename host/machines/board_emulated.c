@@ -84,13 +84,14 @@ static int make_flash(struct board *board, bool named, bool empty,
                       struct host_error *error)
 {
     struct stat about;
+    bool card = board->emulator.bare->card;
     board->flash = named ? open(board->chip, O_RDWR | O_CREAT | O_CLOEXEC, 0600)
                          : memfd_create("flash", MFD_CLOEXEC);
     if (board->flash < 0 || fstat(board->flash, &about) != 0) {
         return named ? refuse_file(board->chip, error) : refuse("flash", error);
     }
     if (about.st_size != HOST_FLASH_BYTES &&
-        host_emulator_erase(board->flash) != 0) {
+        host_chip_make(board->flash, card) != 0) {
         if (!named) {
             return refuse("flash", error);
         }
@@ -99,9 +100,9 @@ static int make_flash(struct board *board, bool named, bool empty,
         return error->code;
     }
     board->emulator.flash.fd = board->flash;
-    return empty
-               ? 0
-               : host_chip_install(board->flash, board->emulator.image, error);
+    return empty ? 0
+                 : host_chip_install(board->flash, card, board->emulator.image,
+                                     error);
 }
 
 /* What UART 0 says where no frames go over it. */
@@ -174,7 +175,7 @@ static int make_board(struct cube *cube, const struct host_bare *bare,
     if (node != 0 && make_log(board, named, error) != 0) {
         return error->code;
     }
-    return bare->flash ? make_flash(board, named, options->empty, error) : 0;
+    return make_flash(board, named, options->empty, error);
 }
 
 static void close_boards(struct cube *cube)
@@ -366,7 +367,6 @@ static const struct host_bare an500 = {.machine = "mps2-an500",
                                        .image = "mps2-an500.img",
                                        .loader = "loader/mps2-an500.img",
                                        .uarts = 5,
-                                       .flash = true,
                                        .serial_baud = 115200,
                                        .pair = unix_file_pair};
 
@@ -383,7 +383,6 @@ static const struct host_bare an385 = {.machine = "mps2-an385",
                                        .image = "mps2-an385.img",
                                        .loader = "loader/mps2-an385.img",
                                        .uarts = 5,
-                                       .flash = true,
                                        .serial_baud = 115200,
                                        .pair = unix_file_pair};
 
@@ -400,7 +399,9 @@ static const struct host_bare raspi = {.machine = "raspi3b",
                                        .program = "qemu-system-aarch64",
                                        .package = "qemu-system-arm",
                                        .image = "raspi3b.img",
+                                       .loader = "loader/raspi3b.img",
                                        .uarts = 2,
+                                       .card = true,
                                        .serial_baud = 115200,
                                        .pair = tcp_pair};
 

@@ -32,7 +32,8 @@ static int read_node(struct host_cube_file *file, const config_setting_t *group,
     int node = -1;
     if (!config_setting_is_group(group)) {
         return host_cube_wrong(file, group, error,
-                               "nodes: not a list of groups in braces");
+                               "nodes: not a list of groups in braces; write "
+                               "nodes = ( { node = 0; .. }, .. );");
     }
     const config_setting_t *board = config_setting_get_member(group, "board");
     if (host_cube_check_names(file, group, names, error) != 0) {

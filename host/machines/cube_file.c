@@ -157,7 +157,9 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
         config_setting_t *group = config_setting_get_elem(links, i);
         if (!config_setting_is_group(group)) {
             return host_cube_wrong(file, links, error,
-                                   "links: not a list of groups in braces");
+                                   "links: not a list of groups in braces; "
+                                   "write links = ( { node = 0; to = "
+                                   "\"host\"; .. }, .. );");
         }
         if (host_cube_read_wire(file, group, error) != 0) {
             return error->code;

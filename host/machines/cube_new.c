@@ -12,6 +12,7 @@
 #include "cube_key.h"
 #include "host/base/options.h"
 #include "host/base/parse.h"
+#include "host/base/text.h"
 
 enum {
     KEY_NEW = 256,
@@ -77,11 +78,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         c->output = value;
         return 0;
     case ARGP_KEY_ARG:
-        if (c->file != NULL) {
-            host_fail(c->error, HOST_USAGE,
-                      "%s: one argument too many; give one FILE", value);
-        }
-        c->file = value;
+        (void)host_option_argument(key, "FILE", value, &c->file, c->error);
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -346,9 +343,9 @@ static int write_new(const struct cube_new *c)
         return host_fail(c->error, HOST_INPUT, "%s: %s; give another -o",
                          c->output, strerror(reason));
     }
-    printf("%s: %u nodes%s%s; edit what says EDIT, then: incode cube %s\n",
-           c->output, c->nodes, key[0] == '\0' ? "" : ", with the key ", key,
-           c->output);
+    printf("%s: %u node%s%s%s; edit what says EDIT, then: incode cube %s\n",
+           c->output, c->nodes, host_text_s(c->nodes),
+           key[0] == '\0' ? "" : ", with the key ", key, c->output);
     return 0;
 }
 

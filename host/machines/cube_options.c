@@ -123,10 +123,9 @@ static void print_bare(const struct host_cube_file *file, unsigned node)
     const struct host_board *board = file->board_of[node];
     char name[HOST_NODE_OPTION_BYTES];
     unsigned count;
-    printf("# node %u (%s): put its firmware on it, %s of make firmware%s; "
-           "UART 0: ",
-           node, board->name, board->bare->image,
-           board->bare->loader != NULL ? ", by incode flash" : "");
+    printf("# node %u (%s): put its firmware on it, %s of make firmware, by "
+           "incode flash; UART 0: ",
+           node, board->name, board->bare->image);
     for (unsigned k = 0; k < 2; k++) {
         const struct host_cube_wire *wire = host_cube_host_wire(file, k);
         if (wire != NULL && wire->node == node) {

@@ -9,6 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "boards.h"
+
 enum { ARGUMENTS_MAX = 64, ARGUMENT_BYTES = 2 * PATH_MAX + 128 };
 
 extern char **environ;
@@ -74,21 +76,24 @@ int host_emulator_find(const struct host_bare *bare,
         find_image(bare->image, emulator->image, error) != 0) {
         return error->code;
     }
-    return find_image(bare->loader == NULL ? bare->image : bare->loader,
-                      emulator->kernel, error);
+    return find_image(bare->loader, emulator->kernel, error);
 }
 
-int host_emulator_erase(int fd)
+bool host_firmware_find(const char *board, char path[PATH_MAX])
 {
-    static uint8_t erased[1 << 16];
-    memset(erased, 0xff, sizeof erased);
-    for (size_t at = 0; at < HOST_FLASH_BYTES; at += sizeof erased) {
-        if (pwrite(fd, erased, sizeof erased, (off_t)at) !=
-            (ssize_t)sizeof erased) {
-            return -1;
-        }
+    const struct host_board *row = host_board_named(board);
+    struct host_error error = {0};
+    char here[PATH_MAX];
+    if (row == NULL || row->bare == NULL ||
+        find_image(row->bare->image, path, &error) != 0 ||
+        getcwd(here, sizeof here) == NULL) {
+        return false;
     }
-    return 0;
+    size_t above = strlen(here);
+    if (strncmp(path, here, above) == 0 && path[above] == '/') {
+        memmove(path, path + above + 1, strlen(path + above + 1) + 1);
+    }
+    return true;
 }
 
 /* --- its start ------------------------------------------------------------ */
@@ -163,9 +168,13 @@ static void add_device(struct words *w, const char *name, unsigned number,
     }
 }
 
-static void add_flash(struct words *w, struct host_place flash)
+static void add_flash(struct words *w, struct host_place flash, bool card)
 {
-    if (is_given(flash)) {
+    if (is_given(flash) && card) {
+        add(w, "-drive");
+        add(w, "if=sd,format=raw");
+        add_file(w, "file", flash);
+    } else if (is_given(flash)) {
         strcat(w->text[w->count - 1], ",memory-backend=ram");
         add(w, "-object");
         add(w, "memory-backend-file,id=ram,share=on,size=%d", HOST_FLASH_BYTES);
@@ -204,7 +213,7 @@ void host_emulator_become(const struct host_emulator *emulator, unsigned turn)
     add(w, "%s", e->bare->program);
     add(w, "-M");
     add(w, "%s", e->bare->machine);
-    add_flash(w, e->flash);
+    add_flash(w, e->flash, e->bare->card);
     add(w, "-kernel");
     add(w, "%s", e->kernel);
     add(w, "-display");

@@ -35,9 +35,9 @@ struct host_bare {
     const char *program; /* QEMU for its processor, */
     const char *package; /* of the distribution */
     const char *image;   /* its firmware, a file's name, */
-    const char *loader;  /* and its loader's, which starts it; NULL: none */
+    const char *loader;  /* and its loader's, which starts it */
     unsigned uarts;
-    bool flash;              /* it has a chip */
+    bool card;               /* its flash is a memory card's, not a chip */
     uint32_t serial_baud;    /* that its firmware takes its wires for */
     int (*pair)(int fds[2]); /* of which a wire between two is made */
 };
@@ -52,8 +52,8 @@ struct host_place {
 struct host_emulator {
     const struct host_bare *bare;
     char program[PATH_MAX], image[PATH_MAX];
-    char kernel[PATH_MAX]; /* what it runs at first: the loader, or the image */
-    struct host_place flash; /* the chip's file, of HOST_FLASH_BYTES */
+    char kernel[PATH_MAX];   /* what it runs at first: the loader */
+    struct host_place flash; /* the chip's or card's file: HOST_FLASH_BYTES */
     /* What is at the other end of a UART: a connected socket, or a path at
      * which it listens; and the file that keeps what it sends. */
     struct {
@@ -74,8 +74,9 @@ int host_emulator_find(const struct host_bare *bare,
                        struct host_emulator *emulator,
                        struct host_error *error);
 
-/* A chip as it is sold, erased: 0, or -1 and errno. */
-int host_emulator_erase(int fd);
+/* The image that `make firmware` has made for a board, by the shortest name
+ * that it has from here; false: there is none. */
+bool host_firmware_find(const char *board, char path[PATH_MAX]);
 
 /* In the child: becomes the emulator.  turn: of the processors, by which one
  * is taken.  Returns where that fails, with errno. */

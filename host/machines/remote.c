@@ -12,6 +12,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/progress.h"
+#include "host/base/text.h"
 #include "transport/drivers/secure_sodium.h"
 #include "transport/drivers/unix_file.h"
 
@@ -98,6 +99,20 @@ int host_remote_program(const struct host_cube_file *file, const char *given,
                : host_cluster_program(given, board->program, path, size, error);
 }
 
+/* What stands for a file's name is such words already. */
+static void tell_where(const struct host_cube_file *file, char *where)
+{
+    static const char option[] = "--cube ";
+    enum { HEAD = sizeof option - 1 };
+    memcpy(where, option, sizeof option);
+    if (strncmp(file->path, "--", 2) == 0) {
+        snprintf(where, HOST_REMOTE_WHERE, "%s", file->path);
+    } else if (host_text_quote(where + HEAD, HOST_REMOTE_WHERE - HEAD,
+                               file->path) != 0) {
+        snprintf(where + HEAD, HOST_REMOTE_WHERE - HEAD, "FILE");
+    }
+}
+
 int host_remote_start(struct host_remote *remote,
                       const struct host_cube_file *file, const char *program,
                       struct host_error *error)
@@ -110,6 +125,7 @@ int host_remote_start(struct host_remote *remote,
     memset(remote, 0, sizeof *remote);
     remote->file = file;
     remote->program = program;
+    tell_where(file, remote->where);
     host_remote_wire(file, wire);
     host_offer_begin(&remote->offer, wire);
     int status = host_remote_free(file, 0, error);
@@ -173,7 +189,7 @@ void host_remote_wire(const struct host_cube_file *file,
 int host_remote_free(const struct host_cube_file *file, uint64_t wait_us,
                      struct host_error *error)
 {
-    char wire[HOST_WIRE_NAME], text[HOST_HOLDER_TEXT];
+    char wire[HOST_WIRE_NAME], text[HOST_HOLDER_TEXT], where[HOST_REMOTE_WHERE];
     struct host_holder holder;
     uint64_t begun_us = host_now_us();
     bool told = false;
@@ -182,10 +198,12 @@ int host_remote_free(const struct host_cube_file *file, uint64_t wait_us,
     while (name != NULL && host_holder_find(&holder, wire)) {
         (void)host_holder_text(&holder, text, sizeof text);
         if (host_now_us() - begun_us >= wait_us) {
+            tell_where(file, where);
             return host_fail(error, HOST_CUBE,
                              "%s: in use by %s; wait until it has ended, or "
-                             "end it; incode console looks on meanwhile",
-                             name + 1, text);
+                             "end it; look on meanwhile with: incode console "
+                             "%s",
+                             name + 1, text, where);
         }
         if (!told) {
             host_note("%s: in use by %s; waits for its end, %llu s at most",
@@ -274,7 +292,7 @@ static int port_to(const struct host_remote *r, unsigned node)
 
 static const char *machine_doubt(void *context, unsigned node)
 {
-    static char text[120];
+    static char text[TCP_PATH_MAX + 160];
     const struct host_remote *r = context;
     int port = port_to(r, node);
     if (port < 0) {
@@ -289,6 +307,17 @@ static const char *machine_doubt(void *context, unsigned node)
     if (r->console[port].faults > 0) {
         snprintf(text, sizeof text, "its console says: %.100s",
                  r->console[port].fault);
+        return text;
+    }
+    const struct host_cube_wire *wire =
+        host_cube_host_wire(r->file, (unsigned)port);
+    const char *path = tcp_address_path(&wire->via);
+    if (fault == EACCES && path != NULL) {
+        snprintf(text, sizeof text,
+                 "no permission to use the socket %s; let this user write to "
+                 "it, and enter its folders, or be the user who started the "
+                 "node",
+                 path);
         return text;
     }
     snprintf(text, sizeof text, "%s", fault == 0 ? "" : strerror(fault));
@@ -389,6 +418,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
     }
     machine.restarts = all_here ? machine_restarts : NULL;
     machine.kill = machine_kill;
+    machine.where = remote->where;
     machine.keyed = remote->file->has_key;
     machine.doubt = machine_doubt;
     machine.start_line = machine_start_line;

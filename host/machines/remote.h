@@ -20,6 +20,8 @@
 
 enum { HOST_ABSENT_MIN_S = 3 };
 
+enum { HOST_REMOTE_WHERE = 1024 };
+
 struct host_remote {
     const struct host_cube_file *file;
     const char *program;
@@ -29,7 +31,8 @@ struct host_remote {
     struct secure_ends ends[HOST_PORTS_MAX];     /* of their wires */
     struct host_process process[HOST_NODES_MAX]; /* of those started here */
     unsigned restarts;
-    struct host_offer offer; /* of a look at it */
+    struct host_offer offer;       /* of a look at it */
+    char where[HOST_REMOTE_WHERE]; /* "--cube FILE" */
 };
 
 /* What the first node of those that the host starts runs on; NULL: there is

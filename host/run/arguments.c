@@ -162,19 +162,6 @@ static const char *face_rule_name(unsigned i)
     return host_face_rules[i];
 }
 
-static int number(struct host_arguments *p, const char *option,
-                  const char *value, uint64_t lo, uint64_t hi, uint64_t *result)
-{
-    if (host_parse_number(value, lo, hi, result) != 0) {
-        return host_fail(p->error, HOST_USAGE,
-                         "--%s %s: not a number that is allowed; give %llu to "
-                         "%llu",
-                         option, value, (unsigned long long)lo,
-                         (unsigned long long)hi);
-    }
-    return 0;
-}
-
 static void parse_memory(struct host_arguments *p, const char *value)
 {
     uint64_t *bytes = &p->options->memory;
@@ -255,7 +242,8 @@ static bool parse_sharing(int key, const char *value, struct host_arguments *p)
     if (i < 0 || i >= (int)(sizeof row / sizeof row[0])) {
         return false;
     }
-    (void)number(p, row[i].name, value, row[i].min, row[i].max, &n);
+    (void)host_option_number(row[i].name, value, row[i].min, row[i].max, &n,
+                             p->error);
     *row[i].into = (unsigned)n;
     return true;
 }
@@ -266,36 +254,42 @@ static bool parse_testing(int key, const char *value, struct host_arguments *p)
     uint64_t n = 0;
     switch (key) {
     case KEY_WINDOW:
-        (void)number(p, "window", value, 1, LINK_WINDOW_MAX, &n);
+        (void)host_option_number("window", value, 1, LINK_WINDOW_MAX, &n,
+                                 p->error);
         o->window = (unsigned)n;
         return true;
     case KEY_SHUFFLE_SEED:
-        (void)number(p, "shuffle-seed", value, 0, UINT64_MAX, &o->shuffle_seed);
+        (void)host_option_number("shuffle-seed", value, 0, UINT64_MAX,
+                                 &o->shuffle_seed, p->error);
         return true;
     case KEY_HOST_STALL:
-        (void)number(p, "host-stall", value, 0, 60000, &n);
+        (void)host_option_number("host-stall", value, 0, 60000, &n, p->error);
         o->throttle.stall_us_max = 1000 * n;
         return true;
     case KEY_HOST_RATE:
-        (void)number(p, "host-rate", value, 1, 1000000000,
-                     &o->throttle.bytes_a_second);
+        (void)host_option_number("host-rate", value, 1, 1000000000,
+                                 &o->throttle.bytes_a_second, p->error);
         return true;
     case KEY_HOST_RATE_TIME:
-        (void)number(p, "host-rate-time", value, 0, 86400, &n);
+        (void)host_option_number("host-rate-time", value, 0, 86400, &n,
+                                 p->error);
         o->throttle.slow_us = 1000000 * n;
         return true;
     case KEY_HOST_UNPLUG:
-        (void)number(p, "host-unplug", value, 50, 86400000, &n);
+        (void)host_option_number("host-unplug", value, 50, 86400000, &n,
+                                 p->error);
         o->unplug_us = 1000 * n;
         return true;
     case KEY_BOARD_RESET:
     case KEY_BOARD_STOP:
     case KEY_BOARD_KILL:
-        (void)number(p, "board-reset, -stop, -kill", value, 10, 86400000, &n);
+        (void)host_option_number("board-reset, -stop, -kill", value, 10,
+                                 86400000, &n, p->error);
         o->trouble.every_us[key - KEY_BOARD_RESET] = 1000 * n;
         return true;
     case KEY_SEED:
-        (void)number(p, "seed", value, 0, UINT64_MAX, &o->throttle.seed);
+        (void)host_option_number("seed", value, 0, UINT64_MAX,
+                                 &o->throttle.seed, p->error);
         return true;
     case KEY_NODE_PROGRAM:
         o->node_program = value;
@@ -371,7 +365,8 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         parse_memory(p, value);
         return 0;
     case KEY_PATIENCE:
-        (void)number(p, "patience", value, 1, 86400, &p->options->patience_s);
+        (void)host_option_number("patience", value, 1, 86400,
+                                 &p->options->patience_s, p->error);
         return 0;
     case KEY_FORMAT:
         p->options->format = value;

@@ -16,6 +16,7 @@
 #include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/base/progress.h"
+#include "host/base/text.h"
 #include "host/files/output.h"
 #include "host/machines/board_emulated.h"
 #include "transport/drivers/tcp_address.h"
@@ -158,12 +159,6 @@ static int check(const struct emulate *e)
                          "--nodes %u: %s has UARTs for a cube of %u; give %u "
                          "or fewer",
                          e->nodes, e->board->name, most, most);
-    }
-    if (e->empty && !e->board->bare->flash) {
-        return host_fail(e->error, HOST_USAGE,
-                         "--empty: %s has no flash, and is given its image at "
-                         "each start; leave it out",
-                         e->board->name);
     }
     if ((e->linux_nodes & ~all) != 0 || e->linux_nodes == all) {
         return host_fail(e->error, HOST_USAGE,
@@ -371,6 +366,25 @@ static int keep(const struct emulate *e, struct host_machine *machine)
     return status;
 }
 
+/* The commands that go on from here. */
+static void say_next(const struct emulate *e)
+{
+    char image[PATH_MAX], from[PATH_MAX], file[PATH_MAX];
+    bool known = host_firmware_find(e->board->name, image) &&
+                 host_text_quote(from, sizeof from, image) == 0;
+    if (host_text_quote(file, sizeof file, e->file) != 0) {
+        snprintf(file, sizeof file, "FILE");
+    }
+    printf("%u node%s of %s: ", e->nodes, host_text_s(e->nodes),
+           e->board->name);
+    if (e->empty) {
+        printf("incode flash --cube %s %s; then ", file,
+               known ? from : "IMAGE");
+    }
+    printf("incode run POINTS --cube %s\n", file);
+    (void)fflush(stdout);
+}
+
 int host_emulate(int argc, char **argv, struct host_error *error)
 {
     static const struct argp argp = {
@@ -404,12 +418,7 @@ int host_emulate(int argc, char **argv, struct host_error *error)
     int status = write_file(&e);
     expect_end();
     if (status == 0) {
-        printf("%u nodes of %s: ", e.nodes, e.board->name);
-        if (e.empty) {
-            printf("incode flash IMAGE --cube %s; then ", e.file);
-        }
-        printf("incode run POINTS --cube %s\n", e.file);
-        (void)fflush(stdout);
+        say_next(&e);
         status = keep(&e, machine);
         (void)unlink(e.file);
     }

@@ -174,7 +174,8 @@ static int fail(const struct host_service *s, struct host_error *error)
         snprintf(next, sizeof next, "%s%s",
                  known ? "look after that node and its wires"
                  : m->start_line != NULL
-                     ? "start those that are missing, incode cube prints how"
+                     ? "start those that are missing, incode cube FILE prints "
+                       "how"
                      : "is the node's program of this version, and the machine "
                        "not too busy?",
                  m->keyed && !known ? ", with the same key file" : "");

@@ -12,6 +12,22 @@ enum {
     WIRE_US = 1200000
 };
 
+/* What may be on the way before an answer: a window each way of the slowest
+ * wire, 10 bits a byte. */
+static uint64_t wire_us(const struct host_service *s)
+{
+    enum { WINDOWS_BITS = 10 * 2 * 8192 };
+    uint32_t baud = s->machine->serial_baud;
+    return baud == 0 ? 0 : UINT64_C(1000000) * WINDOWS_BITS / baud;
+}
+
+/* For how long a node may be silent before anybody is told. */
+static uint64_t doubt_us(const struct host_service *s)
+{
+    uint64_t us = DOUBT_US + wire_us(s);
+    return s->machine->slow && us < SLOW_US ? SLOW_US : us;
+}
+
 static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
 {
     uint64_t frames =
@@ -25,7 +41,7 @@ static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
 static bool is_heard(const struct host_service *s, unsigned i)
 {
     return !s->work.lost[i] && s->report[i].up && !s->node[i].doubted &&
-           s->node[i].silent_us < DOUBT_US / 2;
+           s->node[i].silent_us < (DOUBT_US + wire_us(s)) / 2;
 }
 
 /* How many say that the node is silent, and have not said since that it is not;
@@ -36,8 +52,9 @@ static unsigned witnesses(const struct host_service *s, unsigned i,
     unsigned silent = 0;
     *others = 0;
     if (i == cube_wiring(s->cube)->gateway) {
-        silent += s->wire_quiet_us > WIRE_US;
-        *others += s->wire_quiet_us <= WIRE_US;
+        uint64_t limit = WIRE_US + wire_us(s);
+        silent += s->wire_quiet_us > limit;
+        *others += s->wire_quiet_us <= limit;
     }
     for (unsigned d = 0; d < s->machine->dimension; d++) {
         unsigned other = i ^ 1u << d;
@@ -90,7 +107,7 @@ static void look_at_links(struct host_service *s, unsigned i,
         bool both = is_heard(s, i) && is_heard(s, i ^ 1u << d);
         wires &= both ? ~(uint32_t)0 : ~(1u << d);
     }
-    uint64_t limit = s->machine->slow ? SLOW_US : WIRE_US / 2;
+    uint64_t limit = s->machine->slow ? SLOW_US : WIRE_US / 2 + wire_us(s);
     wires &= (1u << s->machine->dimension) - 1;
     node->wires_us = wires != 0 ? node->wires_us + elapsed_us : 0;
     for (unsigned d = 0; wires >> d != 0 && node->wires_us > limit; d++) {
@@ -106,7 +123,7 @@ void host_doubts_check(struct host_service *service, uint64_t elapsed_us)
     unsigned others;
     look_at_wire(s, elapsed_us);
     for (unsigned i = 0; i < s->machine->nodes && s->started; i++) {
-        uint64_t limit = s->machine->slow ? SLOW_US : DOUBT_US;
+        uint64_t limit = doubt_us(s);
         limit = s->patience_us / 2 < limit ? s->patience_us / 2 : limit;
         if (s->work.lost[i] || s->node[i].doubted) {
             continue;

@@ -15,6 +15,7 @@ void host_faults_begin(struct host_service *service)
 static const char *advice(const char *text)
 {
     static const char *const known[][2] = {
+        {"takes no record", "mend that, then reset the board"},
         {"memory", "give the nodes more memory"},
         {"protocol version", "run the same version of the program everywhere"},
         {"role", "run the same version of the program everywhere"}};
@@ -29,13 +30,16 @@ static const char *advice(const char *text)
 static int fail(const struct host_service *s, struct host_error *error)
 {
     const char *next = advice(s->fault.text);
-    if (next == NULL) { /* a loader says itself what to do about it */
-        next = strstr(s->fault.text, "boot loader") != NULL
-                   ? "then run again"
-                   : "please report this with the points";
+    if (strstr(s->fault.text, "no program is running") != NULL) {
+        return host_fail(error, HOST_CUBE,
+                         "node %u: %s; bring one with: incode flash %s IMAGE, "
+                         "where make firmware has made IMAGE, "
+                         "build/firmware/BOARD.img",
+                         s->fault.node, s->fault.text, host_where(s->machine));
     }
-    return host_fail(error, HOST_CUBE, "node %u: %s; %s", s->fault.node,
-                     s->fault.text, next);
+    return host_fail(
+        error, HOST_CUBE, "node %u: %s; %s", s->fault.node, s->fault.text,
+        next != NULL ? next : "please report this with the points");
 }
 
 int host_faults_take(struct host_service *service,

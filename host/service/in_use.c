@@ -47,7 +47,8 @@ int host_in_use_fail(const struct host_machine *machine, unsigned node,
                            node, machine->dimension)
                : host_fail(error, HOST_CUBE,
                            "node %u link %u: the cube is in use by %s; wait "
-                           "until it has ended, or end it; incode console "
-                           "looks on meanwhile",
-                           node, machine->dimension, holder);
+                           "until it has ended, or end it; look on meanwhile "
+                           "with: incode console %s",
+                           node, machine->dimension, holder,
+                           host_where(machine));
 }

@@ -62,6 +62,9 @@ struct host_machine {
     /* Ends a node that does not answer, for `check` to start it again; false,
      * as where it is NULL: the node is not this machine's to start. */
     bool (*kill)(void *context, unsigned node);
+    /* How a command for this cube names it, quoted for a shell, as in "--cube
+     * lab.cube"; NULL: no command can.  host_where tells it. */
+    const char *where;
     bool keyed; /* the nodes must have the host's key */
     /* Why a node is not heard, as "WHAT" or "WHAT; WHAT TO DO NEXT"; NULL, or
      * the result: nothing is known of it.  Until the next call. */
@@ -82,6 +85,12 @@ struct host_machine {
     /* Ends what still runs and was started here. */
     void (*stop)(void *context);
 };
+
+/* For advice: the command's own words, or what they look like. */
+static inline const char *host_where(const struct host_machine *machine)
+{
+    return machine->where == NULL ? "--cube FILE" : machine->where;
+}
 
 /* The link by which a node is reached from the gateway, the last of e-cube's
  * way; of the gateway, the host's wire. */

@@ -56,10 +56,8 @@ static error_t parse_sim_option(int key, char *value, struct argp_state *state)
                   "%s: sim takes options alone; see incode sim --help", value);
         return 0;
     case KEY_SEED:
-        if (host_parse_number(value, 0, UINT64_MAX, &n) != 0) {
-            host_fail(p->error, HOST_USAGE,
-                      "--seed %s: not a number; give 0 or more", value);
-        } else {
+        if (host_option_number("seed", value, 0, UINT64_MAX, &n, p->error) ==
+            0) {
             add_range(p, n, n);
         }
         return 0;
@@ -67,11 +65,8 @@ static error_t parse_sim_option(int key, char *value, struct argp_state *state)
         parse_seeds(p, value);
         return 0;
     case KEY_SECONDS:
-        if (host_parse_number(value, 1, 1000000, &p->options->seconds_max) !=
-            0) {
-            host_fail(p->error, HOST_USAGE,
-                      "--seconds %s: not a number; give 1 or more", value);
-        }
+        (void)host_option_number("seconds", value, 1, 1000000,
+                                 &p->options->seconds_max, p->error);
         return 0;
     case KEY_NODES:
         (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",

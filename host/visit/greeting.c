@@ -34,19 +34,15 @@ static void make_question(struct listener *l, bool first_hello)
 static void take_frame(struct listener *l, const uint8_t *bytes, size_t size)
 {
     struct host_greeting *g = l->greeting;
-    struct frame_reader reader;
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
-    if (frame_open(&reader, bytes, size, &header) != FRAME_GOOD ||
-        header.size > sizeof hello ||
-        frame_take(&reader, &header, hello) != FRAME_GOOD) {
+    if (!frame_decode(bytes, size, &header, hello, sizeof hello)) {
         return;
     }
     g->learns = g->learns || (header.kind == LINK_ACK && header.session == 0);
     if (header.kind == LINK_HELLO && header.size == sizeof hello &&
         hello[7] != 0) {
         g->found = true;
-        g->version = hello[0];
         g->port = hello[1];
         g->node = bytes_get16(hello + 2);
         g->peer_node = bytes_get16(hello + 4);

@@ -21,7 +21,6 @@ struct host_greeting {
     uint8_t port;
     uint16_t peer_node; /* whom it expects here */
     uint8_t dimension;
-    uint8_t version;        /* of the protocol */
     uint16_t frame_payload; /* bytes */
 };
 

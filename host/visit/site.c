@@ -9,6 +9,7 @@
 #include "greeting.h"
 #include "host/base/parse.h"
 #include "host/base/progress.h"
+#include "host/base/text.h"
 #include "host/machines/resolve.h"
 #include "transport/drivers/key_file.h"
 #include "transport/secure_wipe.h"
@@ -57,17 +58,8 @@ void host_site_table(struct argp_option rows[HOST_OPTIONS_MAX],
     memset(&rows[count], 0, sizeof rows[count]);
 }
 
-static void take_number(uint64_t *number, const char *name, const char *value,
-                        uint64_t least, uint64_t most, struct host_error *error)
-{
-    if (host_parse_number(value, least, most, number) != 0) {
-        host_fail(error, HOST_USAGE, "--%s %s: give %llu to %llu", name, value,
-                  (unsigned long long)least, (unsigned long long)most);
-    }
-}
-
-int host_site_option(struct host_site_options *options, int key, char *value,
-                     struct host_error *error)
+error_t host_site_option(struct host_site_options *options, int key,
+                         char *value, struct host_error *error)
 {
     switch (key) {
     case KEY_CUBE:
@@ -87,7 +79,8 @@ int host_site_option(struct host_site_options *options, int key, char *value,
                                &options->nodes, error);
         return 0;
     case KEY_BAUD:
-        take_number(&options->baud, "baud", value, 300, 4000000, error);
+        (void)host_option_number("baud", value, 300, 4000000, &options->baud,
+                                 error);
         return 0;
     case KEY_KEY:
         options->key = value;
@@ -135,6 +128,48 @@ int host_site_check(const struct host_site_options *options,
         }
     }
     return 0;
+}
+
+/* " NAME VALUE", or false: it does not fit. */
+static bool put_word(char *text, size_t size, const char *name,
+                     const char *value)
+{
+    size_t used = strlen(text);
+    int head = snprintf(text + used, size - used, "%s--%s%s",
+                        used == 0 ? "" : " ", name, value == NULL ? "" : " ");
+    used += (size_t)head;
+    return used < size &&
+           (value == NULL ||
+            host_text_quote(text + used, size - used, value) == 0);
+}
+
+void host_site_text(const struct host_site_options *options, char *text,
+                    size_t size)
+{
+    const struct host_site_options *o = options;
+    char nodes[24], baud[24];
+    snprintf(nodes, sizeof nodes, "%u", o->nodes);
+    snprintf(baud, sizeof baud, "%llu", (unsigned long long)o->baud);
+    const struct {
+        bool given;
+        const char *name, *value;
+    } words[] = {{o->cube != NULL, "cube", o->cube},
+                 {o->port != NULL, "port", o->port},
+                 {o->tcp != NULL, "tcp", o->tcp},
+                 {o->unix_path != NULL, "unix", o->unix_path},
+                 {o->nodes != 0, "cube-nodes", nodes},
+                 {o->baud != 0, "baud", baud},
+                 {o->key != NULL, "key", o->key},
+                 {o->insecure, "insecure", NULL}};
+    bool fits = true;
+    text[0] = '\0';
+    for (size_t i = 0; fits && i < sizeof words / sizeof words[0]; i++) {
+        fits = !words[i].given ||
+               put_word(text, size, words[i].name, words[i].value);
+    }
+    if (!fits) {
+        snprintf(text, size, "--cube FILE");
+    }
 }
 
 /* --- a wire instead of a file --------------------------------------------- */
@@ -221,6 +256,28 @@ static int make_file(struct host_site *site, const struct host_site_options *o,
     }
     wire->at = wire->via;
     return o->key == NULL ? 0 : read_key(file, o->key, error);
+}
+
+static void pass_over(const char *text)
+{
+    (void)text;
+}
+
+/* What it notes is noted when it is opened. */
+int host_site_read(const struct host_site_options *options,
+                   struct host_error *error)
+{
+    static struct host_cube_file file;
+    memset(&file, 0, sizeof file);
+    host_note_to(pass_over);
+    if (options->cube != NULL) {
+        (void)host_cube_file_read(&file, options->cube, error);
+    } else if (options->key != NULL) {
+        (void)read_key(&file, options->key, error);
+    }
+    host_note_to(NULL);
+    host_cube_file_free(&file);
+    return error->code;
 }
 
 static void set_nodes(struct host_cube_file *file, unsigned dimension)
@@ -339,9 +396,11 @@ int host_site_open(struct host_site *site,
     memset(site, 0, sizeof *site);
     int status = host_site_check(options, error);
     if (status == 0) {
+        host_site_text(options, site->where, sizeof site->where);
         status = options->cube != NULL ? open_file(site, options, error)
                                        : open_wire(site, options, error);
     }
+    site->machine.where = site->where;
     if (status != 0) {
         host_cube_file_free(&site->file);
     }

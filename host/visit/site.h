@@ -30,7 +30,8 @@ struct host_site_options {
 struct host_site {
     char program[4096]; /* of nodes that are started here */
     char path[240];     /* what stands for a file's name, where there is none */
-    struct host_cube_file file; /* or what stands for one */
+    char where[HOST_REMOTE_WHERE]; /* the machine's */
+    struct host_cube_file file;    /* or what stands for one */
     struct host_remote remote;
     struct host_machine machine;
 };
@@ -40,12 +41,23 @@ struct host_site {
  * *error where its value is wrong. */
 void host_site_table(struct argp_option rows[HOST_OPTIONS_MAX],
                      const struct argp_option *own);
-int host_site_option(struct host_site_options *options, int key, char *value,
-                     struct host_error *error);
+error_t host_site_option(struct host_site_options *options, int key,
+                         char *value, struct host_error *error);
+
+/* The words of a command that name the same place, quoted for a shell, as in
+ * "--port /dev/ttyUSB0 --baud 9600".  Where they do not fit: what to put there.
+ */
+void host_site_text(const struct host_site_options *options, char *text,
+                    size_t size);
 
 /* Whether one place is named, and what it needs: HOST_USAGE if not. */
 int host_site_check(const struct host_site_options *options,
                     struct host_error *error);
+
+/* Reads the cube file, or the key of --tcp, and forgets it again: HOST_INPUT if
+ * that cannot be read, for who opens the wires later. */
+int host_site_read(const struct host_site_options *options,
+                   struct host_error *error);
 
 /* Opens the wires; waits for node 0's greeting where it tells the dimension, 3
  * s at most.  Nodes that the file lists under `start` are started. */

@@ -208,7 +208,7 @@ static void take_message(struct host_visit *v,
 
 /* --- what they are asked -------------------------------------------------- */
 
-/* Both have to be told of each other before one can be late. */
+/* What is wanted `now`, or has been asked and is `still` open for too long. */
 static bool is_due(bool now, bool still, uint64_t asked_us, uint64_t again_us,
                    uint64_t now_us)
 {
@@ -268,7 +268,6 @@ static unsigned serve(struct host_visit *v, unsigned i)
         write_question(v, i, v->tag, v->what, v->target)) {
         node->question_due = false;
         node->question_us = v->now_us;
-        node->asked_us = (uint32_t)v->now_us;
         sent++;
     }
     struct node_question_message theirs;
@@ -429,11 +428,6 @@ int host_visit_restart(struct host_visit *visit,
         }
     }
     return host_visit_round(v, 0, error); /* it is on its way */
-}
-
-bool host_visit_reaches(const struct host_visit *visit, unsigned node)
-{
-    return cube_reaches(visit->cube, (uint16_t)node);
 }
 
 /* --- leaving -------------------------------------------------------------- */

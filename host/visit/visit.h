@@ -37,8 +37,8 @@ struct host_visit_node {
     /* The last answer to host_visit_ask. */
     bool answered;
     size_t size;
-    uint8_t *answer;           /* HOST_VISIT_ANSWER_BYTES */
-    uint32_t asked_us, rtt_us; /* of that answer, from here and back */
+    uint8_t *answer; /* HOST_VISIT_ANSWER_BYTES */
+    uint32_t rtt_us; /* of that answer, from here and back */
     /* Private. */
     uint32_t start;                 /* its epoch; 0: not heard of */
     uint32_t received;              /* counted messages of this generation */
@@ -90,7 +90,8 @@ int host_visit_open(struct host_visit *visit, struct host_machine *machine,
 int host_visit_round(struct host_visit *visit, uint64_t wait_us,
                      struct host_error *error);
 
-/* Until all of the set are there, or wait_us have passed: 0 in both cases. */
+/* Until all of the set are there, or wait_us have passed: 0 in both cases.  The
+ * time does not count while another host has the cube, which may have ended. */
 int host_visit_wait(struct host_visit *visit, const struct host_node_set *set,
                     uint64_t wait_us, struct host_error *error);
 
@@ -120,9 +121,6 @@ bool host_visit_send(struct host_visit *visit, uint16_t dest, uint8_t type,
 int host_visit_restart(struct host_visit *visit,
                        const struct host_node_set *set, enum node_restart what,
                        struct host_error *error);
-
-/* Whether live wires lead to it, as far as that is known. */
-bool host_visit_reaches(const struct host_visit *visit, unsigned node);
 
 /* Why a node is not there, and what to do next: "WHAT; NEXT". */
 const char *host_visit_reason(const struct host_visit *visit, unsigned node,

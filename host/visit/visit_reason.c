@@ -106,8 +106,9 @@ const char *host_visit_reason(const struct host_visit *visit, unsigned node,
                            "and at its wires");
     } else {
         snprintf(text, size,
-                 NO_ANSWER "; is it on, with its program, and wired as it "
-                           "should be?");
+                 NO_ANSWER
+                 "; look whether it is on, with its program, and wired "
+                 "as it should be");
     }
     return text;
 }

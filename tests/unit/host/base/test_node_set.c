@@ -99,10 +99,23 @@ static void test_cut(void **unused)
     assert_string_equal(text, "");
 }
 
+static void test_named(void **unused)
+{
+    (void)unused;
+    struct host_node_set set = {{0}};
+    char text[24];
+    host_node_set_add(&set, 3);
+    host_node_set_name(&set, text, sizeof text);
+    assert_string_equal(text, "node 3");
+    host_node_set_add(&set, 4);
+    host_node_set_name(&set, text, sizeof text);
+    assert_string_equal(text, "nodes 3-4");
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_written),
-                                       cmocka_unit_test(test_refused),
-                                       cmocka_unit_test(test_cut)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_written), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_cut), cmocka_unit_test(test_named)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,7 +13,7 @@
 enum { WORDS_MAX = 6 };
 
 struct seen {
-    unsigned quiet, words;
+    unsigned quiet, words, dry;
     char seed[8], window[8];
 };
 
@@ -26,6 +26,9 @@ static error_t take(int key, char *value, struct argp_state *state)
         return 0;
     case 's':
         snprintf(seen->seed, sizeof seen->seed, "%s", value);
+        return 0;
+    case 'd':
+        seen->dry += value == NULL ? 1 : 10;
         return 0;
     case 300:
         snprintf(seen->window, sizeof seen->window, "%s", value);
@@ -44,6 +47,7 @@ static const struct argp_option options[] = {
     {"sieve", 302, "S", 0, "another, which begins alike", 1},
     {"window", 300, "N", 0, "no letter", 1},
     {"windows", 301, NULL, 0, "begins like another", 2},
+    {"dry", 'd', "D", OPTION_ARG_OPTIONAL, "a value, or none", 2},
     {"quiet", 'q', NULL, 0, "no value, and the last letter", 2},
     {0}};
 static const struct argp argp = {options, take, "", "", NULL, NULL, NULL};
@@ -78,6 +82,22 @@ static void test_taken(void **unused)
     assert_string_equal(seen.window, "9");
     assert_int_equal(parse(dashes, &seen, &error), 0);
     assert_int_equal(seen.words, 1);
+}
+
+/* Its value is in the same word; the next one is for itself. */
+static void test_optional(void **unused)
+{
+    struct seen seen;
+    struct host_error error;
+    static const char *const words[] = {"--dry", "--seed=5", "-d",
+                                        "-d7",   "-d",       NULL};
+    static const char *const next[] = {"--dry", "--seed", NULL};
+    (void)unused;
+    assert_int_equal(parse(words, &seen, &error), 0);
+    assert_int_equal(seen.dry, 13);
+    assert_string_equal(seen.seed, "5");
+    assert_int_equal(parse(next, &seen, &error), HOST_USAGE);
+    assert_non_null(strstr(error.text, "--seed: wants a value; "));
 }
 
 static void test_refused(void **unused)
@@ -116,6 +136,50 @@ static void test_refused(void **unused)
     }
 }
 
+static void test_numbers(void **unused)
+{
+    uint64_t number = 7;
+    struct host_error error = {0};
+    (void)unused;
+    assert_int_equal(
+        host_option_number("baud", "300", 300, 1000, &number, &error), 0);
+    assert_int_equal(number, 300);
+    assert_int_equal(
+        host_option_number("baud", "2k", 300, 1000, &number, &error),
+        HOST_USAGE);
+    assert_int_equal(number, 300);
+    assert_string_equal(error.text, "--baud 2k: not a number that is allowed; "
+                                    "give 300 to 1000");
+    error.code = 0;
+    assert_int_equal(
+        host_option_number("seed", "-1", 1, UINT64_MAX, &number, &error),
+        HOST_USAGE);
+    assert_string_equal(error.text, "--seed -1: not a number; give 1 or more");
+}
+
+static void test_the_one_argument(void **unused)
+{
+    const char *argument = NULL;
+    struct host_error error = {0};
+    (void)unused;
+    assert_int_equal(
+        host_option_argument(ARGP_KEY_END, "IMAGE", NULL, &argument, &error),
+        HOST_USAGE);
+    assert_non_null(strstr(error.text, "IMAGE: not given; "));
+    error.code = 0;
+    assert_int_equal(
+        host_option_argument(ARGP_KEY_ARG, "IMAGE", "a", &argument, &error), 0);
+    assert_int_equal(
+        host_option_argument(ARGP_KEY_END, "IMAGE", NULL, &argument, &error),
+        0);
+    assert_int_equal(
+        host_option_argument(ARGP_KEY_ARG, "IMAGE", "b", &argument, &error),
+        HOST_USAGE);
+    assert_string_equal(error.text,
+                        "b: one argument too many; give IMAGE alone");
+    assert_string_equal(argument, "a");
+}
+
 /* -h ends a command that has done nothing, and is no error. */
 static void test_help(void **unused)
 {
@@ -130,7 +194,10 @@ static void test_help(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_taken),
+                                       cmocka_unit_test(test_optional),
                                        cmocka_unit_test(test_refused),
+                                       cmocka_unit_test(test_numbers),
+                                       cmocka_unit_test(test_the_one_argument),
                                        cmocka_unit_test(test_help)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -125,6 +125,34 @@ static void a_plain_file_beyond_the_memory(void **unused)
     assert_int_equal(unlink("huge.las"), 0);
 }
 
+static void what_is_longer_than_its_caller_takes(void **unused)
+{
+    (void)unused;
+    struct host_source source;
+    struct host_error error = {0};
+    assert_int_equal(host_source_open_bounded(&source, "/dev/zero", 5000,
+                                              "an image", &error),
+                     HOST_INPUT);
+    assert_null(source.data);
+    assert_string_equal(error.text, "/dev/zero: more than 5000 bytes, the most "
+                                    "that an image has; give another file");
+    int file = open("short", O_WRONLY | O_CREAT, 0666);
+    assert_true(file >= 0);
+    assert_int_equal(ftruncate(file, 5000), 0);
+    error = (struct host_error){0};
+    assert_int_equal(
+        host_source_open_bounded(&source, "short", 5000, "an image", &error),
+        0);
+    assert_int_equal(source.bytes, 5000);
+    host_source_close(&source);
+    assert_int_equal(ftruncate(file, 5001), 0);
+    (void)close(file);
+    assert_int_equal(
+        host_source_open_bounded(&source, "short", 5000, "an image", &error),
+        HOST_INPUT);
+    assert_int_equal(unlink("short"), 0);
+}
+
 /* A file of points whose numbers are a block of nothing but zeros. */
 static char *zeros_in_vtk(size_t points, size_t *bytes)
 {
@@ -204,6 +232,7 @@ int main(void)
         cmocka_unit_test(what_unpacks_beyond_the_memory),
         cmocka_unit_test(what_is_little),
         cmocka_unit_test(a_plain_file_beyond_the_memory),
+        cmocka_unit_test(what_is_longer_than_its_caller_takes),
         cmocka_unit_test(an_array_beyond_the_memory),
         cmocka_unit_test(points_beyond_the_memory),
     };

@@ -127,10 +127,8 @@ static void start(unsigned i, bool ended_badly)
     b->loader = NULL;
     b->node = NULL;
     b->confirmed = b->off = false;
-    assert_true(loader_boots_next(&b->chip.flash, &b->boot));
-    b->as.identity.epoch = b->boot;
-    loader_slots_open(&b->slots, &b->rules);
-    b->slot = loader_slots_choose(&b->slots, ended_badly);
+    b->slot = loader_slots_start(&b->slots, &b->rules, ended_badly, &b->boot);
+    b->as.identity.epoch = b->boot > 0 ? b->boot : b->as.identity.epoch + 1;
     if (b->slot < LOADER_SLOTS && !b->stays && loader_slots_try(&b->slots)) {
         b->node = node_start(&b->as, &why);
     } else {
@@ -190,7 +188,7 @@ static void step_node(struct board *b)
 {
     enum node_event event = node_step(b->node);
     if (!b->confirmed && node_has_met(b->node)) {
-        b->confirmed = loader_slots_confirm(&b->chip.flash, b->slot);
+        b->confirmed = chip_confirm(&b->chip, b->slot);
         assert_true(b->confirmed);
     }
     if (event == NODE_STOPPED) {

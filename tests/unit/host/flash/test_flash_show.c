@@ -15,6 +15,8 @@
 
 #include <cmocka.h>
 
+#include "host/base/progress.h"
+#include "host/flash/flash_cut.h"
 #include "host/flash/flash_show.h"
 
 enum { NODES = 8, TEXT = 4000 };
@@ -66,6 +68,34 @@ static void print_result(void)
     host_flash_show_result(&show);
 }
 
+static void print_cut(void)
+{
+    static char *const argv[] = {"incode flash", "--cube", "my lab.cube",
+                                 "new.img"};
+    host_flash_cut_tell(stderr, &spread, 4, argv);
+}
+
+/* Ctrl-C: what each board does now, and the command that goes on. */
+static void test_cut(void **unused)
+{
+    (void)unused;
+    node[0].phase = HOST_SPREAD_TAKES;
+    node[1].phase = HOST_SPREAD_WHOLE;
+    node[2].phase = HOST_SPREAD_VERIFIED;
+    node[3].phase = HOST_SPREAD_HAS;
+    node[5].phase = HOST_SPREAD_LEAVES;
+    node[5].left = true;
+    capture(STDERR_FILENO, print_cut);
+    assert_non_null(strstr(text, "nodes 0-1: in the loader, and what has "));
+    assert_non_null(strstr(text, "node 2: in the loader; turned off and on, "
+                                 "the new image runs"));
+    assert_non_null(strstr(text, "node 3: with the new image\n"));
+    assert_non_null(strstr(text, "nodes 4,6-7: as before\n"));
+    assert_non_null(strstr(text, "node 5: on the way into the loader"));
+    assert_non_null(strstr(text, "interrupted; go on with: incode flash "
+                                 "--cube 'my lab.cube' new.img\n"));
+}
+
 static void print_plan(void)
 {
     host_flash_show_begin(&show, &spread, true);
@@ -81,7 +111,7 @@ static void print_changes(void)
     host_flash_show_change(&show, 3);
     node[3].phase = HOST_SPREAD_DONE;
     host_flash_show_change(&show, 3);
-    host_flash_show_end(&show);
+    host_progress_end();
 }
 
 static void nodes_of_a_kind_share_a_line(void **unused)
@@ -96,7 +126,7 @@ static void nodes_of_a_kind_share_a_line(void **unused)
     snprintf(node[2].text, sizeof node[2].text, "is no mps2-an500 but linux");
     capture(STDOUT_FILENO, print_result);
     assert_string_equal(text,
-                        "nodes 0-1,3-4: runs mps2-an500 1.2, number 3\n"
+                        "nodes 0-1,3-4: run mps2-an500 1.2, number 3\n"
                         "node 2: passed over, as it is no mps2-an500 but "
                         "linux\n"
                         "nodes 5-6: had mps2-an500 1.2, number 3 already\n");
@@ -154,7 +184,7 @@ static void a_small_terminal_has_several_nodes_a_row(void **unused)
     }
     host_flash_show_begin(&show, &spread, false);
     host_flash_show_draw(&show);
-    host_flash_show_end(&show);
+    host_progress_end();
     take_all(master, slave);
     assert_int_equal(dup2(before, STDERR_FILENO), STDERR_FILENO);
     (void)close(before);
@@ -174,6 +204,7 @@ int main(void)
         TEST(nodes_of_a_kind_share_a_line),
         TEST(a_plan_tells_what_runs_now),
         TEST(where_there_is_no_terminal_there_are_lines),
+        TEST(test_cut),
         TEST(a_small_terminal_has_several_nodes_a_row),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

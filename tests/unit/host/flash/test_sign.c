@@ -17,7 +17,9 @@
 #include "host/flash/sign.h"
 #include "host/flash/sign_key.h"
 #include "host/machines/cube_key.h"
+#include "transport/bytes.h"
 #include "transport/drivers/sign_sodium.h"
+#include "transport/frame.h"
 
 enum { CODE = 5000, WORDS_MAX = 16 };
 
@@ -187,6 +189,49 @@ static void false_code_and_false_signatures_are_found(void **unused)
     assert_int_equal(signed_by("lab.pub"), LOADER_UNSIGNED);
 }
 
+/* What a board's loader has against it; slots.h has the rules, incoming.c the
+ * order. */
+static enum loader_fault refusal(const uint8_t *bytes, size_t size,
+                                 const uint8_t key[SIGN_PUBLIC_BYTES])
+{
+    struct loader_image image;
+    uint8_t digest[SIGN_DIGEST_BYTES];
+    enum loader_fault fault = loader_image_unpack(&image, bytes);
+    if (fault != LOADER_GOOD || image.bytes != size - LOADER_HEADER_BYTES) {
+        return LOADER_NO_IMAGE;
+    }
+    fault = loader_image_signed(bytes, &sign_sodium, key);
+    host_image_digest(bytes, bytes + LOADER_HEADER_BYTES, image.bytes, digest);
+    return fault == LOADER_GOOD &&
+                   memcmp(digest, image.digest, sizeof digest) != 0
+               ? LOADER_WRONG_DIGEST
+               : fault;
+}
+
+/* The CRC is no secret: who changes a bit makes it right again. */
+static void every_bit_of_an_image_is_held(void **unused)
+{
+    enum { CRC = LOADER_HEADER_BYTES - 4, SIZE = LOADER_HEADER_BYTES + CODE };
+    struct host_image file;
+    uint8_t bytes[SIZE], whole[SIZE], key[SIGN_PUBLIC_BYTES];
+    (void)unused;
+    make_image("lab");
+    assert_int_equal(host_sign_public_read(key, in("lab.pub"), &error), 0);
+    assert_int_equal(host_image_open(&file, in("image"), &error), 0);
+    memcpy(whole, file.source.data, SIZE);
+    host_image_close(&file);
+    assert_int_equal(refusal(whole, SIZE, key), LOADER_GOOD);
+    for (unsigned bit = 0; bit < 8 * SIZE; bit += bit < 8 * 512 ? 1 : 61) {
+        memcpy(bytes, whole, SIZE);
+        bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
+        assert_int_not_equal(refusal(bytes, SIZE, key), LOADER_GOOD);
+        if (bit / 8 < CRC) {
+            bytes_put32(bytes + CRC, frame_crc32c(0, bytes, CRC));
+            assert_int_not_equal(refusal(bytes, SIZE, key), LOADER_GOOD);
+        }
+    }
+}
+
 /* At every length, and with a byte too many. */
 static void an_image_that_is_not_whole_is_refused(void **unused)
 {
@@ -209,6 +254,19 @@ static void an_image_that_is_not_whole_is_refused(void **unused)
     }
     error = (struct host_error){0};
     assert_int_equal(host_image_open(&file, in("no"), &error), HOST_INPUT);
+}
+
+static void a_file_without_an_end_is_no_image(void **unused)
+{
+    const char *const words[] = {"/dev/zero", "--key",      in("lab"),
+                                 "--board",   "mps2-an500", NULL};
+    struct host_image file;
+    (void)unused;
+    error = (struct host_error){0};
+    assert_int_equal(host_image_open(&file, "/dev/zero", &error), HOST_INPUT);
+    assert_non_null(strstr(error.text, "the most that an image has; "));
+    assert_int_equal(sign(words), HOST_INPUT);
+    assert_non_null(strstr(error.text, "the most that an image has; "));
 }
 
 static void refuses_key(const char *name, const char *what)
@@ -296,7 +354,9 @@ int main(void)
         cmocka_unit_test(an_image_is_signed_anew_in_its_place),
         cmocka_unit_test(the_digest_is_blake2b_of_name_and_code),
         cmocka_unit_test(false_code_and_false_signatures_are_found),
+        cmocka_unit_test(every_bit_of_an_image_is_held),
         cmocka_unit_test(an_image_that_is_not_whole_is_refused),
+        cmocka_unit_test(a_file_without_an_end_is_no_image),
         cmocka_unit_test(keys_of_the_other_kind_are_refused),
         cmocka_unit_test(a_secret_half_is_its_owner_s_alone),
         cmocka_unit_test(a_pair_is_made_whole_or_not_at_all),

@@ -295,7 +295,7 @@ static void who_is_off_is_waited_for(void **unused)
     off_until_us[3] = 12000000;
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_DONE);
-    assert_non_null(strstr(said, "node 3: is not heard; up to 30 s"));
+    assert_non_null(strstr(said, "node 3: is not heard; waits for up to 30 s"));
     host_spread_close(&spread);
 }
 

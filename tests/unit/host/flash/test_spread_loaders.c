@@ -124,7 +124,7 @@ static void a_loader_answers_as_a_node(void **unused)
     assert_true(host_visit_send(&visit, 3, NODE_SETUP, &setup, sizeof setup));
     assert_true(host_visit_send(&visit, 2, NODE_IMAGE_DO, &name, sizeof name));
     stay_for(300000);
-    assert_non_null(strstr(told, "incode flash"));
+    assert_non_null(strstr(told, "no program is running"));
     for (enum node_question q = NODE_WHO; q <= NODE_PROBE; q++) {
         assert_int_equal(host_visit_ask(&visit, &all, q, 1, 3000000, &error),
                          0);
@@ -147,6 +147,41 @@ static void a_loader_answers_as_a_node(void **unused)
     for (unsigned i = 0; i < 4; i++) {
         assert_int_equal(board[i].boot, 3);
     }
+    close_world();
+}
+
+/* Its neighbours are flashed and run; it says what is wrong with it. */
+static void a_board_with_a_worn_flash_waits_and_says_so(void **unused)
+{
+    struct node_setup_message setup = {.protocol = NODE_PROTOCOL, .nodes = 4};
+    struct host_node_set all, worn = {{0}};
+    (void)unused;
+    open_world(2, 4);
+    host_node_set_all(&all, 4);
+    host_node_set_add(&worn, 1);
+    (void)flash(&old);
+    board[1].chip.worn_out = true;
+    unsigned starts = visit.node[1].starts;
+    assert_int_equal(
+        host_visit_restart(&visit, &all, NODE_RESTART_PLAIN, &error), 0);
+    stay_for(10000000);
+    assert_int_equal(host_visit_wait(&visit, &all, 5000000, &error), 0);
+    assert_null(board[1].node);
+    assert_non_null(board[1].loader);
+    assert_int_equal(visit.node[1].starts, starts + 1);
+    assert_int_equal(visit.node[1].who.kind, NODE_KIND_LOADER);
+    assert_int_equal(visit.node[1].who.boot, 0);
+    for (unsigned i = 0; i < 4; i++) {
+        assert_true(i == 1 || board[i].node != NULL);
+    }
+    assert_int_equal(
+        host_visit_ask(&visit, &worn, NODE_LOG, 0, 3000000, &error), 0);
+    assert_non_null(strstr((const char *)visit.node[1].answer, "is worn"));
+    visit.take = hear;
+    told[0] = '\0';
+    assert_true(host_visit_send(&visit, 1, NODE_SETUP, &setup, sizeof setup));
+    stay_for(300000);
+    assert_non_null(strstr(told, "it is worn"));
     close_world();
 }
 
@@ -262,6 +297,7 @@ int main(void)
         cmocka_unit_test(of_slow_wires_answers_take_little),
         cmocka_unit_test(erasing_goes_beside_the_wire),
         cmocka_unit_test(a_loader_answers_as_a_node),
+        cmocka_unit_test(a_board_with_a_worn_flash_waits_and_says_so),
         cmocka_unit_test(a_second_image_takes_the_first_s_place),
         cmocka_unit_test(losses_cost_time_alone),
         cmocka_unit_test(pauses_cost_time_alone),

@@ -289,6 +289,32 @@ static void test_stopped(void **unused)
     end_holder();
 }
 
+/* Whoever asks who has it, and how often: it is had. */
+static void test_queue(void **unused)
+{
+    enum { CALLS = 200 };
+    struct host_look look;
+    struct host_holder who;
+    char text[HOST_HOLDER_TEXT];
+    (void)unused;
+    begin_holder();
+    look_at(&look);
+    kill(holder, SIGSTOP);
+    for (unsigned i = 0; i < CALLS; i++) {
+        assert_true(host_holder_find(&who, wire));
+    }
+    assert_int_equal(who.pid, 0);
+    host_holder_text(&who, text, sizeof text);
+    assert_string_equal(text, "a program that stands still");
+    kill(holder, SIGCONT);
+    assert_int_equal(host_look_ask(&look, &all, NODE_TOP, WAIT_US, &error), 0);
+    while (!host_holder_find(&who, wire) || who.pid != holder) {
+        (void)usleep(SECOND / 100);
+    }
+    host_look_close(&look);
+    end_holder();
+}
+
 /* --- who says what is no question ------------------------------------------
  */
 
@@ -406,6 +432,7 @@ int main(void)
         cmocka_unit_test_setup(test_several, set_up),
         cmocka_unit_test_setup(test_killed, set_up),
         cmocka_unit_test_setup(test_stopped, set_up),
+        cmocka_unit_test_setup(test_queue, set_up),
         cmocka_unit_test_setup(test_nonsense, set_up),
         cmocka_unit_test_setup(test_deaf, set_up),
         cmocka_unit_test_setup(test_next, set_up),

@@ -50,6 +50,7 @@ static struct {
     uint16_t spare;
     uint8_t absent_s;
     uint32_t dead_us;
+    uint32_t baud; /* that the nodes and the host are told of; 0: none */
     struct event events[EVENTS];
     uint64_t stop_us;    /* a STOP lasts so long; 0: for ever */
     double host_fails;   /* when; 0: never */
@@ -161,6 +162,7 @@ static inline void start_world(void)
         .time_us_max = UINT64_C(2000000000), /* a run that hangs */
         .steps_max = UINT64_MAX,
         .absent_s = world.absent_s,
+        .serial_baud = world.baud,
         .strike = strike,
     };
     struct host_error error = {0};
@@ -290,6 +292,30 @@ static inline void survives(const struct host_strategy *strategy)
     assert_string_equal(digest.text, expected.text);
     assert_true(result.built >= result.tetrahedra);
     assert_true(result.make_tetra_calls >= result.tetrahedra);
+}
+
+/* Points, what they come to, and how long that takes undisturbed. */
+static inline void begin_runs(uint64_t count)
+{
+    struct host_error error = {0};
+    assert_int_equal(host_gen("uniform", count, 5, &points, &error), 0);
+    prepare();
+    start_world();
+    assert_int_equal(run(&host_sequential, &expected, &error), 0);
+    sequential_us = world.sim.now_us;
+    assert_int_equal(result.generations, 1);
+    prepare();
+    start_world();
+    assert_int_equal(run(&host_spatial, &expected, &error), 0);
+    spatial_us = world.sim.now_us;
+    assert_int_equal(result.generations, 1);
+}
+
+static inline int end_runs(void **unused)
+{
+    (void)unused;
+    host_points_free(&points);
+    return 0;
 }
 
 static inline void fails_with(const char *text)

@@ -72,24 +72,8 @@ static const struct host_onlookers onlookers = {NULL, ask, answer, answered,
 
 static int set_up(void **unused)
 {
-    struct host_error error = {0};
     (void)unused;
-    assert_int_equal(host_gen("uniform", 16000, 5, &points, &error), 0);
-    for (unsigned k = 0; k < 2; k++) {
-        prepare();
-        start_world();
-        assert_int_equal(
-            run(k == 0 ? &host_sequential : &host_spatial, &expected, &error),
-            0);
-        *(k == 0 ? &sequential_us : &spatial_us) = world.sim.now_us;
-    }
-    return 0;
-}
-
-static int tear_down(void **unused)
-{
-    (void)unused;
-    host_points_free(&points);
+    begin_runs(16000);
     return 0;
 }
 
@@ -183,5 +167,5 @@ int main(void)
         cmocka_unit_test(test_some),
         cmocka_unit_test(test_nobody),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, set_up, end_runs);
 }

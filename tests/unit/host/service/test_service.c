@@ -5,25 +5,8 @@
 
 static int set_up(void **unused)
 {
-    struct host_error error = {0};
     (void)unused;
-    assert_int_equal(host_gen("uniform", 8000, 5, &points, &error), 0);
-    for (unsigned k = 0; k < 2; k++) {
-        prepare();
-        start_world();
-        assert_int_equal(
-            run(k == 0 ? &host_sequential : &host_spatial, &expected, &error),
-            0);
-        *(k == 0 ? &sequential_us : &spatial_us) = world.sim.now_us;
-        assert_int_equal(result.generations, 1);
-    }
-    return 0;
-}
-
-static int tear_down(void **unused)
-{
-    (void)unused;
-    host_points_free(&points);
+    begin_runs(8000);
     return 0;
 }
 
@@ -387,5 +370,5 @@ int main(void)
         cmocka_unit_test(test_missing_host_port),
         cmocka_unit_test(test_ends_at_once),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, set_up, end_runs);
 }

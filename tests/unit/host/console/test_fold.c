@@ -1,0 +1,75 @@
+/* Answers that are equal share a row, also where a time in them differs a bit.
+ */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "host/console/fold.h"
+
+static char said[2000];
+
+static void take(void *context, const char *text)
+{
+    (void)context;
+    strcat(said, text);
+    strcat(said, "\n");
+}
+
+static const char *folded(const uint32_t *time_s, unsigned count)
+{
+    struct host_fold fold = {0};
+    for (unsigned i = 0; i < count; i++) {
+        host_fold_add_timed(&fold, i, "up \1 all", time_s[i]);
+    }
+    said[0] = '\0';
+    host_fold_print(&fold, "TIME", take, NULL);
+    host_fold_free(&fold);
+    return said;
+}
+
+static void times_that_are_near_share_a_row(void **unused)
+{
+    (void)unused;
+    assert_string_equal(folded((uint32_t[]){7, 7}, 2),
+                        "NODES  TIME\n0-1    up       7 s all\n");
+    assert_string_equal(folded((uint32_t[]){59, 58, 61, 60}, 4),
+                        "NODES  TIME\n0-3    up   58-61 s all\n");
+    assert_string_equal(folded((uint32_t[]){125, 130}, 2),
+                        "NODES  TIME\n0-1    up     2 min all\n");
+    assert_string_equal(folded((uint32_t[]){7200, 7900}, 2),
+                        "NODES  TIME\n0-1    up       2 h all\n");
+}
+
+/* One that has begun anew is seen. */
+static void times_that_are_not_do_not(void **unused)
+{
+    (void)unused;
+    assert_string_equal(folded((uint32_t[]){3600, 3605, 12}, 3),
+                        "NODES  TIME\n0-1    up       1 h all\n"
+                        "2      up      12 s all\n");
+}
+
+static void a_row_without_a_time_is_another(void **unused)
+{
+    struct host_fold fold = {0};
+    (void)unused;
+    host_fold_add(&fold, 0, "no answer");
+    host_fold_add_timed(&fold, 1, "no answer", 5);
+    host_fold_add(&fold, 2, "no answer");
+    assert_int_equal(fold.count, 2);
+    host_fold_free(&fold);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(times_that_are_near_share_a_row),
+        cmocka_unit_test(times_that_are_not_do_not),
+        cmocka_unit_test(a_row_without_a_time_is_another)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
