@@ -29,7 +29,8 @@ fi
 
 for image in "$BUILD"/firmware/tests/*-arithmetic.img; do
     board=$(basename "$image" -arithmetic.img)
-    flash=$scratch/flash
+    flash=$scratch/$board.flash
+    make_flash "$board"
     # shellcheck disable=SC2046
     within tests/arithmetic/compare "0 1089 $step,1090 1099 1" \
         $(fact "$board" emulator) -kernel "$image" -display none -nic none \

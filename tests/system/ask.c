@@ -3,44 +3,73 @@
  *
  *     ask PATH WORD
  *
- * 1: there was no answer to any of twenty.
+ * Who is not answered types it again: a line that comes while a board begins
+ * anew is lost.  1: there was no whole answer within two minutes, whatever else
+ * the board said.
  */
 #include <poll.h>
+#include <stdbool.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
 
-enum { ANSWER_MS = 1000, TIMES = 20 };
+enum { AGAIN_MS = 3000, DEADLINE_MS = 120000, BYTES_MAX = 65536 };
 
-/* The next byte; -1: none came in time. */
-static int next(int fd)
+static int64_t now_ms(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* The next byte; -1: none has come by then. */
+static int next(int fd, int64_t end_ms)
 {
     unsigned char byte;
     struct pollfd ready = {.fd = fd, .events = POLLIN};
-    return poll(&ready, 1, ANSWER_MS) == 1 && read(fd, &byte, 1) == 1 ? byte
-                                                                      : -1;
+    int64_t wait_ms = end_ms - now_ms();
+    return wait_ms > 0 && poll(&ready, 1, (int)wait_ms) == 1 &&
+                   read(fd, &byte, 1) == 1
+               ? byte
+               : -1;
 }
 
 /* To the beginning of an answer: 00 FF, \r. */
-static int find_answer(int fd)
+static bool find_answer(int fd, int64_t end_ms)
 {
     int last[3] = {1, 1, 1}, byte;
-    while ((byte = next(fd)) >= 0) {
+    while ((byte = next(fd, end_ms)) >= 0) {
         last[0] = last[1], last[1] = last[2], last[2] = byte;
         if (last[0] == 0 && last[1] == 0xff && last[2] == '\r') {
-            return 0;
+            return true;
         }
     }
-    return -1;
+    return false;
+}
+
+/* To its end, 00, which frames may come behind; false: it has none in time. */
+static bool print_answer(int fd, int64_t end_ms)
+{
+    static char text[BYTES_MAX];
+    size_t size = 0;
+    int byte;
+    while ((byte = next(fd, end_ms)) > 0) {
+        if (byte != '\r' && size < sizeof text) {
+            text[size++] = (char)byte;
+        }
+    }
+    return byte == 0 && fwrite(text, 1, size, stdout) == size;
 }
 
 int main(int argc, char **argv)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     char line[100];
-    int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), byte;
+    int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (argc != 3) {
         fprintf(stderr, "ask PATH WORD\n");
         return 2;
@@ -52,13 +81,13 @@ int main(int argc, char **argv)
         perror(argv[1]);
         return 1;
     }
-    for (int i = 0; i < TIMES; i++) {
-        if (write(fd, line, (size_t)size) == size && find_answer(fd) == 0) {
-            while ((byte = next(fd)) > 0) {
-                if (byte != '\r') {
-                    putchar(byte);
-                }
-            }
+    int64_t end_ms = now_ms() + DEADLINE_MS, now;
+    while ((now = now_ms()) < end_ms) {
+        int64_t again_ms = now + AGAIN_MS < end_ms ? now + AGAIN_MS : end_ms;
+        if (send(fd, line, (size_t)size, MSG_NOSIGNAL | MSG_DONTWAIT) != size) {
+            break;
+        }
+        if (find_answer(fd, again_ms) && print_answer(fd, again_ms)) {
             return 0;
         }
     }

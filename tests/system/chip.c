@@ -1,6 +1,7 @@
 /* An emulated board's flash chip as a file, for tests:
  *
  *     chip FILE              says what is in it
+ *     chip FILE card -       makes a new one a memory card
  *     chip FILE put IMAGE    for a new one: with this image, as from the shop
  *     chip FILE try IMAGE    as it is once an image was brought: on trial
  *     chip FILE break SLOT   a byte of that slot's code is another
@@ -13,6 +14,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "node/loader/flash_card.h"
 #include "node/loader/flash_ram.h"
 #include "node/loader/layout.h"
 #include "node/loader/messages.h"
@@ -71,17 +73,20 @@ static bool try_image(const struct loader_flash *flash,
 }
 
 /* By their marks in a journal. */
-static unsigned held(const struct loader_flash *flash, const uint8_t *chip)
+static unsigned held(const struct loader_flash *flash)
 {
     struct loader_layout layout = loader_layout(flash);
     unsigned most = 0;
     for (unsigned slot = 0; slot < LOADER_SLOTS; slot++) {
         uint32_t marks =
             loader_journal_at(&layout, flash, slot) + loader_marks_in(flash);
+        uint32_t apart = loader_mark_apart(flash);
         unsigned count = 0;
         for (unsigned i = 0; i < layout.bytes / LOADER_BLOCK_BYTES; i++) {
             static const uint8_t none[] = {0xff, 0xff, 0xff, 0xff};
-            count += memcmp(chip + marks + 4 * i, none, 4) != 0;
+            uint8_t mark[LOADER_MARK_BYTES];
+            flash->read(flash->context, marks + apart * i, mark, sizeof mark);
+            count += memcmp(mark, none, sizeof mark) != 0;
         }
         most = count > most ? count : most;
     }
@@ -115,12 +120,17 @@ int main(int argc, char **argv)
     static uint8_t bytes[IMAGE_MAX];
     const char *what = argc == 4 ? argv[2] : "";
     if (argc != 2 && argc != 4) {
-        fprintf(stderr,
-                "chip FILE [put IMAGE | try IMAGE | break SLOT | held -]\n");
+        fprintf(stderr, "chip FILE [card - | put IMAGE | try IMAGE | break "
+                        "SLOT | held -]\n");
         return 2;
     }
     uint8_t *chip = open_chip(argv[1]);
-    const struct loader_flash flash = LOADER_RAM(chip);
+    struct loader_card card = LOADER_CARD_IN(chip);
+    const struct loader_flash in_chip = LOADER_RAM(chip);
+    const struct loader_flash on_card = LOADER_CARD(&card);
+    bool is_card = strcmp(what, "card") == 0 ? loader_card_format(&card)
+                                             : loader_card_open(&card);
+    const struct loader_flash flash = is_card ? on_card : in_chip;
     const struct loader_rules rules = {.flash = &flash, .suite = &sign_sodium};
     struct loader_slots slots;
     bool good = true;
@@ -131,9 +141,10 @@ int main(int argc, char **argv)
         good = try_image(&flash, &slots, bytes, read_image(argv[3], bytes));
     } else if (strcmp(what, "break") == 0) {
         unsigned slot = (unsigned)strtoul(argv[3], NULL, 10);
-        chip[loader_slots_code(&slots, slot) + 1000] ^= 1;
+        chip[card.first * LOADER_CARD_BLOCK + loader_slots_code(&slots, slot) +
+             1000] ^= 1;
     } else if (strcmp(what, "held") == 0) {
-        printf("%u\n", held(&flash, chip));
+        printf("%u\n", held(&flash));
     } else {
         tell(&flash, &slots);
     }

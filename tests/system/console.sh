@@ -60,11 +60,21 @@ answers console-run 0 '12953 tetrahedra' \
 answers console-run-fails 3 '1 of 1' -c 'run missing.npy -o out.ele' -c 'ping 1 1'
 answers console-json-run 0 '"digest":"sha256:' --json \
     -c 'run points.npy -o out.ele'
+answers console-json-run-fails 3 '"error":"missing.npy: ' --json \
+    -c 'run missing.npy'
+console -c 'run many.npy -o no.ele --host-rate 20000 &' -c 'stat 1' -c abort \
+    > output 2> errors
+check console-looks-at-once "$(last errors)" \
+    eval '! grep -q "the run has the cube" errors'
 answers console-abort 0 '1 of 1' -c 'run many.npy -o no.ele --host-rate 20000 &' \
     -c abort -c 'ping 1 1'
 check console-abort-leaves-nothing 'no.ele is there' test ! -e no.ele
 refuses console-nowhere 2 'give --cube FILE' "$program" console -c nodes
 refuses console-no-file 3 'none.cube' "$program" console --cube none.cube -c nodes
+refuses console-no-file-nothing-to-do 3 'none.cube' \
+    "$program" console --cube none.cube
+refuses console-no-key-nothing-to-do 3 'none.key' \
+    "$program" console --tcp 127.0.0.1:9 --key none.key
 check console-leaves-no-folder "$(ls -d incode-console.* 2> /dev/null)" \
     test -z "$(ls -d incode-console.* 2> /dev/null)"
 
@@ -74,18 +84,31 @@ check console-leaves-no-folder "$(ls -d incode-console.* 2> /dev/null)" \
     --no-progress > /dev/null 2>&1 &
 run=$!
 looks() { console -c 'stat 1' -c 'links 3' 2> errors | grep -q '^3  '; }
-# Whether it can be looked at: one of its open files is such a meeting place.
-offers() {
-    awk '/@incode-look-/ { print "socket:[" $7 "]" }' /proc/net/unix > places
-    readlink "/proc/$run/fd/"* 2> /dev/null | grep -qFxf places
-}
-await offers
+await lets_look $run
 await looks
 check console-looks-beside-a-run "$(last errors)" looks
 answers console-touches-nothing 4 '^1-2:' -c 'memory 1-2' -c 'reset all'
 check console-tells-who "$(last errors)" grep -q "incode run .* has the cube" errors
 kill $run
 wait $run 2> /dev/null
+
+# --- ended from outside ---------------------------------------------------------
+
+has_folder() { ls -d incode-console.* > /dev/null 2>&1; }
+for signal in TERM HUP; do
+    "$program" console --cube four.cube \
+        -c 'run many.npy -o no.ele --host-rate 20000' -c nodes \
+        > output 2> errors &
+    ended=$!
+    await has_folder
+    kill -$signal $ended
+    wait $ended 2> /dev/null
+    status=$?
+    check "console-ended-by-$signal" "exit $status: $(last errors)" \
+        test $status = $((128 + $(kill -l $signal)))
+    check "console-ended-by-$signal-leaves-nothing" "$(ls)" \
+        eval '! has_folder && [ ! -e no.ele ]'
+done
 
 # --- by one wire ---------------------------------------------------------------
 

@@ -33,6 +33,8 @@ check 'cube_new/serial: the port' "$(cat "$scratch/blank.cube")" eval \
     "cmp '$scratch/serial.cube' '$scratch/blank.cube' &&
      grep -q /dev/ttyUSB7 '$scratch/serial.cube'"
 new bare 16 --board mps2-an385 --serial
+succeeds 'cube_new/serial alone, at the end' incode cube --new 8 \
+    -o "$scratch/end.cube" --serial > "$scratch/said"
 
 before=$(cat "$scratch/tcp.cube" "$scratch/tcp.key")
 incode cube --new 4 --tcp "$hosts" -o "$scratch/tcp.cube" 2> "$scratch/errors"
@@ -55,6 +57,7 @@ refused() {
 }
 refused 'three nodes' --new 3 -o "$scratch/no.cube"
 refused 'no file' --new 4
+refused 'an option without its value' --new 2 --serial --tcp
 refused 'two orders' --new 4 -o "$scratch/no.cube" "$scratch/tcp.cube"
 refused 'too few hosts' --new 4 --tcp a,b,c -o "$scratch/no.cube"
 refused 'too many hosts' --new 2 --tcp a,b,c -o "$scratch/no.cube"

@@ -75,6 +75,13 @@ if ! await ssh -F "$scratch/ssh.conf" -o BatchMode=yes "$to" true \
     exit 1
 fi
 
+# As many have it: a master that stays would keep the pipes of its first user.
+cat >> "$scratch/ssh.conf" << END2
+ControlMaster auto
+ControlPath $scratch/master-%C
+ControlPersist 60
+END2
+
 # cube NAME [SETTING...]: four nodes, each on a board of its own.
 cube() {
     local name=$1 node
@@ -141,6 +148,8 @@ says 'status of nothing: the next step' 1 \
     'nodes 0-3 do not run; start them with: ' "$scratch/errors"
 
 does 'first' 0
+check 'deploy/first: no master of ssh stays' "$(ls "$scratch")" \
+    [ -z "$(compgen -G "$scratch/master-*")" ]
 says 'first: each' 4 ': deployed: program .*, key, what starts it; running by '
 check 'deploy/first: the program' 'it differs' eval \
     '[ "$(digest "$(board 2)/incode-node")" = "$(digest "$BUILD/incode-node")" ]'
@@ -166,6 +175,16 @@ check 'deploy/again: the same processes' 'another' \
 does 'status' 0 --status
 says 'status: each' 4 ': [a-z0-9_]*, running by itself.*, since '
 
+if has_terminals 'deploy/a terminal'; then
+    script -qec "stty cols 80 rows 24; exec '$INCODE' deploy --status \
+--cube '$scratch/four.cube' --programs '$scratch/programs' \
+--ssh-config '$scratch/ssh.conf'" "$scratch/said" > /dev/null 2>&1 < /dev/null
+    check 'deploy/a terminal: exit 0' "exit $?: $(last "$scratch/said")" [ $? = 0 ]
+    check 'deploy/a terminal: a row a board' "$(head -c 600 "$scratch/said")" \
+        grep -qE $'^\r?node 3 .*: [^\r]*\033\\[K' "$scratch/said"
+    says 'a terminal: and at the end' 4 ': [a-z0-9_]*, running by itself.*, since '
+fi
+
 # Another program, that is the same but for a byte behind its end.
 { cat "$BUILD/incode-node"; echo; } > "$scratch/programs/incode-node-$machine"
 does 'a new program, for two' 0 --nodes 1-2
@@ -188,7 +207,7 @@ run_on 'a run after that'
 
 fails() { # NAME NODES PATTERN: these alone, and say why
     says "$1: it says why" 1 "^incode: node $2 \($3" "$scratch/errors"
-    says "$1: and which" 1 "boards failed, nodes $2; .*--nodes $2\$" \
+    says "$1: and which" 1 "boards? failed, nodes? $2; .*--nodes $2\$" \
         "$scratch/errors"
 }
 kill -KILL "$(cat "$(board 3)/pid")"

@@ -84,7 +84,8 @@ nodes() {
 }
 
 nodes 'who is there' loader 4
-has 'who is there: what next' 'bring one with: incode flash IMAGE'
+has 'who is there: what next' \
+    "bring one with: incode flash --cube $lab [^ ]*$board.img"
 full && nodes 'who is there, without a cube file' loader 4 --port "$port"
 step 'boards are there'
 
@@ -112,7 +113,7 @@ step 'refused'
 # --- flash ------------------------------------------------------------------------
 
 succeeds 'first_hour/flash' incode flash --cube "$lab" "$image" > "$said"
-has 'flash' '0-3: runs '
+has 'flash' '0-3: run '
 step 'flashed'
 off 3
 refuses 'first_hour/flash again, a node is off' 4 '^incode: node 3: .*; ' \

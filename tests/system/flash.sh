@@ -37,6 +37,12 @@ refuses 'flash/image: another key' 5 'signed with another key; sign it' \
     incode image "$raw" --key "$scratch/cube.key"
 refuses 'flash/sign: a full disk' 3 '^incode: /dev/full: ' \
     incode sign "$raw" --key "$key" -o /dev/full
+refuses 'flash/sign: an ELF file' 3 'an ELF file; .* objcopy -O binary' \
+    incode sign "$INCODE" --key "$key" --board mps2-an500 -o "$scratch/none.img"
+{ head -c 200 "$raw" && tail -c +202 "$raw"; } > "$scratch/shifted.img"
+refuses 'flash/sign: a damaged header' 3 'a damaged header; ' \
+    incode sign "$scratch/shifted.img" --key "$key" --board mps2-an500 \
+    -o "$scratch/none.img"
 chmod 640 "$key"
 refuses 'flash/sign: others can read the key' 3 'read by others.*; chmod 600' \
     incode sign "$raw" --key "$key"
@@ -66,6 +72,7 @@ refuses_image 'no image' 'no image, or one with a damaged header; ' \
     "$scratch/raw"
 refuses_image 'an empty file' ': .*; ' /dev/null
 refuses_image 'no file' 'No such file' "$scratch/no.img"
+refuses_image 'a file without an end' 'the most that an image has; ' /dev/zero
 refuses_image 'a directory' ': .*; ' "$scratch"
 incode sign "$raw" --key "$key" --board mps2-an385 -o "$scratch/other.img"
 refuses_image 'an image for another board' 'is for mps2-an385, and .*; ' \
@@ -73,6 +80,11 @@ refuses_image 'an image for another board' 'is for mps2-an385, and .*; ' \
 refuses 'flash/no place' 2 'give --cube FILE' incode flash "$raw"
 refuses 'flash/nodes that there are not' 2 '^incode: 0-3: not nodes of this cube; ' \
     incode flash --cube "$scratch/nobody.cube" --nodes 0-3 "$raw"
+incode cube --new 2 --serial /dev/none -o "$scratch/none.cube" > /dev/null
+for nodes in 3-1 0-99999999 '' ',' 0-1,,1 0x1 0- - 99999999999999999999 '0,'; do
+    refuses "flash/nodes that are none: '$nodes'" 2 'not nodes of this cube; ' \
+        incode flash --cube "$scratch/none.cube" --nodes "$nodes" "$raw"
+done
 refuses 'flash/nobody there' 4 '^incode: nodes? 0.*; ' \
     incode flash --cube "$scratch/nobody.cube" -q --patience 1 --nodes 0 "$raw"
 
@@ -80,16 +92,10 @@ refuses 'flash/nobody there' 4 '^incode: nodes? 0.*; ' \
 
 image=$BUILD/firmware/mps2-an500.img
 hangs=$BUILD/firmware/tests/image-mps2-an500-hang.img
-if [ ! -r "$image" ]; then
-    skip flash "there is no $BUILD/firmware: make firmware"
-    exit 0
-fi
-if ! command -v qemu-system-arm > /dev/null; then
-    skip flash 'qemu-system-arm is not there: make deps'
-    exit 0
-fi
+need_boards flash mps2-an500
 cube=$scratch/lab.cube
-within "$INCODE" emulate --board mps2-an500 --nodes 2 --empty -o "$cube" \
+# Not by within, a function, whose process is not what is to be ended.
+timeout -k 5 "$hang" "$INCODE" emulate --board mps2-an500 --nodes 2 --empty -o "$cube" \
     > "$scratch/boards" 2>&1 &
 boards=$!
 trap 'kill $boards 2> /dev/null; wait $boards; rm -rf "$scratch"' EXIT
@@ -119,12 +125,16 @@ refuses 'flash/an image that hangs' 4 \
     '^incode: node 1: did not come up with the image, and waits.*: .*; ' \
     incode flash --cube "$cube" -q --nodes 1 "$hangs"
 
-# Ended in mid-transfer, and begun again.
-"$INCODE" flash --cube "$cube" "$image" > /dev/null 2> "$errors" &
+# Ended in mid-transfer, and begun again.  Meanwhile nobody else gets in.
+"$INCODE" flash --cube "$cube" "$image" > /dev/null 2> "$scratch/first" &
 flash=$!
-await grep -q 'node 1: takes blocks' "$errors"
-sleep 2
-kill -TERM $flash 2> /dev/null
+await grep -q 'node 1: takes blocks' "$scratch/first"
+sleep 1
+kill -STOP $flash
+refuses 'flash/two at once' 4 'in use by incode flash .*; ' \
+    incode flash --cube "$cube" -q "$image"
+kill -TERM $flash
+kill -CONT $flash
 wait $flash
 check 'flash/interrupted' "exit $?" [ $? != 0 ]
 if has_terminals 'flash/a terminal'; then
@@ -134,9 +144,9 @@ if has_terminals 'flash/a terminal'; then
     check 'flash/a terminal: a row a node' "$(head -c 300 "$said")" \
         grep -qE 'node 1 \[#+ +\] +[0-9]+ % takes blocks' "$said"
     check 'flash/a terminal: all of them' "$(last "$said")" \
-        grep -q 'nodes 0-1: runs mps2-an500' "$said"
+        grep -q 'nodes 0-1: run mps2-an500' "$said"
 else
-    flashes 'flash/all of them' '^nodes 0-1: runs mps2-an500' "$image"
+    flashes 'flash/all of them' '^nodes 0-1: run mps2-an500' "$image"
 fi
 flashes 'flash/nothing to do' '^nodes 0-1: had mps2-an500 .* already' "$image"
 
@@ -148,3 +158,42 @@ flashes 'flash/the old image stays' '^nodes 0-1: had mps2-an500 .* already' \
 "$INCODE" gen uniform 200 --seed 1 -o "$scratch/points.npy" 2> /dev/null
 succeeds 'flash/they triangulate' incode run "$scratch/points.npy" -q \
     --cube "$cube" --verify
+
+# --- a Raspberry Pi, whose flash is a part of its card --------------------------
+
+image=$BUILD/firmware/raspi3b.img
+if [ ! -r "$image" ] || ! command -v qemu-system-aarch64 > /dev/null; then
+    skip flash/raspi3b 'its image or qemu-system-aarch64 is not there'
+    exit 0
+fi
+kill $boards
+wait $boards
+cube=$scratch/pi.cube
+pis() {
+    : > "$scratch/pis"
+    timeout -k 5 "$hang" "$INCODE" emulate --board raspi3b --nodes 2 --empty \
+        -o "$cube" > "$scratch/pis" 2>&1 &
+    boards=$!
+    if ! await grep -q '^2 nodes' "$scratch/pis"; then
+        fail 'flash/raspi3b' "they do not start: $(last "$scratch/pis")"
+        exit 1
+    fi
+}
+pis
+refuses 'flash/raspi3b: a wrong image' 3 \
+    'is for mps2-an500, and .*; ' \
+    incode flash --cube "$cube" -q "$raw"
+flashes 'flash/raspi3b: two at once' '^nodes 0-1: run raspi3b' "$image"
+flashes 'flash/raspi3b: nothing to do' '^nodes 0-1: had raspi3b' "$image"
+refuses 'flash/raspi3b: an image that hangs' 4 \
+    '^incode: node 1: did not come up with the image, and went back.*; ' \
+    incode flash --cube "$cube" -q --nodes 1 \
+    "$BUILD/firmware/tests/image-raspi3b-hang.img"
+succeeds 'flash/raspi3b: they triangulate' incode run "$scratch/points.npy" -q \
+    --cube "$cube" --verify
+# Off and on: what a card has stays.
+kill $boards
+wait $boards
+pis
+flashes 'flash/raspi3b: the card keeps it' '^nodes 0-1: had raspi3b' \
+    --dry-run "$image"

@@ -84,6 +84,24 @@ same 'nodes that learn who they are' --cube "$scratch/unix.cube"
 end_nodes
 kill $stranger
 wait $stranger
-check 'hostile/it was' "$(cat "$scratch/stranger")" grep -qE \
-    '^[34] tcp [3-9] unix; [0-9]{3,} tcp [0-9]{2,} unix calls taken' \
-    "$scratch/stranger"
+check 'hostile/it was' "$(head -n 1 "$scratch/stranger")" grep -qE \
+    '^[0-9]{3,} tcp [0-9]{2,} unix calls taken' "$scratch/stranger"
+# What there is to call: the wires of both files, and where a run lets others look
+# on (host/look/look.h), one place for each of the host's two wires.  A pair that
+# connects nodes of its own has a port of the kernel's choice, for a moment in
+# which the stranger may look.
+{
+    awk -v base="$base" '$1 == "tcp" && $2 >= base && $2 < base + 500' \
+        "$scratch/stranger" | sort
+    grep '^unix ' "$scratch/stranger" | sort |
+        sed -E 's/@incode-look-[0-9a-f]{32}$/@look/'
+} > "$scratch/found"
+printf '%s\n' "tcp $base" "tcp $((base + 1))" "tcp $((base + 2))" \
+    "unix $scratch/0-2" "unix $scratch/0-host" "unix $scratch/1-3" \
+    'unix @look' 'unix @look' > "$scratch/all"
+check 'hostile/on every socket that listens, and there is no other' \
+    "$(tr '\n' ' ' < "$scratch/stranger")" \
+    cmp -s "$scratch/found" "$scratch/all"
+check 'hostile/and at most one port of a pair' \
+    "$(tr '\n' ' ' < "$scratch/stranger")" \
+    test "$(grep -c '^tcp ' "$scratch/stranger")" -le 4

@@ -59,6 +59,20 @@ has_data() {
 # need_data NAME: ends the script where there are no real sets.
 need_data() { has_data "$1" || exit 0; }
 
+# --- emulated boards ----------------------------------------------------------
+
+# need_boards NAME BOARD: ends the script where there is no emulator or image.
+need_boards() {
+    if ! command -v qemu-system-arm > /dev/null; then
+        skip "$1" 'qemu-system-arm is not there: make deps'
+        exit 0
+    fi
+    if [ ! -r "$BUILD/firmware/$2.img" ]; then
+        skip "$1" "there is no $BUILD/firmware/$2.img: make firmware"
+        exit 0
+    fi
+}
+
 # "name file points distinct tetrahedra digest" for each set of the index.
 list_sets() {
     awk -F'|' '
@@ -97,6 +111,15 @@ await() {
         [ $SECONDS -lt $end ] || return 1
         sleep 0.01
     done
+}
+
+# lets_look PID: who comes to the cube that it has looks on, and does not get in:
+# one of its open files is the meeting place of host/look/look.h.
+lets_look() {
+    local places
+    places=$(awk '/@incode-look-/ { print "socket:[" $7 "]" }' /proc/net/unix)
+    [ -n "$places" ] && readlink "/proc/$1/fd/"* 2> /dev/null |
+        grep -qFx "$places"
 }
 
 # What needs no waiting is told long before a node's patience of 60 s is over,

@@ -312,7 +312,8 @@ END
     check 'links/a second host: exit 4' "exit $status" \
         test $status = 4 -a $((SECONDS - began)) -lt $soon
     check 'links/a second host: it is told' "$(last "$scratch/errors")" \
-        grep -q '^incode: 127.0.0.1:.*: in use by incode run .*; ' \
+        grep -q "^incode: 127.0.0.1:$((base + 80)): in use by incode run .*, \
+process $host of .*; " \
         "$scratch/errors"
     at_work 'a second host'
     wait $host

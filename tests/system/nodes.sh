@@ -58,6 +58,17 @@ nobody() {
     told nodes-none 4 'nodes? 0-?3?: nodes: .*; ' --cube four.cube
     told nodes-twice 2 'named twice' --cube four.cube --unix host.socket
     told nodes-nowhere 2 '--cube FILE' --json
+    printf x > port
+    for name in port unix; do
+        "$INCODE" nodes --json --$name $name > said 2> errors
+        jq -e '.command == "nodes" and .status == 4 and
+            (.error | contains("'$name'"))' said > /dev/null 2>&1
+        check nodes-json-$name "$(tail -c 300 said)|$(last errors)" [ $? = 0 ]
+    done
+    "$INCODE" console --json < /dev/null > said 2> errors
+    jq -e '.status == 2 and (.error | contains("--cube FILE"))' said \
+        > /dev/null 2>&1
+    check console-json-nowhere "$(tail -c 300 said)|$(last errors)" [ $? = 0 ]
     told nodes-usage 2 'write --cube' four.cube
 }
 
@@ -69,6 +80,18 @@ whole() {
     told nodes-one-wire 0 '^0-3 +linux' --unix host.socket
     told nodes-json 0 '"links_up":3.*"wires":\[\],"status":0' --cube four.cube \
         --json
+    # The socket is another user's; root may do as it likes.
+    local other=
+    [ "$(id -u)" != 0 ] || other='setpriv --reuid 65534 --clear-groups'
+    chmod 000 host.socket
+    if $other "$INCODE" --version > version 2>&1; then
+        $other "$INCODE" nodes --unix host.socket > said 2>&1
+        check nodes-no-permission "$(last said)" \
+            grep -q 'no permission to use the socket host.socket; ' said
+    else
+        skip nodes-no-permission 'another user cannot start the program'
+    fi
+    chmod 700 host.socket
     # Another program has the cube, then a run.
     mkfifo lines
     "$INCODE" console --cube four.cube < lines > console.log 2>&1 &

@@ -6,8 +6,8 @@
  *
  *     stranger SEED PID
  *
- * At its end it prints how many listeners it has found of each kind, and how
- * many of its calls were taken.
+ * At its end it prints how many of its calls were taken, and each listener that
+ * it has found, a line each: `tcp PORT`, `unix PATH`.
  */
 #include <arpa/inet.h>
 #include <dirent.h>
@@ -400,6 +400,17 @@ static void run(void)
     }
 }
 
+static void print_target(const struct target *t)
+{
+    const char *path = t->address.un.sun_path;
+    if (t->address.any.sa_family != AF_UNIX) {
+        printf("tcp %u\n", ntohs(t->address.in.sin_port)); /* as sin6_port */
+    } else {
+        printf("unix %s%s\n", path[0] == '\0' ? "@" : "",
+               path[0] == '\0' ? path + 1 : path);
+    }
+}
+
 int main(int argc, char **argv)
 {
     if (argc != 3) {
@@ -413,11 +424,10 @@ int main(int argc, char **argv)
         all.call[i].fd = -1;
     }
     run();
-    unsigned found[2] = {0, 0};
+    printf("%lu tcp %lu unix calls taken, %lu refused\n", all.taken[0],
+           all.taken[1], all.refused);
     for (unsigned i = 0; i < all.targets; i++) {
-        found[all.target[i].address.any.sa_family == AF_UNIX]++;
+        print_target(&all.target[i]);
     }
-    printf("%u tcp %u unix; %lu tcp %lu unix calls taken, %lu refused\n",
-           found[0], found[1], all.taken[0], all.taken[1], all.refused);
     return 0;
 }

@@ -8,18 +8,6 @@ cube=$scratch/lab.cube
 errors=$scratch/errors
 stats=$scratch/stats.json
 
-# need_boards NAME BOARD: ends the script where there is no emulator or image.
-need_boards() {
-    if ! command -v qemu-system-arm > /dev/null; then
-        skip "$1" 'qemu-system-arm is not there: make deps'
-        exit 0
-    fi
-    if [ ! -r "$BUILD/firmware/$2.img" ]; then
-        skip "$1" "there is no $BUILD/firmware/$2.img: make firmware"
-        exit 0
-    fi
-}
-
 # make_points FILE N: and $expected, the digest of their triangulation.
 make_points() {
     "$INCODE" gen uniform "$2" --seed 1 -o "$1" 2> /dev/null
