@@ -176,9 +176,8 @@ static uint32_t *head_of(const struct incode_afl *afl, uint32_t key,
     return &afl->heads[((key * UINT32_C(2654435761) >> 7) + part) & afl->mask];
 }
 
-/* Where a face is, and its twin. */
-static uint32_t *head_of_face(const struct incode_afl *afl, uint32_t key,
-                              uint32_t b, uint32_t c)
+uint32_t *incode_afl_list(const struct incode_afl *afl, uint32_t key,
+                          uint32_t b, uint32_t c)
 {
     uint32_t part = 0;
     if (afl->wide_count > 0)
@@ -237,7 +236,7 @@ static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts)
     while (all != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[all];
         incode_afl_breathe_at(afl, all);
-        uint32_t *head = head_of_face(afl, key, node->b, node->c);
+        uint32_t *head = incode_afl_list(afl, key, node->b, node->c);
         uint32_t next = node->next;
         node->next = *head;
         *head = all;
@@ -337,7 +336,7 @@ static __attribute__((noinline)) void breathe_over(const struct incode_afl *afl,
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                            uint32_t c)
 {
-    uint32_t *link = head_of_face(afl, key, b, c), passed = 0;
+    uint32_t *link = incode_afl_list(afl, key, b, c), passed = 0;
     afl->searches++;
     while (*link != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[*link];
@@ -375,7 +374,7 @@ void incode_afl_open(struct incode_afl *afl, uint32_t key, uint32_t b,
 {
     uint32_t i = take_node(afl);
     struct incode_afl_node *node = &afl->nodes[i];
-    uint32_t *head = head_of_face(afl, key, b, c);
+    uint32_t *head = incode_afl_list(afl, key, b, c);
     *node = (struct incode_afl_node){key, b, c, *head};
     *head = i;
     struct incode_touched *entry =
@@ -547,7 +546,7 @@ uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
 static uint32_t find_face(const struct incode_afl *afl, uint32_t key,
                           uint32_t b, uint32_t c)
 {
-    uint32_t i = *head_of_face(afl, key, b, c);
+    uint32_t i = *incode_afl_list(afl, key, b, c);
     while (i != INCODE_AFL_NIL &&
            (afl->nodes[i].key != key || afl->nodes[i].b != b ||
             afl->nodes[i].c != c))

@@ -97,6 +97,24 @@ static inline void incode_afl_breathe_at(const struct incode_afl *afl,
         incode_afl_breathe(afl, 1);
 }
 
+/* Asks for what each of some lists has next, in the cache, and goes on to where
+ * the next but one is found; best when what was asked for before has come.
+ * Returns how many have not ended, now the first of them.  Where faces have
+ * gone since, it leads elsewhere, in vain. */
+static inline uint32_t incode_afl_fetch(const struct incode_afl *afl,
+                                        const uint32_t **link, uint32_t count)
+{
+    uint32_t left = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t next = *link[i];
+        if (next == INCODE_AFL_NIL)
+            continue;
+        link[left] = &afl->nodes[next].next;
+        __builtin_prefetch(link[left++], 1);
+    }
+    return left;
+}
+
 /* Bytes for so many faces and touched bricks. */
 size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks);
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
@@ -112,6 +130,11 @@ struct incode_touched *incode_afl_find(const struct incode_afl *afl,
                                        uint32_t brick);
 /* Forgets a brick, which must have no face left. */
 void incode_afl_drop(struct incode_afl *afl, uint32_t brick);
+
+/* Where the first face is found of the list that a face and its twin are in, or
+ * would be. */
+uint32_t *incode_afl_list(const struct incode_afl *afl, uint32_t key,
+                          uint32_t b, uint32_t c);
 
 /* Opens the face (key, b, c), whose unknown side is where orient3d(key, b, c,
  * p) > 0; or closes it where its twin (key, c, b) is open.  One that is open

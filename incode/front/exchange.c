@@ -10,6 +10,7 @@ enum {
     SWEEP_ENTRIES = 512,
     SWEEP_COMMITS = 64,
     LOOKS = 256,     /* at bricks or entries, a call */
+    WINDOW = 4,      /* bricks ahead of one that waits */
     SWEEP_SHARE = 4, /* tetrahedra for each open face between two sweeps */
     SWEEP_LEAST = 1024,
     SEED_TRIES = 64, /* at the start */
@@ -98,9 +99,11 @@ void incode_exchange_start(struct incode_front *front)
                                     .words = (own + 63) / 64,
                                     .left = own};
     memcpy(fresh.lo, e->lo, sizeof fresh.lo);
-    for (int d = 0; d < 3; d++)
-        fresh.floor[d] =
-            front->job.lo[d] > e->lo[d] ? front->job.lo[d] : -__builtin_inf();
+    for (int d = 0; d < 3; d++) {
+        bool below = front->job.lo[d] > e->lo[d];
+        fresh.floor[d] = below ? front->job.lo[d] : -__builtin_inf();
+        fresh.below |= (unsigned)below << d;
+    }
     *e = fresh;
     memset(e->ready, 0, e->words * sizeof *e->ready);
     memset(e->deferred, 0, e->words * sizeof *e->deferred);
@@ -141,14 +144,11 @@ static void mark(struct incode_front *front, uint32_t v)
         incode_afl_touch(&front->afl, brick)->mark = front->exchange.sweep;
 }
 
-void incode_exchange_toggle(struct incode_front *front, const uint32_t f[3],
-                            enum incode_face_state state)
+void incode_exchange_open(struct incode_front *front, const uint32_t f[3],
+                          enum incode_face_state state)
 {
     struct incode_exchange *e = &front->exchange;
-    bool own = incode_own(front, f[0]);
-    if (incode_afl_close_twin(&front->afl, f[0], f[1], f[2]))
-        return;
-    if (state == INCODE_FACE_HELD && !own)
+    if (state == INCODE_FACE_HELD && !incode_own(front, f[0]))
         state = INCODE_FACE_OPEN; /* of hubs: in nobody's turn */
     incode_afl_open(&front->afl, f[0], f[1], f[2], state);
     if (state == INCODE_FACE_OPEN)
@@ -160,11 +160,12 @@ void incode_exchange_toggle(struct incode_front *front, const uint32_t f[3],
         mark(front, f[i]);
 }
 
-bool incode_exchange_is_near(const struct incode_front *front,
-                             const double *const p[4])
+bool incode_exchange_is_near_side(const struct incode_front *front,
+                                  const double *const p[4])
 {
     bool near = false;
-    for (int d = 0; d < 3; d++) {
+    for (unsigned left = front->exchange.below; left != 0; left &= left - 1) {
+        unsigned d = (unsigned)__builtin_ctz(left);
         double a = p[0][d], b = p[1][d], c = p[2][d], e = p[3][d];
         double lo = a < b ? a : b, hi = a < b ? b : a;
         double lo2 = c < e ? c : e, hi2 = c < e ? e : c;
@@ -198,19 +199,6 @@ bool incode_exchange_is_outward(const struct incode_front *front,
 }
 
 /* ---- tetrahedra ---- */
-
-void incode_exchange_share(struct incode_front *front, const uint32_t v[4])
-{
-    struct incode_exchange *e = &front->exchange;
-    unsigned count = v[3] == INCODE_NONE ? 3 : 4;
-    bool foreign = false;
-    for (unsigned i = 0; i < count; i++)
-        foreign = foreign || !incode_own(front, v[i]);
-    e->changes++;
-    e->fetched = 0;
-    if (foreign)
-        e->peers.share(e->peers.context, v);
-}
 
 /* A tetrahedron or facet that another can have built. */
 static bool may_come(const struct incode_front *front, const uint32_t *v,
@@ -401,12 +389,27 @@ uint64_t incode_exchange_pending(const struct incode_front *front,
     return entry == NULL || returning ? 0 : entry->pending & ~entry->waiting;
 }
 
+/* The position beyond which no star is begun: as long as others wait for pages,
+ * near them, as what is built far ahead opens faces there again. */
+static uint32_t window_end(const struct incode_front *front)
+{
+    uint32_t end = UINT32_MAX;
+    for (uint32_t left = front->busy; left != 0; left &= left - 1) {
+        uint32_t v = front->task[__builtin_ctz(left)].v;
+        if (!incode_own(front, v))
+            continue;
+        uint32_t position = position_of(front, v / INCODE_BRICK_POINTS);
+        end = position + WINDOW < end ? position + WINDOW : end;
+    }
+    return end;
+}
+
 /* The next own vertex with faces to be pursued. */
 static enum found next_own(struct incode_front *front, uint32_t *v)
 {
     struct incode_exchange *e = &front->exchange;
-    uint32_t position, looked = 0;
-    while (lowest(e, e->ready, &e->ready_from, &position)) {
+    uint32_t position, looked = 0, end = window_end(front);
+    while (lowest(e, e->ready, &e->ready_from, &position) && position < end) {
         uint32_t brick = front->job.last - 1 - position;
         uint64_t ready = incode_exchange_pending(front, brick);
         if (ready != 0) {

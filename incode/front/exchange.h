@@ -133,17 +133,32 @@ static inline bool incode_exchange_is_foreign(const struct incode_front *front,
 /* Whether a tetrahedron is so near a side of the region beyond which there are
  * lower ones that its faces may look out there; p: its vertices' coordinates.
  */
-bool incode_exchange_is_near(const struct incode_front *front,
-                             const double *const p[4]);
+bool incode_exchange_is_near_side(const struct incode_front *front,
+                                  const double *const p[4]);
+
+static inline bool incode_exchange_is_near(const struct incode_front *front,
+                                           const double *const p[4])
+{
+    return front->exchange.below != 0 && incode_exchange_is_near_side(front, p);
+}
 
 /* Whether a face does: a step of an edge's length from its centre outward leads
  * below the region's box. */
 bool incode_exchange_is_outward(const struct incode_front *front,
                                 const double *const p[3]);
 
-/* Opens f or closes its twin, in the list of f[0]. */
-void incode_exchange_toggle(struct incode_front *front, const uint32_t f[3],
-                            enum incode_face_state state);
+/* Opens f, whose twin is not open, in the list of f[0]. */
+void incode_exchange_open(struct incode_front *front, const uint32_t f[3],
+                          enum incode_face_state state);
+
+/* The same, or closes its twin. */
+static inline void incode_exchange_toggle(struct incode_front *front,
+                                          const uint32_t f[3],
+                                          enum incode_face_state state)
+{
+    if (!incode_afl_close_twin(&front->afl, f[0], f[1], f[2]))
+        incode_exchange_open(front, f, state);
+}
 
 /* A face of the vertex may be open. */
 void incode_exchange_ready(struct incode_front *front, uint32_t v);
@@ -155,7 +170,16 @@ uint64_t incode_exchange_pending(const struct incode_front *front,
 /* A brick that was spilled is whole again. */
 void incode_exchange_returned(struct incode_front *front, uint32_t brick);
 
-/* Tells the others of a tetrahedron or facet of the hull that was built. */
-void incode_exchange_share(struct incode_front *front, const uint32_t v[4]);
+/* A tetrahedron or facet of the hull was built; shared: others have a vertex of
+ * it, and are told. */
+static inline void incode_exchange_share(struct incode_front *front,
+                                         const uint32_t v[4], bool shared)
+{
+    struct incode_exchange *e = &front->exchange;
+    e->changes++;
+    e->fetched = 0;
+    if (shared)
+        e->peers.share(e->peers.context, v);
+}
 
 #endif

@@ -186,12 +186,12 @@ static void toggle_at_hand(struct incode_front *front, const uint32_t f[3],
 {
     if (!front->exchange.on)
         incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
-    else
-        incode_exchange_toggle(front, f,
-                               incode_exchange_is_foreign(front, f, 3)
-                                   ? INCODE_FACE_FOREIGN
-                               : held ? INCODE_FACE_HELD
-                                      : INCODE_FACE_OPEN);
+    else if (!incode_afl_close_twin(&front->afl, f[0], f[1], f[2]))
+        incode_exchange_open(front, f,
+                             incode_exchange_is_foreign(front, f, 3)
+                                 ? INCODE_FACE_FOREIGN
+                             : held ? INCODE_FACE_HELD
+                                    : INCODE_FACE_OPEN);
 }
 
 void incode_front_toggle(struct incode_front *front, const uint32_t f[3],

@@ -47,6 +47,7 @@
 enum {
     INCODE_STAR_FACES = 256, /* open faces at one vertex held at hand */
     INCODE_STAR_BUILT = 256, /* tetrahedra a step, at most */
+    INCODE_STAR_LATER = 32,  /* faces that wait to toggle elsewhere */
     INCODE_TASKS = 16,       /* vertices that wait for an answer */
     INCODE_SPILL_FACES = 1024,
     INCODE_SPILL_BUILT = 128, /* tetrahedra a step while faces are spilled */
@@ -77,7 +78,9 @@ struct incode_star {
     alignas(64) uint32_t b[INCODE_STAR_FACES];
     alignas(64) uint32_t c[INCODE_STAR_FACES];
     uint16_t ib[INCODE_STAR_FACES], ic[INCODE_STAR_FACES];
-    uint32_t kept;
+    uint32_t kept, later_count, links;
+    const uint32_t *link[INCODE_STAR_LATER]; /* ways through their lists */
+    uint32_t later[INCODE_STAR_LATER][3];    /* in other vertices' lists */
     uint32_t apexes[INCODE_STAR_BUILT][3];
 };
 
@@ -103,6 +106,7 @@ struct incode_exchange {
     uint64_t *committed; /* its stars are closed */
     double lo[3];        /* of all points */
     double floor[3];     /* of the region: below are lower ones; or -inf */
+    unsigned below;      /* bit d: there are some along d */
     uint32_t words;      /* of a map */
     uint32_t ready_from, deferred_from; /* no bit in words before */
     uint32_t elsewhere; /* entries of others' bricks, from `at` on, whose lists
@@ -332,6 +336,14 @@ static inline bool incode_precedes(const struct incode_front *front, uint32_t v,
     return front->exchange.on ? v > w : v < w;
 }
 
+/* Which of three vertices comes first. */
+static inline unsigned incode_front_first(const struct incode_front *front,
+                                          const uint32_t v[3])
+{
+    unsigned least = incode_precedes(front, v[1], v[0]);
+    return incode_precedes(front, v[2], v[least]) ? 2 : least;
+}
+
 /* Which of v's vertices has the face in its list: *turn is its index; false:
  * the face is not pursued.  p: the coordinates of its vertices. */
 bool incode_front_key_slow(const struct incode_front *front,
@@ -345,8 +357,7 @@ static inline bool incode_front_key(const struct incode_front *front,
     if (front->hub_count != 0 || !incode_own(front, v[0]) ||
         !incode_own(front, v[1]) || !incode_own(front, v[2]))
         return incode_front_key_slow(front, v, p, turn);
-    unsigned least = incode_precedes(front, v[1], v[0]);
-    *turn = incode_precedes(front, v[2], v[least]) ? 2 : least;
+    *turn = incode_front_first(front, v);
     return true;
 }
 

@@ -12,6 +12,7 @@
 #ifndef INCODE_OWNER_H
 #define INCODE_OWNER_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "incode/predicates/predicates.h"
@@ -21,13 +22,19 @@ enum incode_owner_rule {
     INCODE_OWNER_LOWEST    /* of number: coordinates do not count */
 };
 
-/* Which of four points is the smallest. */
+/* Which of four points is the smallest: by x alone, as a rule, and without a
+ * branch, as nothing foretells which it is. */
 static inline unsigned incode_smallest(const double *const p[4])
 {
     unsigned least = 0;
-    for (unsigned i = 1; i < 4; i++)
-        if (incode_lexicographic(p[i], p[least]) < 0)
-            least = i;
+    double x = p[0][0];
+    for (unsigned i = 1; i < 4; i++) {
+        bool less = p[i][0] < x;
+        if (__builtin_expect(p[i][0] == x, 0))
+            less = incode_lexicographic(p[i], p[least]) < 0;
+        x = less ? p[i][0] : x;
+        least = less ? i : least;
+    }
     return least;
 }
 

@@ -70,17 +70,52 @@ static void toggle_here(struct incode_front *front, uint32_t b, uint32_t c,
     push_face(star, b, c, ib, ic);
 }
 
+/* Toggles what has waited, when the lists of the last ones are there, too. */
+static void toggle_later(struct incode_front *front)
+{
+    enum { ROUNDS = 3 };
+    struct incode_star *star = &front->star;
+    for (unsigned i = 0; i < ROUNDS && star->links > 0; i++)
+        star->links = incode_afl_fetch(&front->afl, star->link, star->links);
+    for (uint32_t i = 0; i < star->later_count; i++)
+        incode_front_toggle(front, star->later[i], false);
+    star->later_count = star->links = 0;
+}
+
+/* A face toggles in another vertex's list: where nobody else looks there before
+ * the star is shut, it waits until then, and its list comes meanwhile. */
+static void toggle_there(struct incode_front *front, const uint32_t f[3],
+                         bool held)
+{
+    struct incode_star *star = &front->star;
+    if (held) {
+        incode_front_toggle(front, f, true);
+        return;
+    }
+    memcpy(star->later[star->later_count++], f, sizeof star->later[0]);
+    star->links = incode_afl_fetch(&front->afl, star->link, star->links);
+    const uint32_t *link = incode_afl_list(&front->afl, f[0], f[1], f[2]);
+    __builtin_prefetch(link, 1);
+    star->link[star->links++] = link;
+    if (star->later_count == INCODE_STAR_LATER)
+        toggle_later(front);
+}
+
+/* A tetrahedron is inside where all its vertices are own and none is a hub. */
 static void toggle_face(struct incode_front *front, const uint32_t v[3],
                         const double *const p[3], const uint16_t hint[3],
-                        bool near)
+                        bool inside, bool near)
 {
     unsigned turn;
-    if (!incode_front_key(front, v, p, &turn))
+    if (inside)
+        turn = incode_front_first(front, v);
+    else if (!incode_front_key(front, v, p, &turn))
         return;
     const uint32_t f[3] = {v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]};
     bool held = near && incode_exchange_is_outward(front, p);
-    if (f[0] != front->star.v || incode_exchange_is_foreign(front, f, 3)) {
-        incode_front_toggle(front, f, held);
+    if (f[0] != front->star.v ||
+        (!inside && incode_exchange_is_foreign(front, f, 3))) {
+        toggle_there(front, f, held);
         return;
     }
     if (held) {
@@ -93,16 +128,10 @@ static void toggle_face(struct incode_front *front, const uint32_t v[3],
     toggle_here(front, f[1], f[2], hint[(turn + 1) % 3], hint[(turn + 2) % 3]);
 }
 
-/* The region of its owner keeps a tetrahedron. */
-static bool is_kept(const struct incode_front *front, const uint32_t v[4],
-                    const double *const p[4])
+static bool all_own(const struct incode_front *front, const uint32_t v[4])
 {
-    bool own[4], all = true;
-    for (int i = 0; i < 4; i++) {
-        own[i] = incode_own(front, v[i]);
-        all = all && own[i];
-    }
-    return all || own[incode_owner(front->owner_rule, v, p)];
+    return incode_own(front, v[0]) && incode_own(front, v[1]) &&
+           incode_own(front, v[2]) && incode_own(front, v[3]);
 }
 
 /* Emits the tetrahedron v of positive orientation if it is the region's own,
@@ -113,9 +142,11 @@ static void build(struct incode_front *front, const uint32_t v[4],
                   bool through)
 {
     struct incode_star *star = &front->star;
+    bool all = all_own(front, v);
     star->built++;
     front->counts.built++;
-    if (is_kept(front, v, p)) {
+    /* The region of its owner keeps it. */
+    if (all || incode_own(front, v[incode_owner(front->owner_rule, v, p)])) {
         memcpy(star->apexes[star->kept++], v + 1, 3 * sizeof *v);
         front->counts.kept++;
         INCODE_ASSERT(star->kept <= INCODE_STAR_BUILT);
@@ -124,8 +155,9 @@ static void build(struct incode_front *front, const uint32_t v[4],
     bool near = false;
     if (front->exchange.on) {
         near = p[0] != NULL && incode_exchange_is_near(front, p);
-        incode_exchange_share(front, v);
+        incode_exchange_share(front, v, !all);
     }
+    bool inside = all && front->hub_count == 0;
     /* Faces with their unknown side outward: of (v, b, c, a) these are
      * (v, c, b) behind, (v, a, c), (v, b, a) and (b, c, a). */
     static const uint8_t face[4][3] = {
@@ -135,7 +167,7 @@ static void build(struct incode_front *front, const uint32_t v[4],
         const uint32_t f[3] = {v[j[0]], v[j[1]], v[j[2]]};
         const double *const q[3] = {p[j[0]], p[j[1]], p[j[2]]};
         const uint16_t i[3] = {hint[j[0]], hint[j[1]], hint[j[2]]};
-        toggle_face(front, f, q, i, near);
+        toggle_face(front, f, q, i, inside, near);
     }
 }
 
@@ -157,7 +189,9 @@ static void find_hull(struct incode_front *front, const uint32_t v[4])
     front->counts.hull_facets++;
     if (front->exchange.on) {
         front->star.built++; /* it takes as much room */
-        incode_exchange_share(front, v);
+        bool all = incode_own(front, v[0]) && incode_own(front, v[1]) &&
+                   incode_own(front, v[2]);
+        incode_exchange_share(front, v, !all);
     }
 }
 
@@ -188,6 +222,7 @@ bool incode_star_open(struct incode_front *front, uint32_t v)
     uint32_t pairs[INCODE_STAR_FACES / 2][2];
     star->v = v;
     star->faces = star->built = star->kept = 0;
+    star->later_count = star->links = 0;
     uint32_t n = incode_afl_take(&front->afl, v, pairs, INCODE_STAR_FACES / 2,
                                  &star->more);
     for (uint32_t i = 0; i < n; i++)
@@ -223,6 +258,7 @@ void incode_star_build(struct incode_front *front, const uint32_t v[4],
 
 void incode_star_shut(struct incode_front *front)
 {
+    toggle_later(front);
     put_back(front);
     emit(front);
 }
@@ -235,6 +271,7 @@ static void build_alone(struct incode_front *front, const uint32_t v[4],
     struct incode_star *star = &front->star;
     star->v = v[0];
     star->faces = star->built = star->kept = 0;
+    star->later_count = star->links = 0;
     star->more = true;
     build(front, v, p, NO_HINTS, through);
     incode_star_shut(front);

@@ -6,8 +6,10 @@
 #include "stages.h"
 
 enum {
-    EMIT_A_UNIT = 8, /* tetrahedra */
-    AT_ONCE = 16     /* points or cells, in a breath */
+    EMIT_A_UNIT = 8,  /* tetrahedra */
+    FETCHED = 32,     /* lists, side by side */
+    FETCHED_MOST = 8, /* of each, cells that come first */
+    AT_ONCE = 16      /* points or cells, in a breath */
 };
 
 /* Which of a cell's vertices is the smallest, whose brick owns it. */
@@ -95,7 +97,7 @@ enum incode_insertion_step incode_insertion_list(struct incode_insertion *n)
     }
     if (n->cell < x->cells)
         return INCODE_INSERTION_WORKED;
-    n->v = 1;
+    n->v = n->fetched = 1;
     n->stage = INCODE_INSERTION_EMIT;
     return INCODE_INSERTION_WORKED;
 }
@@ -141,11 +143,42 @@ static enum incode_insertion_step emit_some(struct incode_insertion *n,
     return INCODE_INSERTION_WORKED;
 }
 
+/* The lists of the points from v on come into the cache, all at a time: one
+ * after the other, each cell waits for the one before it, a fifth of a node's
+ * time on uniform points. */
+static void fetch(const struct incode_insertion *n)
+{
+    const struct incode_complex *x = &n->complex;
+    uint32_t next[FETCHED], count = 0, end = x->points - n->v;
+    incode_maker_breathe(n->maker, FETCHED * FETCHED_MOST / 8);
+    for (uint32_t i = 0; i < FETCHED && i < end; i++) {
+        next[count] = x->point[n->v + i].cell;
+        if (next[count] == INCODE_NONE)
+            continue;
+        __builtin_prefetch(incode_complex_cell(x, next[count]));
+        count++;
+    }
+    for (unsigned round = 1; round < FETCHED_MOST && count > 0; round++) {
+        uint32_t left = 0;
+        for (uint32_t i = 0; i < count; i++) {
+            next[left] = incode_complex_cell(x, next[i])->n[0].cell;
+            if (next[left] == INCODE_CELL_NONE)
+                continue;
+            __builtin_prefetch(incode_complex_cell(x, next[left]));
+            left++;
+        }
+        count = left;
+    }
+}
+
 enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n)
 {
     struct incode_complex *x = &n->complex;
-    for (unsigned i = 0; i < INCODE_INSERTION_STEPS && n->v < x->points;
-         i++, n->v++)
+    if (n->v >= n->fetched) {
+        fetch(n);
+        n->fetched = n->v + FETCHED;
+    }
+    for (; n->v < x->points && n->v < n->fetched; n->v++)
         if (x->point[n->v].cell != INCODE_NONE)
             return emit_some(n, &x->point[n->v]);
     if (n->v == x->points)

@@ -99,6 +99,7 @@ struct incode_insertion {
     unsigned level;      /* of the points that are inserted now */
     uint32_t next, near; /* the staged point at work, and a vertex near by */
     uint32_t cell, v;    /* that is judged, whose tetrahedra are emitted */
+    uint32_t fetched;    /* the lists of points before it are in the cache */
     uint32_t final;      /* cells so far */
     uint32_t reached;    /* cells, by boxes and by no point yet */
     uint32_t listed;     /* of these; INCODE_NONE: none is */

@@ -85,10 +85,24 @@ uint16_t node_shares_owner(const struct node_shares *shares, uint32_t brick)
 
 /* ---- batches ---- */
 
+/* n tetrahedra of up to three others each begin 3 n batches at most; and, as
+ * a batch is begun when the one before it to the same node is full, no more
+ * than 3 n / 32, rounded up for each node. */
 static size_t shares_room(void *context)
 {
+    enum { EACH = NODE_SHARES_A_BATCH };
     const struct node_shares *s = context;
-    return (NODE_SHARE_BATCHES - s->used) / OTHERS_MAX;
+    size_t free = NODE_SHARE_BATCHES - s->used, others = s->nodes - 1;
+    size_t told = others < OTHERS_MAX ? others : (size_t)OTHERS_MAX;
+    if (told == 0) {
+        return (size_t)NODE_SHARE_BATCHES * EACH;
+    }
+    size_t room = free / told;
+    if (free > others) {
+        size_t whole = (free * EACH - others * (EACH - 1)) / told;
+        room = whole > room ? whole : room;
+    }
+    return room;
 }
 
 static void tell(struct node_shares *s, uint16_t to, const uint32_t v[4])

@@ -378,6 +378,36 @@ static void searches_of_long_lists(void **unused)
     free(memory);
 }
 
+/* Ways through lists of 0, 1 and 3 faces end in that order, and change nothing;
+ * one of them leads past every face of its list. */
+static void fetched_lists(void **context)
+{
+    (void)context;
+    enum { LISTS = 3 };
+    static const uint32_t faces[LISTS] = {0, 3, 1}, left[] = {2, 1, 1, 0, 0};
+    struct incode_afl afl;
+    void *memory = malloc(incode_afl_bytes(FACES, BRICKS));
+    const uint32_t *link[LISTS];
+    assert_non_null(memory);
+    incode_afl_init(&afl, memory, FACES, BRICKS, NULL);
+    for (uint32_t v = 0; v < LISTS; v++) {
+        for (uint32_t i = 0; i < faces[v]; i++)
+            incode_afl_toggle(&afl, v, 100 + i, 200 + i);
+        link[v] = incode_afl_list(&afl, v, 100, 200);
+        assert_ptr_equal(link[v], incode_afl_list(&afl, v, 200, 100));
+    }
+    uint32_t count = LISTS;
+    for (uint32_t i = 0; i < sizeof left / sizeof *left; i++) {
+        count = incode_afl_fetch(&afl, link, count);
+        assert_int_equal(count, left[i]);
+        if (count > 0)
+            assert_ptr_equal(link[0], &afl.nodes[2 - i].next);
+    }
+    assert_int_equal(afl.count, 4);
+    assert_null(afl.fault);
+    free(memory);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -386,6 +416,7 @@ int main(void)
         cmocka_unit_test(crowded),
         cmocka_unit_test(held_of_a_long_list),
         cmocka_unit_test(searches_of_long_lists),
+        cmocka_unit_test(fetched_lists),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
