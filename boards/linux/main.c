@@ -203,6 +203,7 @@ static struct node_identity identity_of(const struct linux_options *options)
     id.serial_baud = (uint32_t)options->serial_baud;
     id.dead_us = (uint32_t)options->dead;
     id.host_port = options->host_port != 0;
+    id.host_ports = (uint8_t)options->host_ports;
     return id;
 }
 

@@ -42,6 +42,9 @@ static const char help[] =
     "                     serial:DEVICE:BAUD or serial:DEVICE:BAUD:rtscts\n"
     "\n"
     "Of the host that starts nodes itself:\n"
+    "  --host-ports N     nodes 0 to N - 1 have host ports, a power of two to "
+    "8 "
+    "(1)\n"
     "  --links FD,FD,..   the wires of links 0, 1, .. are these open files\n"
     "  --epoch N          of this start, never repeated\n"
     "  --awake US         microseconds to stay awake when there is nothing to "
@@ -151,6 +154,7 @@ static const char *read_one(const char *name, const char *text,
                  {"--epoch", &options->epoch, UINT32_MAX},
                  {"--serial-baud", &options->serial_baud, UINT32_MAX},
                  {"--host-port", &options->host_port, 1},
+                 {"--host-ports", &options->host_ports, CUBE_HOST_PORTS_MAX},
                  {"--dead", &options->dead, UINT32_MAX},
                  {"--awake", &options->awake, UINT32_MAX}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
@@ -185,7 +189,10 @@ static const char *read_one(const char *name, const char *text,
 static bool wires_fit(const struct linux_options *options)
 {
     unsigned links = (unsigned)options->dimension +
-                     (options->node == 0 || options->host_port != 0 ? 1 : 0);
+                     (options->node == 0 || options->host_port != 0 ||
+                              options->node < options->host_ports
+                          ? 1
+                          : 0);
     if (options->node == LINUX_UNNAMED) {
         links = options->links_count + options->wires_count;
         if (links == 0) {

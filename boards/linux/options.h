@@ -25,6 +25,7 @@ struct linux_options {
     uint64_t epoch;       /* of this start; 0: it draws one */
     uint64_t serial_baud; /* of the slowest serial wire; 0: there is none */
     uint64_t host_port;   /* 1: it has a host port although not node 0 */
+    uint64_t host_ports;  /* nodes before this one have; 0: as with 1 */
     uint64_t dead;        /* microseconds until a link is given up; 0: never */
     uint64_t awake;       /* microseconds to stay awake with nothing to do */
     int links[CUBE_LINKS_MAX]; /* open files, given by who starts the node */

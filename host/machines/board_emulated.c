@@ -354,7 +354,7 @@ int host_emulated_start(const struct host_board *board,
     started->machine = machine_of(cube);
     started->limited = true;
     started->memory_held = ", held by the board";
-    (void)tcp_buffers(cube->cluster.port.tcp.fd, &started->send_bytes,
+    (void)tcp_buffers(cube->cluster.port[0].tcp.fd, &started->send_bytes,
                       &started->receive_bytes);
     return 0;
 }

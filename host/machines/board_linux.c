@@ -19,7 +19,7 @@ static int start(const struct host_board *board,
     started->memory_held = cluster.limited
                                ? ", held by the kernel"
                                : " (a sanitizer build: not held by the kernel)";
-    (void)tcp_buffers(cluster.port.tcp.fd, &started->send_bytes,
+    (void)tcp_buffers(cluster.port[0].tcp.fd, &started->send_bytes,
                       &started->receive_bytes);
     return 0;
 }

@@ -62,11 +62,11 @@ static bool set_limit(int resource, uint64_t bytes)
 static void become_node(const void *context, unsigned node)
 {
     const struct host_cluster *c = context;
-    char text[7][32], links[CUBE_LINKS_MAX * 12] = "";
+    char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
     char *no_environment[] = {NULL};
     size_t at = 0;
     (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
-    for (unsigned d = 0; d < c->dimension + (node == 0 ? 1u : 0u); d++) {
+    for (unsigned d = 0; d < c->dimension + (node < c->ports ? 1u : 0u); d++) {
         int fd = c->wires.end[node][d];
         fcntl(fd, F_SETFD, 0);
         at += (size_t)snprintf(links + at, sizeof links - at, "%s%d",
@@ -80,6 +80,7 @@ static void become_node(const void *context, unsigned node)
     snprintf(text[4], sizeof text[4], "%u", c->options.window);
     snprintf(text[5], sizeof text[5], "%lu", (unsigned long)c->epoch);
     snprintf(text[6], sizeof text[6], "%llu", (unsigned long long)c->awake_us);
+    snprintf(text[7], sizeof text[7], "%u", c->ports);
     char *argv[] = {(char[]){"incode-node"},
                     (char[]){"--node"},
                     text[0],
@@ -95,6 +96,8 @@ static void become_node(const void *context, unsigned node)
                     text[5],
                     (char[]){"--awake"},
                     text[6],
+                    (char[]){"--host-ports"},
+                    text[7],
                     (char[]){"--links"},
                     links,
                     NULL};
@@ -118,23 +121,25 @@ static int start_node(struct host_cluster *c, unsigned node,
     return host_child_start(&c->process[node], &child, error);
 }
 
-/* The host's end of its wire.  A terminal is opened by its name as a real port
- * would be. */
-static int take_wire(struct host_cluster *c, struct host_error *error)
+/* The host's ends of its wires.  A terminal is opened by its name as a real
+ * port would be. */
+static int take_wires(struct host_cluster *c, struct host_error *error)
 {
     const struct host_cluster_options *options = &c->options;
     struct host_wires *wires = &c->wires;
     struct serial_port_settings settings = {.dtr = true, .rts = true};
     if (!options->link->terminals) {
-        host_port_socket(&c->port, wires->host);
-        wires->host = -1;
+        for (unsigned i = 0; i < c->ports; i++) {
+            host_port_socket(&c->port[i], wires->host[i]);
+            wires->host[i] = -1;
+        }
         return 0;
     }
     memcpy(settings.name, wires->host_path, sizeof wires->host_path);
-    int status = host_port_serial(&c->port, &settings, error);
-    c->port.unplug_us = options->unplug_us;
-    close(wires->host);
-    wires->host = -1;
+    int status = host_port_serial(&c->port[0], &settings, error);
+    c->port[0].unplug_us = options->unplug_us;
+    close(wires->host[0]);
+    wires->host[0] = -1;
     return status;
 }
 
@@ -148,14 +153,29 @@ static uint32_t first_epoch(void)
     return epoch % (UINT32_MAX / 2) + 1;
 }
 
+/* Where wires are this machine's own, as many nodes as can be have one to the
+ * host: passing on what is another's takes a node a fifteenth of the time in
+ * which that other computes.  A board has one UART for it, and what goes over
+ * terminals is as on real wires. */
+static unsigned host_ports(const struct host_cluster_options *options)
+{
+    if (options->become != NULL || options->link->terminals ||
+        options->one_wire) {
+        return 1;
+    }
+    return options->nodes < CUBE_HOST_PORTS_MAX ? options->nodes
+                                                : CUBE_HOST_PORTS_MAX;
+}
+
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,
                        struct host_error *error)
 {
     memset(cluster, 0, sizeof *cluster);
-    cluster->wires.host = -1;
+    memset(&cluster->wires, -1, sizeof cluster->wires);
     cluster->nodes = options->nodes;
     cluster->options = *options;
+    cluster->ports = host_ports(options);
     cluster->limited = LIMITED && options->become == NULL;
     /* Not where others wait for the processor. */
     cluster->awake_us = options->nodes < host_threads() ? AWAKE_US : 0;
@@ -168,9 +188,9 @@ int host_cluster_start(struct host_cluster *cluster,
         return error->code;
     }
     int status = host_wires_make(&cluster->wires, options->link, cluster->nodes,
-                                 cluster->dimension, error);
+                                 cluster->dimension, cluster->ports, error);
     if (status == 0) {
-        status = take_wire(cluster, error);
+        status = take_wires(cluster, error);
     }
     cluster->host_epoch = cluster->epoch;
     for (unsigned i = 0; status == 0 && i < cluster->nodes; i++) {
@@ -224,7 +244,9 @@ void host_cluster_stop(struct host_cluster *cluster)
         host_child_wait(&cluster->process[i]);
     }
     host_wires_close(&cluster->wires);
-    host_port_close(&cluster->port);
+    for (unsigned i = 0; i < cluster->ports; i++) {
+        host_port_close(&cluster->port[i]);
+    }
 }
 
 /* --- as a machine --------------------------------------------------------- */
@@ -238,7 +260,7 @@ static uint64_t machine_now_us(void *context)
 static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_cluster *cluster = context;
-    host_port_idle(&cluster->port, 1, wait_us, cluster->awake_us);
+    host_port_idle(cluster->port, cluster->ports, wait_us);
 }
 
 static int machine_check(void *context, struct host_error *error)
@@ -279,7 +301,11 @@ struct host_machine host_cluster_machine(struct host_cluster *cluster)
     machine.dimension = cluster->dimension;
     machine.epoch = cluster->host_epoch;
     machine.serial_baud = cluster->options.serial_baud;
-    machine.pipe = host_port_pipe(&cluster->port);
+    machine.pipe = host_port_pipe(&cluster->port[0]);
+    machine.host_ports = (uint8_t)cluster->ports;
+    for (unsigned i = 0; i < cluster->ports; i++) {
+        machine.wires[i] = host_port_pipe(&cluster->port[i]);
+    }
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;

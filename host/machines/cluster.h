@@ -36,6 +36,7 @@ struct host_cluster_options {
     uint64_t memory; /* bytes of data memory a node, stack included */
     const struct host_link *link; /* that has pairs */
     uint64_t unplug_us;           /* for tests: see port.h */
+    bool one_wire;       /* for tests: the host has that to node 0 alone */
     unsigned window;     /* frames a link and direction; 0: node's choice */
     const char *program; /* NULL: incode-node beside this executable */
     /* Other programs than that one: what the child of a node does, which has
@@ -59,9 +60,10 @@ struct host_cluster {
     uint32_t epoch;          /* of the last start of a node */
     unsigned restarts;       /* of nodes */
     struct host_wires wires; /* the nodes' ends, for those that start again */
-    struct host_port port;   /* the wire to node 0 */
-    uint64_t awake_us;       /* that nodes and host stay awake for each other */
-    bool limited;            /* the kernel holds the nodes to their memory */
+    unsigned ports;          /* wires of the host, to nodes 0 .. ports - 1 */
+    struct host_port port[CUBE_HOST_PORTS_MAX];
+    uint64_t awake_us; /* that nodes stay awake for the host */
+    bool limited;      /* the kernel holds the nodes to their memory */
     struct host_process process[HOST_PROCESSES_MAX];
     char path[4096]; /* of the node program */
 };

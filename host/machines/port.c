@@ -81,10 +81,9 @@ static unsigned add_events(const struct host_port *port, struct pollfd *fds)
     }
 }
 
-void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
-                    uint64_t awake_us)
+void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
 {
-    struct pollfd fds[HOST_PORTS_MAX * TCP_WIRE_FDS_MAX];
+    struct pollfd fds[CUBE_HOST_PORTS_MAX * TCP_WIRE_FDS_MAX];
     nfds_t used = 0;
     for (unsigned i = 0; i < count; i++) {
         struct host_port *port = &ports[i];
@@ -98,7 +97,7 @@ void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
             unplug(port);
         }
     }
-    wait_files(fds, used, wait_us, awake_us);
+    wait_files(fds, used, wait_us, 0);
 }
 
 void host_port_rest(struct host_port *port, uint64_t rest_us)

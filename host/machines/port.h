@@ -6,13 +6,14 @@
  *
  *     host_port_socket(&port, fd);
  *     machine.pipe = host_port_pipe(&port);
- *     host_port_idle(&port, 1, wait_us, 0);
+ *     host_port_idle(&port, 1, wait_us);
  *     host_port_close(&port);
  */
 #ifndef HOST_PORT_H
 #define HOST_PORT_H
 
 #include "host/base/error.h"
+#include "transport/cube.h"
 #include "transport/drivers/serial_port.h"
 #include "transport/drivers/tcp_wire.h"
 
@@ -22,6 +23,8 @@ enum host_port_kind {
     HOST_PORT_SERIAL,
     HOST_PORT_NET
 };
+
+enum { HOST_PORTS_MAX = 2 /* of the host to a cube of a cube file */ };
 
 struct host_port {
     enum host_port_kind kind;
@@ -48,11 +51,8 @@ int host_port_net(struct host_port *port, const struct tcp_wire_config *config,
 struct link_pipe host_port_pipe(struct host_port *port);
 
 /* Sleeps until one of the ports has bytes, or room for them where there was
- * none, but no longer than wait_us; awake_us: as in wait.h.  At most
- * HOST_PORTS_MAX ports. */
-enum { HOST_PORTS_MAX = 2 };
-void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us,
-                    uint64_t awake_us);
+ * none, but no longer than wait_us.  At most CUBE_HOST_PORTS_MAX ports. */
+void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us);
 
 /* Where the other end is in use: leaves it alone for a time, if it can be
  * called again then. */

@@ -245,7 +245,7 @@ static uint64_t machine_now_us(void *context)
 static void machine_idle(void *context, uint64_t wait_us)
 {
     struct host_remote *r = context;
-    host_port_idle(r->port, r->ports, wait_us, 0);
+    host_port_idle(r->port, r->ports, wait_us);
 }
 
 static int machine_check(void *context, struct host_error *error)

@@ -27,13 +27,14 @@ static uint64_t now_us(void *context)
 
 static int send_on(void *context, const uint8_t *bytes, size_t size)
 {
-    struct host_throttled *t = context;
-    return t->machine.pipe.send(t->machine.pipe.context, bytes, size);
+    struct host_throttled_wire *wire = context;
+    return wire->pipe.send(wire->pipe.context, bytes, size);
 }
 
 static int receive_slowly(void *context, uint8_t *bytes, size_t size)
 {
-    struct host_throttled *t = context;
+    struct host_throttled_wire *wire = context;
+    struct host_throttled *t = wire->throttled;
     uint64_t passed = now_us(t) - t->start_us;
     if (t->throttle.stall_us_max != 0 && draw(&t->random) % 32 == 0) {
         sleep_us(draw(&t->random) % t->throttle.stall_us_max);
@@ -45,7 +46,7 @@ static int receive_slowly(void *context, uint8_t *bytes, size_t size)
         }
         size = allowed - t->taken < size ? (size_t)(allowed - t->taken) : size;
     }
-    int got = t->machine.pipe.receive(t->machine.pipe.context, bytes, size);
+    int got = wire->pipe.receive(wire->pipe.context, bytes, size);
     t->taken += got > 0 ? (uint64_t)got : 0;
     return got;
 }
@@ -138,7 +139,13 @@ struct host_machine host_throttle_machine(struct host_throttled *throttled,
     throttled->random = throttle->seed * 2 + 88172645463325253u;
     throttled->start_us = machine->now_us(machine->context);
     result.context = throttled;
-    result.pipe = (struct link_pipe){throttled, send_on, receive_slowly};
+    for (unsigned i = 0; i < CUBE_HOST_PORTS_MAX; i++) {
+        throttled->wire[i] = (struct host_throttled_wire){
+            throttled, i == 0 ? machine->pipe : machine->wires[i]};
+        result.wires[i] =
+            (struct link_pipe){&throttled->wire[i], send_on, receive_slowly};
+    }
+    result.pipe = result.wires[0];
     result.now_us = now_us;
     result.idle = idle;
     result.check = check;

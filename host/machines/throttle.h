@@ -1,5 +1,5 @@
 /* A machine whose host is slow on purpose, for tests: reads no faster than a
- * rate for a while, and stalls at random.
+ * rate for a while, all its wires together, and stalls at random.
  *
  * Memory: the struct.  Work: that of the machine beneath, and the sleep.
  *
@@ -20,6 +20,10 @@ struct host_throttle {
 
 struct host_throttled {
     struct host_machine machine; /* the one beneath */
+    struct host_throttled_wire {
+        struct host_throttled *throttled;
+        struct link_pipe pipe; /* beneath */
+    } wire[CUBE_HOST_PORTS_MAX];
     struct host_throttle throttle;
     uint64_t start_us, taken, random;
 };

@@ -37,34 +37,41 @@ static int make_between_nodes(struct host_wires *wires,
     return 0;
 }
 
-int host_wires_make(struct host_wires *wires, const struct host_link *link,
-                    unsigned nodes, unsigned dimension,
-                    struct host_error *error)
+static int make_to_host(struct host_wires *wires, const struct host_link *link,
+                        unsigned dimension, unsigned node,
+                        struct host_error *error)
 {
     int pair[2];
-    memset(wires, -1, sizeof *wires);
-    wires->host_path[0] = '\0';
-    if (make_between_nodes(wires, link, nodes, dimension, error) != 0) {
-        host_wires_close(wires);
-        return error->code;
-    }
     if (link->pair(pair) != 0) {
-        int reason = errno;
-        host_wires_close(wires);
         return host_fail(error, HOST_CUBE,
-                         "wire between host and node 0: %s; are %s allowed?",
-                         strerror(reason), link->needs);
+                         "wire between host and node %u: %s; are %s allowed?",
+                         node, strerror(errno), link->needs);
     }
-    wires->end[0][dimension] = pair[0];
-    wires->host = pair[1];
-    if (link->terminals &&
+    wires->end[node][dimension] = pair[0];
+    wires->host[node] = pair[1];
+    if (node == 0 && link->terminals &&
         ttyname_r(pair[1], wires->host_path, sizeof wires->host_path) != 0) {
-        host_wires_close(wires);
         return host_fail(error, HOST_CUBE,
                          "wire between host and node 0: a pseudo-terminal "
                          "without a name; is /dev/pts mounted?");
     }
     return 0;
+}
+
+int host_wires_make(struct host_wires *wires, const struct host_link *link,
+                    unsigned nodes, unsigned dimension, unsigned host_ports,
+                    struct host_error *error)
+{
+    memset(wires, -1, sizeof *wires);
+    wires->host_path[0] = '\0';
+    int status = make_between_nodes(wires, link, nodes, dimension, error);
+    for (unsigned i = 0; status == 0 && i < host_ports; i++) {
+        status = make_to_host(wires, link, dimension, i, error);
+    }
+    if (status != 0) {
+        host_wires_close(wires);
+    }
+    return status;
 }
 
 void host_wires_close_nodes(struct host_wires *wires)
@@ -79,5 +86,7 @@ void host_wires_close_nodes(struct host_wires *wires)
 void host_wires_close(struct host_wires *wires)
 {
     host_wires_close_nodes(wires);
-    close_end(&wires->host);
+    for (unsigned i = 0; i < CUBE_HOST_PORTS_MAX; i++) {
+        close_end(&wires->host[i]);
+    }
 }

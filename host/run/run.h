@@ -84,6 +84,7 @@ struct host_run_result {
     uint64_t pages; /* that there are to be asked for */
     uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
     uint64_t retransmitted, faces_spilled;
+    uint64_t bytes_sent, bytes_received; /* on the host's wire */
     unsigned lost;                  /* nodes that the run had to do without */
     unsigned restarts, generations; /* of nodes; of the cube's wiring */
     unsigned missing_wires;         /* that were named */

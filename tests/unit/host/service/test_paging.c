@@ -115,14 +115,15 @@ static void test_advice(void **unused)
     assert_int_equal(host_paging_memory(4 << 20, 1105, 1106), 8 << 20);
     assert_int_equal(host_paging_memory(4 << 20, 1105, 4420), 16 << 20);
     assert_int_equal(host_paging_memory(1433600, 335, 336), 2 << 20);
+    assert_int_equal(host_paging_memory(512 << 10, 78, 163), 1 << 20);
     assert_int_equal(host_paging_memory(4 << 20, 1105, 1 << 30),
                      HOST_MEMORY_MAX);
     begin(HOST_MEMORY_MAX, 1000);
     send(1000000);
     assert_non_null(strstr(told, "; more nodes would share them"));
     begin(512 << 20, 1000);
-    order.tree.pages = 100000;
-    send(1000000);
+    order.tree.pages = 1000000;
+    send(10000000);
     assert_non_null(strstr(told, "; --memory 1G would hold more of them"));
 }
 
