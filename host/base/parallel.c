@@ -1,6 +1,7 @@
 #include "parallel.h"
 
 #include <sched.h>
+#include <signal.h>
 
 enum { THREADS_MAX = 16 };
 
@@ -31,10 +32,14 @@ static void *trampoline(void *argument)
 void host_fork_start(struct host_fork *fork, void (*function)(void *),
                      void *argument)
 {
+    sigset_t all, before;
     fork->function = function;
     fork->argument = argument;
+    (void)sigfillset(&all);
+    (void)pthread_sigmask(SIG_BLOCK, &all, &before);
     fork->running = threads_most > 1 &&
                     pthread_create(&fork->thread, NULL, trampoline, fork) == 0;
+    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (!fork->running) {
         function(argument);
     }

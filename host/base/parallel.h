@@ -27,8 +27,8 @@ unsigned host_threads(void);
  */
 void host_threads_limit(unsigned most);
 
-/* Runs function(argument) on a thread of its own, or at once on this one where
- * no thread can be had. */
+/* Runs function(argument) on a thread of its own, which takes no signals, or at
+ * once on this one where no thread can be had. */
 void host_fork_start(struct host_fork *fork, void (*function)(void *),
                      void *argument);
 void host_fork_join(struct host_fork *fork);

@@ -80,8 +80,8 @@ void host_output_guard(void)
     (void)signal(SIGXFSZ, SIG_IGN);
 }
 
-/* Holds signals off while the list and the files change together.  No other
- * thread lives while outputs are open. */
+/* Holds signals off while the list and the files change together.  Other
+ * threads take none (parallel.h). */
 static void hold(sigset_t *before)
 {
     sigset_t set;
@@ -330,11 +330,11 @@ void host_output_expect(void)
 
 /* --- writing -------------------------------------------------------------- */
 
-static void flush(struct host_output *out)
+static void put_out(struct host_output *out, const char *bytes, size_t size)
 {
-    for (size_t done = 0; done < out->used && out->failure == 0;) {
+    for (size_t done = 0; done < size && out->failure == 0;) {
         in_place = in_place != 0 || out->part == NULL;
-        ssize_t n = write(out->file, out->buffer + done, out->used - done);
+        ssize_t n = write(out->file, bytes + done, size - done);
         if (n >= 0) {
             done += (size_t)n;
             host_progress_add((uint64_t)n);
@@ -342,6 +342,11 @@ static void flush(struct host_output *out)
             out->failure = errno;
         }
     }
+}
+
+static void flush(struct host_output *out)
+{
+    put_out(out, out->buffer, out->used);
     out->used = 0;
 }
 
@@ -349,10 +354,15 @@ void host_output_bytes(struct host_output *out, const void *bytes, size_t n)
 {
     const char *from = bytes;
     while (n > 0) {
+        bool whole = out->used == 0 && n >= BUFFER_BYTES;
         size_t room = BUFFER_BYTES - out->used;
         size_t part = n < room ? n : room;
-        memcpy(out->buffer + out->used, from, part);
-        out->used += part;
+        if (whole) { /* as it is, without a copy */
+            put_out(out, from, part);
+        } else {
+            memcpy(out->buffer + out->used, from, part);
+            out->used += part;
+        }
         from += part;
         n -= part;
         if (out->used == BUFFER_BYTES) {

@@ -4,7 +4,7 @@
  * what was there before stays as it was.
  *
  * Memory: a buffer of 1 MiB an output that is open; its names until the end.
- * Work: one copy, a write a MiB.
+ * Work: a write a MiB, and one copy of what comes in smaller pieces.
  *
  *     if (host_output_open(&out, "a.ele", &error) != 0)
  *         return error.code;

@@ -226,9 +226,7 @@ static void write_points(struct host_output *out,
                          const struct host_points *points)
 {
     write_header(out, "<f8", points->count, 3);
-    for (uint64_t i = 0; i < 3 * points->count; i++) {
-        host_put_double(out, points->xyz[i], false);
-    }
+    host_put_doubles(out, points->xyz, 3 * (size_t)points->count);
 }
 
 static int write_tetrahedra(struct host_output *out, struct host_output *beside,
@@ -239,10 +237,8 @@ static int write_tetrahedra(struct host_output *out, struct host_output *beside,
     (void)beside;
     (void)points;
     write_header(out, "<u4", tets->count, 4);
-    for (uint64_t i = 0; i < tets->count; i++) {
-        for (int k = 0; k < 4; k++) {
-            host_put_whole(out, tets->v[i][k], 4, false);
-        }
+    if (tets->count > 0) {
+        host_put_words(out, tets->v[0], 4 * (size_t)tets->count);
     }
     return error->code;
 }

@@ -106,6 +106,8 @@ uint64_t host_whole_at(const uint8_t *from, enum host_number type, bool big)
     return is_signed && extended(bits, bytes) < 0 ? UINT64_MAX : bits;
 }
 
+static const bool is_little = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
+
 int host_append_numbers(struct host_points *points, const uint8_t *from,
                         uint64_t rows, size_t stride, enum host_number type,
                         bool big, struct host_error *error)
@@ -113,9 +115,14 @@ int host_append_numbers(struct host_points *points, const uint8_t *from,
     enum { ROWS = 512 };
     double xyz[3 * ROWS];
     size_t bytes = host_number_bytes(type);
+    bool as_here = type == HOST_F64 && big != is_little && stride == 24;
     while (rows > 0) {
         size_t n = rows < ROWS ? (size_t)rows : ROWS;
-        for (size_t i = 0; i < n; i++, from += stride) {
+        if (as_here) {
+            memcpy(xyz, from, n * stride);
+            from += n * stride;
+        }
+        for (size_t i = 0; i < n && !as_here; i++, from += stride) {
             for (size_t d = 0; d < 3; d++) {
                 xyz[3 * i + d] = host_number_at(from + d * bytes, type, big);
             }
@@ -165,4 +172,26 @@ void host_put_double(struct host_output *out, double value, bool big)
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     host_put_whole(out, bits, sizeof bits, big);
+}
+
+void host_put_words(struct host_output *out, const uint32_t *values, size_t n)
+{
+    if (is_little) {
+        host_output_bytes(out, values, n * sizeof *values);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        host_put_whole(out, values[i], sizeof values[i], false);
+    }
+}
+
+void host_put_doubles(struct host_output *out, const double *values, size_t n)
+{
+    if (is_little) {
+        host_output_bytes(out, values, n * sizeof *values);
+        return;
+    }
+    for (size_t i = 0; i < n; i++) {
+        host_put_double(out, values[i], false);
+    }
 }

@@ -55,4 +55,8 @@ void host_put_whole(struct host_output *out, uint64_t value, size_t bytes,
 
 void host_put_double(struct host_output *out, double value, bool big);
 
+/* Many at once, little-endian. */
+void host_put_words(struct host_output *out, const uint32_t *values, size_t n);
+void host_put_doubles(struct host_output *out, const double *values, size_t n);
+
 #endif

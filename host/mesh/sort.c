@@ -1,5 +1,5 @@
 /* The canonical order: rows sorted in place by their ascending vertices, most
- * significant byte first (American flag sort: McIlroy, Bostic and McIlroy,
+ * significant digit first (American flag sort: McIlroy, Bostic and McIlroy,
  * Computing Systems 6:5-27, 1993), small groups by insertion. */
 #include <stdbool.h>
 #include <string.h>
@@ -8,7 +8,8 @@
 #include "tetrahedra.h"
 
 enum {
-    BUCKETS = 256,
+    DIGIT_BITS = 10,
+    BUCKETS = 1 << DIGIT_BITS,
     INSERTION_MAX = 40,
     FORK_ROWS = 1 << 16,
     SAMPLE = 63,
@@ -19,26 +20,17 @@ typedef uint32_t row_t[4];
 
 static void canonical(row_t r)
 {
+    /* Ascending, by comparisons whose outcome no branch has to foresee; where
+     * they are an odd number of exchanges, one more at the end. */
     uint32_t a = r[0], b = r[1], c = r[2], d = r[3];
-    /* Even permutations only: two exchanges, or a rotation of three. */
-    if (b < a && b < c && b < d) {
-        uint32_t t = a;
-        a = b, b = t, t = c, c = d, d = t;
-    } else if (c < a && c < d) {
-        uint32_t t = a;
-        a = c, c = t, t = b, b = d, d = t;
-    } else if (d < a) {
-        uint32_t t = a;
-        a = d, d = t, t = b, b = c, c = t;
-    }
-    if (c < b && c < d) {
-        uint32_t t = b;
-        b = c, c = d, d = t;
-    } else if (d < b) {
-        uint32_t t = b;
-        b = d, d = c, c = t;
-    }
-    r[0] = a, r[1] = b, r[2] = c, r[3] = d;
+    uint32_t ab = a < b ? a : b, ba = a < b ? b : a;
+    uint32_t cd = c < d ? c : d, dc = c < d ? d : c;
+    uint32_t least = ab < cd ? ab : cd, low = ab < cd ? cd : ab;
+    uint32_t most = ba < dc ? dc : ba, high = ba < dc ? ba : dc;
+    uint32_t second = low < high ? low : high, third = low < high ? high : low;
+    bool odd = (a > b) ^ (c > d) ^ (ab > cd) ^ (ba > dc) ^ (high > low);
+    r[0] = least, r[1] = second;
+    r[2] = odd ? most : third, r[3] = odd ? third : most;
 }
 
 /* Word w of the sorting key of a canonical row. */
@@ -78,46 +70,106 @@ static void insertion_sort(row_t *v, size_t n)
     }
 }
 
-/* Sorts by byte `shift` of word w and goes on below it.  Depth: at most 16. */
-static void flag_sort(row_t *v, size_t n, int w, int shift)
+/* The same of at most INSERTION_MAX rows with one first word: mostly the second
+ * and the third tell them apart. */
+static void sort_star(row_t *v, size_t n)
 {
-    size_t end[BUCKETS] = {0}, next[BUCKETS];
+    uint64_t key[INSERTION_MAX];
     for (size_t i = 0; i < n; i++) {
-        end[(word(v[i], w) >> shift) & (BUCKETS - 1)]++;
+        row_t t;
+        memcpy(t, v[i], sizeof t);
+        uint64_t k = (uint64_t)t[1] << 32 | word(t, 2);
+        size_t j = i;
+        for (; j > 0 &&
+               (k < key[j - 1] || (k == key[j - 1] && less(t, v[j - 1])));
+             j--) {
+            key[j] = key[j - 1];
+            memcpy(v[j], v[j - 1], sizeof t);
+        }
+        key[j] = k;
+        memcpy(v[j], t, sizeof t);
     }
-    size_t sum = 0;
-    for (size_t b = 0; b < BUCKETS; b++) {
+}
+
+/* Bits of a word: those from `shift` on, as many as `mask` has. */
+struct digit {
+    int word, shift;
+    uint32_t mask;
+};
+
+/* The digit below, of `bits` bits or what is left of the word; false: none. */
+static bool go_down(struct digit *d, int bits)
+{
+    if (d->shift == 0) {
+        d->word++;
+        d->shift = 32;
+        bits = 8;
+    }
+    bits = bits < d->shift ? bits : d->shift;
+    d->shift -= bits;
+    d->mask = (1u << bits) - 1;
+    return d->word < 4;
+}
+
+/* Moves rows to where their digits belong; end[b]: of those with digit b.
+ * Inlined, so that it is made for the first word, which nearly all are of. */
+static inline __attribute__((always_inline)) void
+exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS])
+{
+    size_t next[BUCKETS], sum = 0, buckets = (size_t)d.mask + 1;
+    memset(end, 0, buckets * sizeof *end);
+    for (size_t i = 0; i < n; i++) {
+        end[word(v[i], w) >> d.shift & d.mask]++;
+    }
+    for (size_t b = 0; b < buckets; b++) {
         next[b] = sum;
         sum += end[b];
         end[b] = sum;
     }
-    for (size_t b = 0; b < BUCKETS; b++) {
+    for (size_t b = 0; b < buckets; b++) {
         while (next[b] < end[b]) {
             row_t t;
             memcpy(t, v[next[b]], sizeof t);
-            size_t to = (word(t, w) >> shift) & (BUCKETS - 1);
+            size_t to = word(t, w) >> d.shift & d.mask;
             while (to != b) {
                 row_t u;
                 memcpy(u, v[next[to]], sizeof u);
                 memcpy(v[next[to]++], t, sizeof t);
-                /* 256 streams are more than the processor foresees. */
+                /* So many streams are more than the processor foresees. */
                 __builtin_prefetch(&v[next[to] + AHEAD], 1);
                 memcpy(t, u, sizeof t);
-                to = (word(t, w) >> shift) & (BUCKETS - 1);
+                to = word(t, w) >> d.shift & d.mask;
             }
             memcpy(v[next[b]++], t, sizeof t);
         }
     }
-    if (shift == 0) {
-        shift = 32;
-        w++;
+}
+
+static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS])
+{
+    if (d.word == 0) {
+        exchange_by(v, n, 0, d, end);
+    } else {
+        exchange_by(v, n, d.word, d, end);
     }
-    for (size_t b = 0, first = 0; b < BUCKETS; first = end[b++]) {
+}
+
+/* Sorts by a digit and goes on below it.  Depth: at most 16. */
+static void flag_sort(row_t *v, size_t n, struct digit digit, int bits)
+{
+    size_t end[BUCKETS], first = 0, buckets = (size_t)digit.mask + 1;
+    exchange(v, n, digit, end);
+    if (!go_down(&digit, bits)) {
+        return;
+    }
+    for (size_t b = 0; b < buckets; first = end[b++]) {
         size_t m = end[b] - first;
-        if (m <= INSERTION_MAX || w > 3) {
-            insertion_sort(v + first, w > 3 ? 0 : m);
+        if (m > INSERTION_MAX) {
+            flag_sort(v + first, m, digit, bits);
+        } else if (digit.word > 0) {
+            sort_star(v + first, m);
         } else {
-            flag_sort(v + first, m, w, shift - 8);
+            insertion_sort(v + first, m);
         }
     }
 }
@@ -165,19 +217,21 @@ static void sort_rows(void *argument)
         host_fork_join(&fork);
         return;
     }
-    uint32_t top = 0;
+    if (s->n <= INSERTION_MAX) {
+        insertion_sort(s->v, s->n);
+        return;
+    }
+    uint32_t top = 1;
     for (size_t i = 0; i < s->n; i++) {
         top |= s->v[i][0];
     }
-    int shift = 24;
-    while (shift > 0 && top >> shift == 0) {
-        shift -= 8;
-    }
-    if (s->n <= INSERTION_MAX) {
-        insertion_sort(s->v, s->n);
-    } else {
-        flag_sort(s->v, s->n, 0, shift);
-    }
+    /* The first word in as few digits as there may be, of equal size. */
+    int used = 32 - __builtin_clz(top);
+    int digits = (used + DIGIT_BITS - 1) / DIGIT_BITS;
+    int bits = (used + digits - 1) / digits;
+    struct digit digit = {0, used, 0};
+    (void)go_down(&digit, bits);
+    flag_sort(s->v, s->n, digit, bits);
 }
 
 struct canon {

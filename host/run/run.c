@@ -8,6 +8,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/base/progress.h"
 #include "host/files/output.h"
 #include "host/formats/claims.h"
@@ -40,11 +41,11 @@ static double seconds_since(uint64_t start_us)
     return 1e-6 * (double)(host_now_us() - start_us);
 }
 
-/* Of this process, all its threads. */
-static double processor_seconds(void)
+/* Of this process, all its threads, or of this thread. */
+static double used_seconds(clockid_t clock)
 {
     struct timespec used;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+    clock_gettime(clock, &used);
     return (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
 }
 
@@ -54,6 +55,8 @@ void host_run_sum(const struct host_service *service,
     struct host_run_result *r = result;
     memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
     r->retransmitted = service->retransmitted;
+    r->bytes_sent = service->bytes_sent;
+    r->bytes_received = service->bytes_received;
     r->faces_spilled = service->spill.faces_total;
     r->restarts = service->restarts;
     r->lost = r->nodes - service->work.living;
@@ -190,7 +193,7 @@ static int on_nodes(const struct host_run_options *options,
         result->missing_wires = service.missing_wires;
     }
     host_service_end(&service);
-    if (status == 0) {
+    if (status == 0 && options->stats != NULL) {
         status = host_hull_facets(tets,
                                   (uint64_t)order->bricks * INCODE_BRICK_POINTS,
                                   &result->hull_facets, error);
@@ -235,6 +238,8 @@ static int begin_on_board(const struct host_run_options *options,
     nodes.window = options->window;
     nodes.link = options->link;
     nodes.unplug_us = options->unplug_us;
+    /* So many bytes a second that all nodes together are heard. */
+    nodes.one_wire = options->throttle.bytes_a_second != 0;
     nodes.program = options->node_program;
     nodes.trouble = options->trouble;
     if (options->board->start(options->board, &nodes, &started, error) != 0) {
@@ -377,22 +382,32 @@ static int verify(const struct host_points *points,
     return status;
 }
 
-/* Order, check, digest and files, once the tetrahedra are here. */
-static int finish(const struct host_run_options *options,
-                  const struct host_points *points,
-                  struct host_tetrahedra *tets, struct host_run_result *result,
-                  struct host_error *error)
+/* The digest, on a thread of its own, while others read the tetrahedra. */
+struct digest {
+    const struct host_tetrahedra *tets;
+    struct host_digest *digest;
+    double cpu_s;
+};
+
+static void make_digest(void *argument)
 {
-    uint64_t start = host_now_us();
-    host_progress_phase("sorting", NULL);
-    host_tetrahedra_sort(tets);
-    host_digest(tets, &result->digest);
-    result->time_write_s = seconds_since(start);
-    result->host_cpu_s += processor_seconds();
+    struct digest *d = argument;
+    d->cpu_s = -used_seconds(CLOCK_THREAD_CPUTIME_ID);
+    host_digest(d->tets, d->digest);
+    d->cpu_s += used_seconds(CLOCK_THREAD_CPUTIME_ID);
+}
+
+/* What is done with tetrahedra in their order. */
+static int check_and_write(const struct host_run_options *options,
+                           const struct host_points *points,
+                           struct host_tetrahedra *tets,
+                           struct host_run_result *result,
+                           struct host_error *error)
+{
     if (options->verify && verify(points, tets, result, error) != 0) {
         return error->code;
     }
-    start = host_now_us();
+    uint64_t start = host_now_us();
     for (unsigned i = 0; i < options->outputs; i++) {
         if (host_write(options->output[i], points, tets, error) != 0) {
             return error->code;
@@ -400,6 +415,31 @@ static int finish(const struct host_run_options *options,
     }
     result->time_write_s += seconds_since(start);
     return 0;
+}
+
+/* Order, check, digest and files, once the tetrahedra are here. */
+static int finish(const struct host_run_options *options,
+                  const struct host_points *points,
+                  struct host_tetrahedra *tets, struct host_run_result *result,
+                  struct host_error *error)
+{
+    struct digest digest = {.tets = tets, .digest = &result->digest};
+    struct host_fork fork;
+    uint64_t start = host_now_us();
+    host_progress_phase("sorting", NULL);
+    host_tetrahedra_sort(tets);
+    result->host_cpu_s += used_seconds(CLOCK_PROCESS_CPUTIME_ID);
+    host_fork_start(&fork, make_digest, &digest);
+    result->time_write_s = seconds_since(start);
+    if (options->verify) {
+        host_fork_join(&fork); /* it may order them once more */
+    }
+    check_and_write(options, points, tets, result, error);
+    start = host_now_us();
+    host_fork_join(&fork);
+    result->host_cpu_s += digest.cpu_s;
+    result->time_write_s += seconds_since(start);
+    return error->code;
 }
 
 /* The same on one node, for the table's speed-up. */
@@ -427,7 +467,7 @@ static int run_on(const struct host_run_options *options,
         return error->code;
     }
     result->time_io_s = result->time_read_s;
-    result->host_cpu_s = -processor_seconds();
+    result->host_cpu_s = -used_seconds(CLOCK_PROCESS_CPUTIME_ID);
     int status = host_triangulate(options, points, &tets, result, error);
     if (status == 0) {
         status = finish(options, points, &tets, result, error);

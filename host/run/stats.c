@@ -183,6 +183,8 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "faces_spilled", r->faces_spilled);
     put(o, "socket_send_bytes", (uint64_t)r->socket_send_bytes);
     put(o, "socket_receive_bytes", (uint64_t)r->socket_receive_bytes);
+    put(o, "host_bytes_sent", r->bytes_sent);
+    put(o, "host_bytes_received", r->bytes_received);
     put(o, "retransmitted_frames", r->retransmitted);
     put(o, "nodes_lost", r->lost);
     put(o, "node_restarts", r->restarts);

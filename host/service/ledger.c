@@ -10,18 +10,19 @@ int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
     ledger->bricks = bricks;
     ledger->nodes = nodes;
     ledger->piece_max = bricks;
-    ledger->bits = calloc((size_t)bricks / 64 + 1, sizeof *ledger->bits);
+    ledger->open = malloc((size_t)bricks + 1);
     ledger->job = calloc(nodes, sizeof *ledger->job);
-    if (ledger->bits == NULL || ledger->job == NULL) {
+    if (ledger->open == NULL || ledger->job == NULL) {
         host_ledger_free(ledger);
         return host_fail_memory(error, "the list of bricks");
     }
+    memset(ledger->open, 0xff, bricks);
     return 0;
 }
 
 void host_ledger_free(struct host_ledger *ledger)
 {
-    free(ledger->bits);
+    free(ledger->open);
     free(ledger->job);
     memset(ledger, 0, sizeof *ledger);
 }
@@ -80,11 +81,6 @@ bool host_ledger_current(const struct host_ledger *ledger, uint32_t node,
            ledger->job[node].epoch == epoch;
 }
 
-bool host_ledger_committed(const struct host_ledger *ledger, uint32_t brick)
-{
-    return (ledger->bits[brick / 64] >> (brick % 64) & 1) != 0;
-}
-
 int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
                        uint32_t brick)
 {
@@ -93,7 +89,7 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
         host_ledger_committed(ledger, brick)) {
         return -1;
     }
-    ledger->bits[brick / 64] |= UINT64_C(1) << (brick % 64);
+    ledger->open[brick] = 0;
     ledger->committed++;
     job->committed++;
     return 0;

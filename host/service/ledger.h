@@ -3,7 +3,7 @@
  * a loss left uncommitted is dropped by host_ledger_abandon, and those bricks
  * are given out again, in ranges.
  *
- * Memory: a bit a brick and 16 bytes a node.  Work: constant a call, but for
+ * Memory: a byte a brick and 16 bytes a node.  Work: constant a call, but for
  * host_ledger_abandon, one pass over the tetrahedra, and host_ledger_next,
  * which passes over the bricks once between two calls of the former.
  *
@@ -36,9 +36,9 @@ struct host_ledger {
     enum incode_owner_rule owner_rule; /* after init: the smallest vertex */
     uint32_t epoch;                    /* of the last job given out */
     uint32_t committed;                /* bricks in all */
-    uint32_t cursor;      /* bricks below it are committed or given out */
-    uint32_t piece_max;   /* bricks of a range, at most */
-    uint64_t *bits;       /* committed bricks */
+    uint32_t cursor;    /* bricks below it are committed or given out */
+    uint32_t piece_max; /* bricks of a range, at most */
+    uint8_t *open; /* [bricks] all bits set, or none where it is committed */
     struct host_job *job; /* [nodes] */
 };
 
@@ -67,7 +67,11 @@ bool host_ledger_current(const struct host_ledger *ledger, uint32_t node,
 /* 0, or -1 where the brick is not the node's or is committed already. */
 int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
                        uint32_t brick);
-bool host_ledger_committed(const struct host_ledger *ledger, uint32_t brick);
+static inline bool host_ledger_committed(const struct host_ledger *ledger,
+                                         uint32_t brick)
+{
+    return ledger->open[brick] == 0;
+}
 
 /* Closes the job of a node that has said it is done: 0, or -1 where a brick
  * of it is not committed. */

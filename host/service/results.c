@@ -14,13 +14,37 @@ static bool is_point(const struct host_order *order, uint32_t vertex)
            vertex % INCODE_BRICK_POINTS < order->fill[brick];
 }
 
+/* Whether the vertex, below the number of all, is a point of a brick of the job
+ * that is not committed. */
+static bool is_open(const struct host_service *s, const struct host_job *job,
+                    uint32_t vertex)
+{
+    uint32_t brick = vertex / INCODE_BRICK_POINTS;
+    uint32_t points = s->order->fill[brick] & s->ledger.open[brick];
+    return (vertex % INCODE_BRICK_POINTS < points) &
+           (brick - job->first < job->last - job->first);
+}
+
+static bool is_different(const uint32_t v[4])
+{
+    return (v[0] != v[1]) & (v[0] != v[2]) & (v[0] != v[3]) & (v[1] != v[2]) &
+           (v[1] != v[3]) & (v[2] != v[3]);
+}
+
+/* Who owns a tetrahedron is looked up only where it is not all the same: as
+ * long as none of its bricks is committed, that is at the job's borders. */
 static bool is_sound(const struct host_service *s, const struct host_job *job,
                      const uint32_t v[4])
 {
-    if (!is_point(s->order, v[0]) || !is_point(s->order, v[1]) ||
-        !is_point(s->order, v[2]) || !is_point(s->order, v[3]) ||
-        v[0] == v[1] || v[0] == v[2] || v[0] == v[3] || v[1] == v[2] ||
-        v[1] == v[3] || v[2] == v[3]) {
+    bool different = is_different(v), open = different;
+    for (int i = 0; i < 4; i++) {
+        open &= is_open(s, job, v[i]);
+    }
+    if (open) {
+        return true;
+    }
+    if (!different || !is_point(s->order, v[0]) || !is_point(s->order, v[1]) ||
+        !is_point(s->order, v[2]) || !is_point(s->order, v[3])) {
         return false;
     }
     uint32_t brick = host_ledger_owner(&s->ledger, s->order, v);

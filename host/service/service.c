@@ -218,7 +218,10 @@ int host_service_run(struct host_service *service, struct host_error *error)
     host_detector_end(s);
     host_paging_end(s);
     for (unsigned d = 0; d < cube_links(s->cube); d++) {
-        s->retransmitted += cube_link_statistics(s->cube, d)->retransmitted;
+        const struct link_statistics *l = cube_link_statistics(s->cube, d);
+        s->retransmitted += l->retransmitted;
+        s->bytes_sent += l->bytes_sent;
+        s->bytes_received += l->bytes_received;
     }
     s->finished = true;
     return 0;

@@ -7,7 +7,7 @@
  * wiring: every node drops its job and its role, uncommitted tetrahedra are
  * dropped here, and their bricks are given out again, in ranges.
  *
- * Memory: the cube's windows, 3 KiB a node, a bit a brick, the spilled faces
+ * Memory: the cube's windows, 3 KiB a node, a byte a brick, the spilled faces
  * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
  *
  *     struct host_service service = {.machine = &machine, .order = &order,
@@ -119,13 +119,14 @@ struct host_service {
     uint64_t memory;
     const char *memory_of;
     /* Results. */
-    struct host_node_report *report; /* [nodes], until the end */
-    uint64_t pages_us;               /* time spent on serving pages */
-    uint64_t page_bytes_to_all;      /* of pages that were sent to all */
-    uint64_t retransmitted;          /* frames, on the host's wire */
-    unsigned restarts;               /* of nodes, by the machine */
-    unsigned generations;            /* of the cube's wiring; 1: no loss */
-    unsigned missing_wires;          /* that were named: missing_links.h */
+    struct host_node_report *report;     /* [nodes], until the end */
+    uint64_t pages_us;                   /* time spent on serving pages */
+    uint64_t page_bytes_to_all;          /* of pages that were sent to all */
+    uint64_t retransmitted;              /* frames, on the host's wire */
+    uint64_t bytes_sent, bytes_received; /* on it, all that there are */
+    unsigned restarts;                   /* of nodes, by the machine */
+    unsigned generations;                /* of the cube's wiring; 1: no loss */
+    unsigned missing_wires;              /* that were named: missing_links.h */
     /* Private. */
     struct cube *cube;
     void *cube_memory;
