@@ -272,8 +272,9 @@ $(BUILD)/tests/mpi_hops: $(obj)/tests/bench/mpi_hops.o \
 
 # The peers of `incode bench peers`, which makes those whose packages are there.
 # -frounding-math: CGAL's filters are wrong without it.
-peers = $(addprefix $(BUILD)/peers/,cgal tetgen qhull)
+peers = $(addprefix $(BUILD)/peers/,cgal cgal_file tetgen qhull)
 $(BUILD)/peers/cgal:   peer = -frounding-math $< -lgmp -lnettle
+$(BUILD)/peers/cgal_file: peer = -frounding-math $< -lgmp
 $(BUILD)/peers/tetgen: peer = $< -ltet
 $(BUILD)/peers/qhull:  peer = $< -lqhull_r
 $(peers): $(BUILD)/peers/%: tests/bench/%.cpp tests/bench/peer.hpp

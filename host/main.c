@@ -352,8 +352,8 @@ static const struct command commands[] = {
      "boards without a system, emulated, and the cube\nfile that leads to them",
      host_emulate},
     {"bench", "paper|links|..",
-     "the paper's tables on this machine; its links;\nbare boards; other "
-     "triangulators beside this one",
+     "the paper's tables on this machine; its links;\nbare boards; a "
+     "point's cost; other triangulators",
      host_bench},
     {"sim", "--seeds A..B", "whole cubes in virtual time, with faults",
      command_sim},

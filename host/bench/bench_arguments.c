@@ -8,6 +8,7 @@
 #include "bench_links.h"
 #include "bench_paper.h"
 #include "bench_peers.h"
+#include "bench_scaling.h"
 #include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/service/machine.h"
@@ -26,39 +27,47 @@ enum {
     KEY_BLUNTFIN,
     KEY_MILLION,
     NODES = 256,
-    NODES_QUICK = 64
+    NODES_QUICK = 64,
+    SCALING_NODES = 64,
+    SCALING_NODES_QUICK = 8
 };
 
 struct arguments {
     const char *what; /* the benchmark */
     struct host_paper_options paper;
-    /* Options given that they alone have; of_both: paper and boards. */
-    const char *of_paper, *of_peers, *of_both;
+    /* Options given that they alone have: of_runs paper and scaling, of_rows
+     * these and boards. */
+    const char *of_paper, *of_peers, *of_runs, *of_rows;
     struct host_bench_peers_options peers;
     struct host_error *error;
 };
 
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Of paper:", 1},
-    {"quick", KEY_QUICK, NULL, 0, "A tenth of the points, up to 64 nodes", 1},
     {"table", KEY_TABLE, "LIST", 0,
      "Some tables alone, with commas between: 1 to 7, 11 (the figure), "
      "relation, goals, check (of the model)",
      1},
-    {"nodes", 'n', "N", 0, "Up to N nodes. Default: 256", 1},
     {"strategy", KEY_STRATEGY, "NAME", 0, "One strategy alone", 1},
     {"bluntfin", KEY_BLUNTFIN, "FILE", 0,
      "The grid of NASA's Blunt Fin. Default: one like it", 1},
     {"million", KEY_MILLION, NULL, 0,
      "The goal for 1,000,000 points on 1,024 nodes, too", 1},
-    {NULL, 0, NULL, 0, "Of paper and boards:", 3},
-    {"csv", KEY_CSV, "FILE", 0, "All rows, as CSV", 3},
+    {NULL, 0, NULL, 0, "Of paper and scaling:", 3},
+    {"quick", KEY_QUICK, NULL, 0,
+     "A tenth of the points, up to 64 nodes; or 30,000 points, up to 8", 3},
+    {"nodes", 'n', "N", 0, "Up to N nodes. Default: 256; or 64", 3},
+    {NULL, 0, NULL, 0, "Of paper, scaling and boards:", 4},
+    {"csv", KEY_CSV, "FILE", 0, "All rows, as CSV", 4},
     {"svg", KEY_SVG, "FILE", 0,
-     "Figure 11, by gnuplot; or each board's instructions as a bar", 3},
+     "Figure 11 or both curves, by gnuplot; or each board's instructions as a "
+     "bar",
+     4},
     {NULL, 0, NULL, 0, "Of peers:", 2},
     {"rounds", KEY_ROUNDS, "N", 0, "Medians of N rounds. Default: 3", 2},
     {"class", KEY_CLASS, "NAME", 0,
-     "One class alone: uniform, volumes, real, small, thin, growth, extremes "
+     "One class alone: uniform, files, volumes, real, small, thin, growth, "
+     "extremes "
      "or cube; real, small and cube are of the files given",
      2},
     {"peers", KEY_PEERS, "LIST", 0,
@@ -95,12 +104,12 @@ static bool parse_paper(int key, const char *value, struct arguments *a)
     struct host_paper_options *paper = &a->paper;
     switch (key) {
     case 'n':
-        a->of_paper = "--nodes";
+        a->of_runs = "--nodes";
         (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
                                &paper->nodes_max, a->error);
         return true;
     case KEY_QUICK:
-        a->of_paper = "--quick";
+        a->of_runs = "--quick";
         paper->quick = true;
         return true;
     case KEY_TABLE:
@@ -120,11 +129,11 @@ static bool parse_paper(int key, const char *value, struct arguments *a)
         paper->large = true;
         return true;
     case KEY_CSV:
-        a->of_both = "--csv";
+        a->of_rows = "--csv";
         paper->csv = value;
         return true;
     case KEY_SVG:
-        a->of_both = "--svg";
+        a->of_rows = "--svg";
         paper->svg = value;
         return true;
     default:
@@ -176,35 +185,51 @@ static error_t parse_bench(int key, char *value, struct argp_state *state)
 static const struct argp bench = {
     options,
     parse_bench,
-    "paper\nlinks\nboards\npeers [DIRECTORY|FILE]...",
+    "paper\nlinks\nboards\nscaling\npeers [DIRECTORY|FILE]...",
     "Measures this machine: paper prints Tables 1 to 7 and figure 11 of "
     "Cignoni, Laforenza, Perego, Scopigno and Montani (1995) beside the "
     "paper's figures, for up to 256 nodes in virtual time; links prints what a "
     "link does over each driver; boards, in the source tree, what a "
     "tetrahedron costs each bare board, emulated, in instructions and bytes, "
-    "and where they go; peers, in the source tree, runs CGAL, TetGen and "
+    "and where they go; scaling, what a point costs from 1,000 to 10,000,000 "
+    "points, measured, and from 1 to 64 nodes, in virtual time; peers, in the "
+    "source tree, runs CGAL, TetGen and "
     "Qhull in turn with this program on points that it makes and on those "
     "given, and prints times, ratios and the goals of each class.",
     NULL,
     NULL,
     NULL};
 
+/* An option that the benchmark has not, or NULL. */
+static const char *other_option(const struct arguments *a)
+{
+    bool paper = strcmp(a->what, "paper") == 0;
+    bool runs = paper || strcmp(a->what, "scaling") == 0;
+    bool rows = runs || strcmp(a->what, "boards") == 0;
+    bool peers = strcmp(a->what, "peers") == 0;
+    return a->of_paper != NULL && !paper   ? a->of_paper
+           : a->of_runs != NULL && !runs   ? a->of_runs
+           : a->of_rows != NULL && !rows   ? a->of_rows
+           : a->of_peers != NULL && !peers ? a->of_peers
+                                           : NULL;
+}
+
 /* Options and arguments that the benchmark has not. */
 static int check(const struct arguments *a, struct host_error *error)
 {
-    bool peers = strcmp(a->what, "peers") == 0;
-    bool paper = strcmp(a->what, "paper") == 0;
-    bool boards = strcmp(a->what, "boards") == 0;
-    if (!peers && !paper && !boards && strcmp(a->what, "links") != 0) {
+    static const char *const all[] = {"paper", "links", "boards", "scaling",
+                                      "peers"};
+    bool known = false, peers = strcmp(a->what, "peers") == 0;
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        known = known || strcmp(a->what, all[i]) == 0;
+    }
+    if (!known) {
         return host_fail(error, HOST_USAGE,
                          "bench %s: not in this version; allowed: paper, "
-                         "links, boards, peers",
+                         "links, boards, scaling, peers",
                          a->what);
     }
-    const char *other = peers ? a->of_paper : a->of_peers;
-    if (other == NULL && !paper) {
-        other = a->of_paper != NULL || boards ? a->of_paper : a->of_both;
-    }
+    const char *other = other_option(a);
     if (other != NULL) {
         return host_fail(error, HOST_USAGE,
                          "%s: no option of bench %s; see incode bench --help",
@@ -226,9 +251,8 @@ int host_bench(int argc, char **argv, struct host_error *error)
     }
     if (a.what == NULL) {
         return host_fail(error, HOST_USAGE,
-                         "%s: too few arguments; give paper, links, boards or "
-                         "peers, "
-                         "see --help",
+                         "%s: too few arguments; give paper, links, boards, "
+                         "scaling or peers, see --help",
                          argv[0]);
     }
     if (check(&a, error) != 0) {
@@ -243,6 +267,15 @@ int host_bench(int argc, char **argv, struct host_error *error)
     }
     if (strcmp(a.what, "peers") == 0) {
         return host_bench_peers(&a.peers, error);
+    }
+    if (strcmp(a.what, "scaling") == 0) {
+        struct host_scaling_options scaling = {a.paper.quick, a.paper.nodes_max,
+                                               a.paper.csv, a.paper.svg};
+        if (scaling.nodes_max == 0) {
+            scaling.nodes_max =
+                scaling.quick ? SCALING_NODES_QUICK : SCALING_NODES;
+        }
+        return host_bench_scaling(&scaling, error);
     }
     if (a.paper.nodes_max == 0) {
         a.paper.nodes_max = a.paper.quick ? NODES_QUICK : NODES;

@@ -11,6 +11,13 @@ static const struct host_bench_class classes[] = {
               {.kind = "uniform", .n = 1000000, .ratio = 3, .large = true}},
      .way = HOST_WAY_ALONE,
      .summary = {2.5, 2.5, 10}},
+    {.name = "files",
+     .title = "whole programs by the clock, .npy to .npy; default options",
+     .made = {{.kind = "uniform", .n = 100000},
+              {.kind = "uniform", .n = 1000000, .ratio = 2}},
+     .way = HOST_WAY_USUAL,
+     .wall = true,
+     .whole = true},
     {.name = "volumes",
      .title = "other volumes; sequential, one node of 4M; step: a tetrahedron "
               "against Uniform's",

@@ -49,6 +49,7 @@ struct host_bench_class {
     enum host_bench_files files; /* those given, of so many points */
     enum host_bench_way way, other;
     bool wall;          /* times are the clock's, else the processor's */
+    bool whole;         /* and of whole programs, file to file, CGAL's too */
     bool first;         /* steps are against the first row, a tetrahedron; else
                            against the one before, the set */
     bool narrower;      /* the other way has less memory */

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "gnuplot.h"
 #include "host/base/progress.h"
 #include "host/service/strategies/strategies.h"
 #include "paper_goals.h"
@@ -126,7 +127,7 @@ int host_bench_paper(const struct host_paper_options *options,
     }
     if (options->svg != NULL &&
         (options->tables == NULL || among(options->tables, "11")
-             ? host_paper_can_draw(options->svg, error)
+             ? host_gnuplot_there(options->svg, error)
              : host_fail(
                    error, HOST_USAGE,
                    "--svg: goes with table 11; name it, or leave --svg out")) !=

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "bench_build.h"
 #include "bench_set.h"
@@ -34,7 +35,9 @@ struct bench {
     struct turns turns[TURNS];
     char *file[HOST_BENCH_ROWS_MAX]; /* those given, and in directories */
     unsigned files, wrong;
-    bool left_out; /* the set at hand has no triangulation */
+    char to_file[4096];          /* CGAL from file to file, once it is needed */
+    char folder[32], target[48]; /* of what whole programs write; else empty */
+    bool left_out;               /* the set at hand has no triangulation */
 };
 
 /* --- one set ---------------------------------------------------------------
@@ -48,6 +51,13 @@ static bool command(struct bench *b, unsigned turn,
     unsigned n = 0;
     bool first = b->turns[turn].rounds == 0;
     enum host_bench_way way = turn == MAIN ? b->class->way : b->class->other;
+    if (turn >= PEER && b->class->whole) {
+        words[n++] = b->to_file;
+        words[n++] = set->path;
+        words[n++] = b->target;
+        words[n] = NULL;
+        return turn == PEER && b->builds.there[0];
+    }
     if (turn >= PEER) {
         words[n++] = b->builds.path[turn - PEER];
         words[n++] = set->path;
@@ -62,6 +72,10 @@ static bool command(struct bench *b, unsigned turn,
     }
     for (const char *const *o = host_bench_way_options(way); *o != NULL; o++) {
         words[n++] = *o;
+    }
+    if (b->class->whole) {
+        words[n++] = "-o";
+        words[n++] = b->target;
     }
     words[n] = NULL;
     return way != HOST_WAY_NONE;
@@ -117,7 +131,7 @@ static int take_turn(struct bench *b, unsigned turn, unsigned round,
         }
         t->cpu_s[t->rounds] = trial.cpu_s;
         t->host_s[t->rounds] = trial.host_s;
-        t->wall_s[t->rounds++] = trial.wall_s;
+        t->wall_s[t->rounds++] = b->class->whole ? trial.whole_s : trial.wall_s;
     }
     return status;
 }
@@ -300,6 +314,32 @@ static int measure_made(struct bench *b, struct host_error *error)
     return error->code;
 }
 
+/* CGAL's whole program, and a place on a disk for what such write. */
+static int make_target(struct bench *b, struct host_error *error)
+{
+    if (b->builds.there[0] &&
+        host_bench_made("cgal_file", b->to_file, error) != 0) {
+        return error->code;
+    }
+    (void)strcpy(b->folder, "/tmp/incode-bench.XXXXXX");
+    if (mkdtemp(b->folder) == NULL) {
+        b->folder[0] = '\0';
+        return host_fail(error, HOST_INPUT, "/tmp: %s; make room there",
+                         strerror(errno));
+    }
+    (void)snprintf(b->target, sizeof b->target, "%s/out.npy", b->folder);
+    return 0;
+}
+
+static void remove_target(struct bench *b)
+{
+    if (b->folder[0] != '\0') {
+        (void)unlink(b->target);
+        (void)rmdir(b->folder);
+        b->folder[0] = '\0';
+    }
+}
+
 static int measure_class(struct bench *b, const struct host_bench_class *c,
                          struct host_error *error)
 {
@@ -307,11 +347,15 @@ static int measure_class(struct bench *b, const struct host_bench_class *c,
         return 0;
     }
     b->class = c;
+    if (c->whole && make_target(b, error) != 0) {
+        return error->code;
+    }
     host_bench_table_begin(&b->table, c, b->builds.there, b->options->limit_s);
     int status = c->files == HOST_FILES_NONE ? measure_made(b, error)
                                              : measure_files(b, error);
     host_progress_erase();
     (void)host_bench_table_end(&b->table);
+    remove_target(b);
     return status;
 }
 

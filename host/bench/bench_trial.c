@@ -102,6 +102,7 @@ int host_trial_run(char *const words[], double limit_s,
 {
     FILE *out = tmpfile(), *err = tmpfile();
     pid_t bench = getpid();
+    uint64_t begin = host_now_us();
     memset(trial, 0, sizeof *trial);
     pid_t child = out == NULL || err == NULL ? -1 : fork();
     if (child == 0) {
@@ -112,6 +113,7 @@ int host_trial_run(char *const words[], double limit_s,
                   words[0], strerror(errno));
     } else {
         await(child, limit_s, trial);
+        trial->whole_s = 1e-6 * (double)(host_now_us() - begin);
         last_line(err, trial->said, sizeof trial->said);
         if (!trial->late && trial->status == 0) {
             read_said(out, trial);

@@ -24,6 +24,7 @@ struct host_trial {
     double cpu_s;  /* processor time: of all nodes, or of a peer */
     double host_s; /* of the host, files apart */
     double wall_s;
+    double whole_s;  /* by the clock, from its start to its end */
     char digest[80]; /* empty: it says none */
     char said[400];  /* the last line on standard error */
 };

@@ -1,11 +1,9 @@
 #include "paper_plot.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
+#include "gnuplot.h"
 #include "host/base/progress.h"
 #include "host/service/strategies/strategies.h"
 
@@ -140,55 +138,6 @@ static int draw(struct host_paper_bench *bench, FILE *plot,
     return error->code;
 }
 
-/* gnuplot, with these as its standard input and output: as waitpid has it, or
- * -1. */
-static int gnuplot(const char *word, int in, int out)
-{
-    int status = 0;
-    pid_t child = fork();
-    if (child == 0) {
-        (void)dup2(in, STDIN_FILENO);
-        (void)dup2(out, STDOUT_FILENO);
-        (void)execlp("gnuplot", "gnuplot", word, (char *)NULL);
-        _exit(127);
-    }
-    return child < 0 || waitpid(child, &status, 0) < 0 ? -1 : status;
-}
-
-int host_paper_can_draw(const char *path, struct host_error *error)
-{
-    int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
-    int status = nothing < 0 ? -1 : gnuplot("--version", nothing, nothing);
-    (void)close(nothing);
-    return status == 0 ? 0
-                       : host_fail(error, HOST_INPUT,
-                                   "%s: gnuplot is not installed; install "
-                                   "gnuplot-nox, or leave --svg out",
-                                   path);
-}
-
-/* With its standard input from the script and its output to the file, whose
- * name may have any letters. */
-static int run_gnuplot(FILE *script, const char *path, struct host_error *error)
-{
-    (void)fflush(script);
-    rewind(script);
-    int out = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (out < 0) {
-        return host_fail(error, HOST_INPUT, "%s: %s; choose another file", path,
-                         strerror(errno));
-    }
-    int status = gnuplot("-", fileno(script), out);
-    (void)close(out);
-    if (status != 0) {
-        (void)unlink(path);
-        return host_fail(error, HOST_BROKEN,
-                         "%s: gnuplot does not draw it; see what it says",
-                         path);
-    }
-    return 0;
-}
-
 int host_paper_figure_11(struct host_paper_bench *bench,
                          struct host_error *error)
 {
@@ -207,7 +156,7 @@ int host_paper_figure_11(struct host_paper_bench *bench,
                          strerror(errno));
     }
     int status = draw(bench, script, error);
-    status = status != 0 ? status : run_gnuplot(script, path, error);
+    status = status != 0 ? status : host_gnuplot_draw(script, path, error);
     (void)fclose(script);
     if (status == 0) {
         host_paper_note("Drawn in %s.", path);

@@ -16,7 +16,4 @@
 int host_paper_figure_11(struct host_paper_bench *bench,
                          struct host_error *error);
 
-/* 0; HOST_INPUT where there is no gnuplot, which the file needs. */
-int host_paper_can_draw(const char *path, struct host_error *error);
-
 #endif
