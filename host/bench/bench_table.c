@@ -106,7 +106,7 @@ static void collect(struct cells *c, const struct host_bench_table *t,
     if (class->extra_ms > 0 && t->peer[0]) {
         add_held(c, "ms more",
                  r->node > 0 && r->peer[0] > 0
-                     ? fmax(1e3 * (r->node + r->host - r->peer[0]), 1e-9)
+                     ? fmax(1e3 * (r->node + r->host_all - r->peer[0]), 1e-9)
                      : 0,
                  true, class->extra_ms);
     }

@@ -18,7 +18,8 @@ enum { HOST_BENCH_ROWS_MAX = 4096 };
 struct host_bench_result {
     const char *name;
     uint64_t points, tetrahedra, pages, pages_asked;
-    double node, host, other; /* of nodes, host, and nodes the other way */
+    double node, other;    /* of nodes, and of nodes the other way */
+    double host, host_all; /* to the last tetrahedron; files apart */
     double peer[HOST_BENCH_PEERS];
     bool late, other_late, peer_late[HOST_BENCH_PEERS];
     double ratio, seconds, step; /* goals; 0: none */

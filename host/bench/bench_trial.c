@@ -84,7 +84,8 @@ static void read_said(FILE *out, struct host_trial *t)
     size_t i;
     t->tetrahedra = whole(said, "tetrahedra");
     t->pages = whole(said, "pages");
-    t->host_s = real(said, "host_cpu_s");
+    t->host_s = real(said, "host_triangulation_cpu_s");
+    t->host_all_s = real(said, "host_cpu_s");
     t->cpu_s = real(said, "cpu_s");
     t->wall_s = real(said, nodes == NULL ? "wall_s" : "time_triangulation_s");
     (void)snprintf(t->digest, sizeof t->digest, "%s",

@@ -21,8 +21,9 @@ struct host_trial {
     bool late;  /* it was ended at the limit; nothing else is known then */
     int status; /* that it ended with; 128 and the number of a signal */
     uint64_t tetrahedra, pages_asked, pages;
-    double cpu_s;  /* processor time: of all nodes, or of a peer */
-    double host_s; /* of the host, files apart */
+    double cpu_s; /* processor time: of all nodes, or of a peer */
+    /* Of the host: what time_triangulation_s covers, and all, files apart. */
+    double host_s, host_all_s;
     double wall_s;
     double whole_s;  /* by the clock, from its start to its end */
     char digest[80]; /* empty: it says none */

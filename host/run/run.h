@@ -79,7 +79,9 @@ struct host_run_result {
     double time_total_s, time_read_s, time_order_s, time_io_s;
     double time_start_up_s, time_triangulation_s, time_verify_s, time_write_s;
     double t_min_s, t_max_s; /* of the nodes that worked */
-    double host_cpu_s;       /* of the host's process, files apart */
+    /* Of the host's process: files apart, and of it what time_triangulation_s
+     * is the clock's of. */
+    double host_cpu_s, host_triangulation_cpu_s;
     uint64_t host_peak_bytes;
     uint64_t pages; /* that there are to be asked for */
     uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;

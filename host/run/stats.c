@@ -161,6 +161,7 @@ static json_t *run_object(const struct host_run_result *r)
     json_object_set_new(o, "verified", json_boolean(r->verified));
     put_times(o, r);
     put_real(o, "host_cpu_s", r->host_cpu_s);
+    put_real(o, "host_triangulation_cpu_s", r->host_triangulation_cpu_s);
     put(o, "host_peak_bytes", r->host_peak_bytes);
     put(o, "pages", r->pages);
     put_real(o, "tetrahedra_per_second",
