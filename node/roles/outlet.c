@@ -16,6 +16,7 @@ enum {
     /* Messages on their way out: one for each 64 KiB of memory, within. */
     RESULT_SLOTS_MIN = 4,
     RESULT_SLOTS_MAX = 32,
+    FEW_OF_SLOTS = 4, /* as a part of them: fewer results may wait */
     SPILL_SLOTS_MIN = 9,
     SPILL_SLOTS_MAX = 16
 };
@@ -279,6 +280,14 @@ static bool send_first(struct node_outlet *o, struct node_outbox *box)
     o->bytes_out += slot->size;
     node_outbox_drop(box);
     return true;
+}
+
+bool node_outlet_few(const struct node_outlet *outlet)
+{
+    const struct node_outlet *o = outlet;
+    bool last = o->results.used > 0 && !o->open; /* none may come behind it */
+    return !last && o->results.used < o->results.slot_count / FEW_OF_SLOTS &&
+           o->spills.used == 0 && o->spill_count == 0;
 }
 
 unsigned node_outlet_send(struct node_outlet *outlet)

@@ -65,6 +65,10 @@ bool node_outlet_take_unspill(struct node_outlet *outlet, const uint8_t *data,
 /* The front knows of no such faces. */
 void node_outlet_refuse_unspill(struct node_outlet *outlet, uint32_t brick);
 
+/* Whether what may leave is so little that it can wait for more: results alone,
+ * and there is room for as many again. */
+bool node_outlet_few(const struct node_outlet *outlet);
+
 /* Sends what may leave; the number of messages. */
 unsigned node_outlet_send(struct node_outlet *outlet);
 

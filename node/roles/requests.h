@@ -17,7 +17,10 @@
 #include "node/fault.h"
 #include "node/message.h"
 
-enum { NODE_WANTED_MAX = NODE_PAGES_A_REQUEST }; /* pages not yet asked for */
+enum {
+    NODE_WANTED_MAX = NODE_PAGES_A_REQUEST, /* pages not yet asked for */
+    NODE_REQUESTS_FEW = 8                   /* fewer may wait for others */
+};
 
 struct node_requests {
     struct node_counted *counted;
@@ -48,6 +51,12 @@ bool node_requests_take(struct node_requests *requests, const uint8_t *data,
  * incode/triangulator.h: a fault. */
 void node_requests_judge(struct node_requests *requests, int status,
                          uint32_t page, size_t count);
+
+/* Whether few pages are wanted: where there is other work, more may join. */
+static inline bool node_requests_few(const struct node_requests *requests)
+{
+    return requests->wanted_count < NODE_REQUESTS_FEW;
+}
 
 /* Sends for wanted pages, one message for each node that has some; the number
  * of pages. */

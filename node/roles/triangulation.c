@@ -6,6 +6,8 @@
 #include "node/arena.h"
 #include "node/keepers.h"
 
+enum { HOLD_US = NODE_PACE_US }; /* that messages wait for others, at most */
+
 size_t node_triangulation_min(size_t memory,
                               const struct node_setup_message *setup)
 {
@@ -146,11 +148,32 @@ unsigned node_triangulation_work(struct node_triangulation *t,
 {
     unsigned worked = node_pace_work(pace, node_triangulation_step, t);
     node_triangulation_close(t);
+    t->worked = worked > 0;
+    t->now_us = pace->looked_us;
     return worked;
+}
+
+/* Whether what there is to be sent is little, and not all: while the role works
+ * on, it waits for more, as each message by itself wakes the host. */
+static bool may_wait(struct node_triangulation *t)
+{
+    if (!t->worked || !node_requests_few(&t->requests) ||
+        !node_outlet_few(&t->outlet)) {
+        return false;
+    }
+    if (!t->holds) {
+        t->holds = true;
+        t->held_us = t->now_us;
+    }
+    return t->now_us - t->held_us < HOLD_US;
 }
 
 unsigned node_triangulation_send(struct node_triangulation *t)
 {
+    if (may_wait(t)) {
+        return 0;
+    }
+    t->holds = false;
     return node_requests_send(&t->requests) + node_outlet_send(&t->outlet);
 }
 

@@ -35,6 +35,10 @@ struct node_triangulation {
     struct node_jobs jobs;
     bool exchanges; /* it spills for what others send, room or not */
     bool drained;   /* the triangulator is done, results still leave */
+    bool worked;    /* in the last step, which ended then */
+    uint64_t now_us;
+    bool holds; /* messages, since then, for others to join them */
+    uint64_t held_us;
     struct node_requests requests;
     struct node_outlet outlet;
     size_t before; /* bytes of the arena before the triangulator's */
