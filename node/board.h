@@ -30,7 +30,8 @@ struct node_identity {
     uint8_t dimension;
 
     /* Frames a link and direction, 1 .. LINK_WINDOW_MAX; 0: what suits the
-     * memory: 8 from 2 MiB on, 4 from 1 MiB on, else 2. */
+     * memory: 8 from 2 MiB on, 4 from 1 MiB on, else 2; and 16 to the host
+     * from 3 MiB on, where no wire is serial. */
     uint8_t window;
 
     /* Of this start; not 0, and never used before by this node. */

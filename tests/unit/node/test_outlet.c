@@ -1,0 +1,100 @@
+/* Results that wait for more, and the window of the wire that they take. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "node/arena.h"
+#include "node/configure.h"
+#include "node/roles/outlet.h"
+
+enum { MEMORY = 1 << 20, SLOTS = MEMORY / 65536 };
+
+static _Alignas(NODE_ALIGNMENT) uint8_t memory[MEMORY];
+
+static void begin(struct node_outlet *outlet)
+{
+    static struct node_setup_message setup;
+    static struct node_counted counted;
+    static struct node_fault fault;
+    setup.credits = 100;
+    assert_true(node_outlet_bytes(MEMORY) <= sizeof memory);
+    node_outlet_init(outlet, memory, MEMORY, &setup, &counted, &fault);
+    node_outlet_begin(outlet, 1);
+}
+
+/* Stars until so many batches are full. */
+static void emit(struct node_outlet *outlet, uint32_t batches)
+{
+    static const uint32_t apexes[2][3] = {{1, 2, 3}, {2, 3, 4}};
+    struct incode_front_outside outside = node_outlet_outside(outlet);
+    for (uint32_t v = 0; outlet->results.used < batches; v += 100000) {
+        outside.emit(outside.context, v, apexes, 2);
+    }
+}
+
+static void test_few_wait(void **unused)
+{
+    (void)unused;
+    struct node_outlet outlet;
+    begin(&outlet);
+    assert_true(node_outlet_few(&outlet));
+    emit(&outlet, SLOTS / 4 - 1);
+    assert_true(node_outlet_few(&outlet));
+    emit(&outlet, SLOTS / 4);
+    assert_false(node_outlet_few(&outlet));
+    assert_true(node_outlet_has_room(&outlet));
+}
+
+static void test_last_does_not(void **unused)
+{
+    (void)unused;
+    struct node_outlet outlet;
+    begin(&outlet);
+    emit(&outlet, 1);
+    assert_true(node_outlet_few(&outlet));
+    node_outlet_close(&outlet);
+    assert_false(node_outlet_few(&outlet));
+}
+
+static void test_spilled_do_not(void **unused)
+{
+    (void)unused;
+    struct node_outlet outlet;
+    const struct incode_face face = {{1, 2, 3}};
+    begin(&outlet);
+    struct incode_front_outside outside = node_outlet_outside(&outlet);
+    assert_true(outside.spill(outside.context, &face, 1));
+    assert_false(node_outlet_few(&outlet));
+}
+
+static void test_windows(void **unused)
+{
+    (void)unused;
+    struct node_identity id = {.epoch = 1};
+    struct cube_config config = node_configure(&id, 4u << 20);
+    assert_int_equal(config.window, 8);
+    assert_int_equal(config.host_window, 16);
+    assert_int_equal(node_configure(&id, 2u << 20).host_window, 0);
+    id.serial_baud = 921600;
+    assert_int_equal(node_configure(&id, 4u << 20).host_window, 0);
+    id.serial_baud = 0;
+    id.window = 3;
+    config = node_configure(&id, 4u << 20);
+    assert_int_equal(config.window, 3);
+    assert_int_equal(config.host_window, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_few_wait),
+        cmocka_unit_test(test_last_does_not),
+        cmocka_unit_test(test_spilled_do_not),
+        cmocka_unit_test(test_windows),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
