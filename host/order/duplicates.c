@@ -89,7 +89,7 @@ static void search_part(void *context, unsigned part)
     for (uint64_t row = 0; row < s->rows || taken < queued;) {
         if (row < s->rows && queued - taken < AHEAD) {
             uint64_t h = hash(s->xyz + 3 * row);
-            if ((h >> 40) % s->parts == part) {
+            if ((h >> 40) * s->parts >> 24 == part) {
                 waiting[queued % AHEAD] = h;
                 waiting_row[queued % AHEAD] = (uint32_t)row;
                 __builtin_prefetch(&table->slot[h & (table->slots - 1)], 1);

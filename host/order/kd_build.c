@@ -7,7 +7,7 @@
 #include "incode/pages/pages.h"
 
 enum {
-    SAMPLE_MAX = 256,     /* items looked at to choose a pivot */
+    SAMPLE_MAX = 128,     /* items looked at to choose a pivot */
     SORT_MAX = 16,        /* fewer items than this are sorted by insertion */
     FORK_ITEMS = 1 << 13, /* fewer items than this are not worth a thread */
 };
@@ -45,6 +45,19 @@ int host_kd_longest(const double lo[3], const double hi[3])
     return longest;
 }
 
+/* As a whole, in as few registers as hold it: what is stored in parts is not
+ * there for the next load of it. */
+static inline void exchange(struct host_item *p, struct host_item *q)
+{
+    typedef uint64_t item
+        __attribute__((vector_size(sizeof(struct host_item))));
+    item a, b;
+    memcpy(&a, p, sizeof a);
+    memcpy(&b, q, sizeof b);
+    memcpy(p, &b, sizeof b);
+    memcpy(q, &a, sizeof a);
+}
+
 /* Both partitions move by an unconditional exchange, since the outcome of the
  * comparison is a coin toss that no branch predictor learns. */
 static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
@@ -52,10 +65,9 @@ static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
 {
     size_t m = 0;
     for (size_t i = 0; i < n; i++) {
-        struct host_item t = a[i];
-        a[i] = a[m];
-        a[m] = t;
-        m += sign * t.c[d] < pivot;
+        double key = sign * a[i].c[d];
+        exchange(&a[i], &a[m]);
+        m += key < pivot;
     }
     return m;
 }
@@ -65,10 +77,9 @@ static size_t partition_not_greater(struct host_item *a, size_t n, int d,
 {
     size_t m = 0;
     for (size_t i = 0; i < n; i++) {
-        struct host_item t = a[i];
-        a[i] = a[m];
-        a[m] = t;
-        m += sign * t.c[d] <= pivot;
+        double key = sign * a[i].c[d];
+        exchange(&a[i], &a[m]);
+        m += key <= pivot;
     }
     return m;
 }
@@ -134,7 +145,7 @@ static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
                            double sign, uint64_t *state)
 {
     double key[SAMPLE_MAX];
-    size_t s = n / 32;
+    size_t s = n / 64;
     s = s < 5 ? 5 : s > SAMPLE_MAX ? SAMPLE_MAX : s;
     for (size_t i = 0; i < s; i++) {
         *state = *state * 6364136223846793005u + 1442695040888963407u;
