@@ -1,4 +1,4 @@
-/* Results that wait for more, and the window of the wire that they take. */
+/* Results that wait for more. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -8,7 +8,6 @@
 #include <cmocka.h>
 
 #include "node/arena.h"
-#include "node/configure.h"
 #include "node/roles/outlet.h"
 
 enum { MEMORY = 1 << 20, SLOTS = MEMORY / 65536 };
@@ -71,30 +70,12 @@ static void test_spilled_do_not(void **unused)
     assert_false(node_outlet_few(&outlet));
 }
 
-static void test_windows(void **unused)
-{
-    (void)unused;
-    struct node_identity id = {.epoch = 1};
-    struct cube_config config = node_configure(&id, 4u << 20);
-    assert_int_equal(config.window, 8);
-    assert_int_equal(config.host_window, 16);
-    assert_int_equal(node_configure(&id, 2u << 20).host_window, 0);
-    id.serial_baud = 921600;
-    assert_int_equal(node_configure(&id, 4u << 20).host_window, 0);
-    id.serial_baud = 0;
-    id.window = 3;
-    config = node_configure(&id, 4u << 20);
-    assert_int_equal(config.window, 3);
-    assert_int_equal(config.host_window, 0);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_few_wait),
         cmocka_unit_test(test_last_does_not),
         cmocka_unit_test(test_spilled_do_not),
-        cmocka_unit_test(test_windows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
