@@ -1,5 +1,6 @@
 #include "sending.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "failure_detector.h"
@@ -76,6 +77,8 @@ static bool send_unspill(struct host_service *s, uint16_t to,
                         &body.header.count, error) != 0) {
         return false;
     }
+    assert(node->spilled >= body.header.count);
+    node->spilled -= body.header.count;
     body.header.last = list->faces == 0;
     body.header.sent = node->sent - node->missed;
     if (body.header.last) {
@@ -132,6 +135,7 @@ void host_sending_begin(struct host_service *service)
         node->setup_due = true;
         node->job_due = node->report_due = false;
         node->working = node->reported = false;
+        node->spilled = node->spilled_max = 0;
     }
 }
 
