@@ -19,7 +19,7 @@ enum { SMALL = 1 << 19 };
 struct inquiry {
     struct host_service *s;
     struct host_audit *audit;
-    struct host_judge *judge;
+    struct host_judge judge;
     unsigned named; /* nodes */
 };
 
@@ -126,37 +126,97 @@ static bool same_vertices(const uint32_t v[4], const uint32_t w[4])
            has_vertex(v, w[3]);
 }
 
-/* Beyond facet i of a right tetrahedron, at which the check has failed, another
- * one belongs, unless it is of the hull. */
-static void look_beyond(struct inquiry *q, const uint64_t *tets, unsigned count,
-                        const uint32_t t[4], int i)
+/* --- what is missing ------------------------------------------------------ */
+
+/* Right tetrahedra beyond facets of right ones at faults, that may be missing:
+ * a table by hash, so that one pass over the result tells which are there. */
+enum { MISSING_MAX = 8 * HOST_AUDIT_PLACES, TABLE = 4 * MISSING_MAX };
+
+struct missing {
+    uint32_t v[MISSING_MAX][4];
+    bool there[MISSING_MAX];
+    unsigned count;
+    uint16_t next[MISSING_MAX], head[TABLE]; /* chains; MISSING_MAX: the end */
+};
+
+/* The same for every order of the vertices. */
+static uint32_t hash_of(const uint32_t v[4])
 {
-    static const uint8_t outward[4][3] = {
-        {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-    const uint32_t f[3] = {t[outward[i][0]], t[outward[i][1]],
-                           t[outward[i][2]]};
-    uint32_t apex = host_judge_apex(q->judge, f);
-    if (apex == INCODE_NONE) {
-        return;
+    uint32_t sum = 0;
+    for (int i = 0; i < 4; i++) {
+        uint32_t mixed = (v[i] + 1) * UINT32_C(2654435761);
+        sum += mixed ^ mixed >> 15;
     }
-    const uint32_t missing[4] = {f[0], f[1], f[2], apex};
-    for (unsigned k = 0; k < count; k++) {
-        if (same_vertices(q->s->tets->v[tets[k]], missing)) {
+    return (sum ^ sum >> 15) % TABLE;
+}
+
+static void add_missing(struct missing *m, const uint32_t v[4])
+{
+    uint32_t at = hash_of(v);
+    for (uint16_t i = m->head[at]; i < MISSING_MAX; i = m->next[i]) {
+        if (same_vertices(m->v[i], v)) {
             return;
         }
     }
-    if (host_judge_tetrahedron(q->judge, missing)) {
-        doubt_brick(q, owner(q, missing), "it left out", missing);
+    if (m->count < MISSING_MAX) {
+        memcpy(m->v[m->count], v, sizeof m->v[0]);
+        m->there[m->count] = false;
+        m->next[m->count] = m->head[at];
+        m->head[at] = (uint16_t)m->count++;
     }
 }
 
+static void look_beyond(const struct inquiry *q, struct missing *m,
+                        const uint32_t t[4])
+{
+    static const uint8_t outward[4][3] = {
+        {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    for (int i = 0; i < 4; i++) {
+        uint32_t beyond[4] = {t[outward[i][0]], t[outward[i][1]],
+                              t[outward[i][2]], 0};
+        beyond[3] = host_judge_apex(&q->judge, beyond);
+        if (beyond[3] != INCODE_NONE &&
+            host_judge_tetrahedron(&q->judge, beyond)) {
+            add_missing(m, beyond);
+        }
+    }
+}
+
+/* Those that are nowhere in the result were left out by the node that committed
+ * their brick. */
+static void judge_missing(struct inquiry *q, struct missing *m)
+{
+    const struct host_tetrahedra *all = q->s->tets;
+    for (uint64_t k = 0; m->count > 0 && k < all->count; k++) {
+        for (uint16_t i = m->head[hash_of(all->v[k])]; i < MISSING_MAX;
+             i = m->next[i]) {
+            m->there[i] |= same_vertices(m->v[i], all->v[k]);
+        }
+    }
+    for (unsigned i = 0; i < m->count; i++) {
+        if (!m->there[i]) {
+            doubt_brick(q, owner(q, m->v[i]), "it left out", m->v[i]);
+        }
+    }
+}
+
+/* --- what is there -------------------------------------------------------- */
+
+static bool is_judged(const struct inquiry *q, const uint32_t t[4])
+{
+    bool points = true;
+    for (int i = 0; i < 4; i++) {
+        points = points && is_point(q->s->order, t[i]);
+    }
+    return points && host_judge_tetrahedron(&q->judge, t);
+}
+
 /* Tetrahedron i of those at faults. */
-static void judge_tet(struct inquiry *q, const uint64_t *tets, unsigned i,
-                      bool *right)
+static void judge_tet(struct inquiry *q, struct missing *m,
+                      const uint64_t *tets, unsigned i)
 {
     const uint32_t *t = q->s->tets->v[tets[i]];
-    *right = host_judge_tetrahedron(q->judge, t);
-    if (!*right) {
+    if (!is_judged(q, t)) {
         accuse(q, host_ledger_finder(&q->s->ledger, tets[i]),
                "it sent, and that is not Delaunay,", t);
         q->audit->redo[owner(q, t)] = 1;
@@ -167,35 +227,28 @@ static void judge_tet(struct inquiry *q, const uint64_t *tets, unsigned i,
             doubt_brick(q, owner(q, t), "it sent twice", t);
         }
     }
+    look_beyond(q, m, t);
 }
 
-/* Facets of right tetrahedra that a place names. */
-static void look_at_places(struct inquiry *q, const uint64_t *tets,
-                           unsigned count, const bool *right)
+static void judge_places(struct inquiry *q, struct missing *m)
 {
-    for (unsigned p = 0; p < q->audit->places; p++) {
-        const struct host_audit_place *place = &q->audit->place[p];
-        for (unsigned i = 0; i < place->vertices; i++) {
-            redo(q, place->vertex[i]);
-        }
-        for (unsigned k = 0; k < place->tets; k++) {
-            const uint32_t *t = q->s->tets->v[place->tet[k]];
-            const uint64_t *at = bsearch(&place->tet[k], tets, count,
-                                         sizeof *tets, compare_tets);
-            for (int i = 0; i < 4; i++) {
-                redo(q, t[i]);
-                bool named = place->vertices == 3;
-                for (unsigned j = 0; named && j < 3; j++) {
-                    named = place->vertex[j] != t[i] &&
-                            has_vertex(t, place->vertex[j]);
-                }
-                if (named && right[at - tets]) {
-                    look_beyond(q, tets, count, t, i);
-                }
-            }
+    uint64_t tets[2 * HOST_AUDIT_PLACES];
+    unsigned count = collect(q->audit, tets);
+    for (unsigned i = 0; i < count; i++) {
+        judge_tet(q, m, tets, i);
+        for (int k = 0; k < 4; k++) {
+            redo(q, q->s->tets->v[tets[i]][k]);
         }
     }
+    for (unsigned p = 0; p < q->audit->places; p++) {
+        for (unsigned i = 0; i < q->audit->place[p].vertices; i++) {
+            redo(q, q->audit->place[p].vertex[i]);
+        }
+    }
+    judge_missing(q, m);
 }
+
+/* --- what is to be done again --------------------------------------------- */
 
 /* Of nodes at fault nothing is trusted. */
 static void redo_guilty(struct inquiry *q)
@@ -239,40 +292,36 @@ static void redo_unclear(struct inquiry *q)
 
 static void analyse(struct host_service *s, struct host_audit *a)
 {
-    uint64_t tets[2 * HOST_AUDIT_PLACES];
-    bool right[2 * HOST_AUDIT_PLACES];
     struct inquiry q = {.s = s, .audit = a};
+    const struct host_sites sites = host_sites_of_order(s->order);
+    struct missing *missing = malloc(sizeof *missing);
     a->redo = calloc(s->ledger.bricks, 1);
     a->guilty = calloc(s->machine->nodes, 1);
-    if (a->redo == NULL || a->guilty == NULL) {
+    if (a->redo == NULL || a->guilty == NULL || missing == NULL) {
         host_fail_memory(&a->error, "the search for the faulty node");
-        return;
+    } else if (host_judge_make(&q.judge, &sites, &a->error) == 0) {
+        missing->count = 0;
+        for (unsigned i = 0; i < TABLE; i++) {
+            missing->head[i] = MISSING_MAX;
+        }
+        judge_places(&q, missing);
+        host_judge_free(&q.judge);
+        if (q.named > 0) {
+            redo_guilty(&q);
+        } else {
+            redo_unclear(&q);
+        }
     }
-    q.judge = host_judge_make(s->order, &a->error);
-    if (q.judge == NULL) {
-        return;
-    }
-    unsigned count = collect(a, tets);
-    for (unsigned i = 0; i < count; i++) {
-        judge_tet(&q, tets, i, &right[i]);
-    }
-    look_at_places(&q, tets, count, right);
-    host_judge_free(q.judge);
-    if (q.named > 0) {
-        redo_guilty(&q);
-    } else {
-        redo_unclear(&q);
-    }
+    free(missing);
 }
 
 static void check(void *argument)
 {
     struct host_service *s = argument;
     struct host_audit *a = &s->audit;
-    const struct host_sites sites = {.order = s->order,
-                                     .count = (uint64_t)s->order->bricks *
-                                              INCODE_BRICK_POINTS};
-    const struct host_check_listener listener = {a, note_place};
+    const struct host_sites sites = host_sites_of_order(s->order);
+    const struct host_check_listener listener = {a, HOST_AUDIT_PLACES,
+                                                 note_place};
     struct host_error failed = {0};
     (void)host_check(&sites, s->tets,
                      a->exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING,

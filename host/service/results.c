@@ -140,8 +140,8 @@ static uint32_t (*rows_of_job(const struct host_service *s,
 }
 
 /* Why rows cannot all be tetrahedra of the triangulation; NULL: most are. */
-static const char *why_too_many(struct host_judge *judge, uint32_t (*rows)[4],
-                                uint64_t count)
+static const char *why_too_many(const struct host_judge *judge,
+                                uint32_t (*rows)[4], uint64_t count)
 {
     uint64_t step = count / SAMPLE + 1;
     for (uint64_t i = 0; i < count; i += step) {
@@ -168,15 +168,19 @@ static int look_through_rows(struct host_service *s, unsigned node,
                              struct host_error *error)
 {
     struct host_job *job = &s->ledger.job[node];
-    struct host_judge *judge = host_judge_make(s->order, error);
+    const struct host_sites sites = host_sites_of_order(s->order);
+    struct host_judge judge;
     uint64_t count = 0;
-    uint32_t(*rows)[4] = judge == NULL ? NULL : rows_of_job(s, job, &count);
-    const char *why = rows == NULL ? NULL : why_too_many(judge, rows, count);
-    if (judge != NULL && rows == NULL) {
+    if (host_judge_make(&judge, &sites, error) != 0) {
+        return error->code;
+    }
+    uint32_t(*rows)[4] = rows_of_job(s, job, &count);
+    const char *why = rows == NULL ? NULL : why_too_many(&judge, rows, count);
+    if (rows == NULL) {
         host_fail_memory(error, "a look at a node's results");
     }
     free(rows);
-    host_judge_free(judge);
+    host_judge_free(&judge);
     job->rows_max = 2 * job->rows;
     return error->code != 0 ? error->code
            : why != NULL    ? host_results_refuse(s, node, why, error)
@@ -196,7 +200,7 @@ static bool is_spilled(const struct host_service *s, const struct host_job *job,
 
 /* Whether a face is a facet of the triangulation: of the tetrahedron on one
  * side of it or the other. */
-static bool is_facet(struct host_judge *judge, const uint32_t f[3])
+static bool is_facet(const struct host_judge *judge, const uint32_t f[3])
 {
     for (int side = 0; side < 2; side++) {
         uint32_t t[4] = {f[0], f[side == 0 ? 1 : 2], f[side == 0 ? 2 : 1], 0};
@@ -215,7 +219,7 @@ static int compare_faces(const void *p, const void *q)
 
 /* Why faces cannot all be open ones of the node's front; NULL: most are.  A
  * face is open once in each direction; it begins with its smallest vertex. */
-static const char *why_spilled(struct host_judge *judge,
+static const char *why_spilled(const struct host_judge *judge,
                                struct incode_face *faces, uint64_t count)
 {
     uint64_t step = count / SAMPLE + 1;
@@ -247,19 +251,22 @@ static int look_through_faces(struct host_service *s, unsigned node,
                               struct host_error *error)
 {
     struct host_node *n = &s->node[node];
-    struct host_judge *judge = host_judge_make(s->order, error);
+    const struct host_sites sites = host_sites_of_order(s->order);
+    struct host_judge judge;
     uint64_t count = 0;
     struct incode_face *faces = NULL;
-    if (judge != NULL &&
-        host_spill_copy(&s->spill, node, &faces, &count, error) == 0) {
-        const char *why = why_spilled(judge, faces, count);
+    if (host_judge_make(&judge, &sites, error) != 0) {
+        return error->code;
+    }
+    if (host_spill_copy(&s->spill, node, &faces, &count, error) == 0) {
+        const char *why = why_spilled(&judge, faces, count);
         n->spilled_max = 2 * n->spilled;
         if (why != NULL) {
             (void)host_results_refuse(s, node, why, error);
         }
     }
     free(faces);
-    host_judge_free(judge);
+    host_judge_free(&judge);
     return error->code;
 }
 
