@@ -39,9 +39,8 @@ struct host_sites {
 static inline struct host_sites
 host_sites_of_order(const struct host_order *order)
 {
-    return (struct host_sites){.order = order,
-                               .count = (uint64_t)order->bricks *
-                                        INCODE_BRICK_POINTS};
+    return (struct host_sites){
+        .order = order, .count = (uint64_t)order->bricks * INCODE_BRICK_POINTS};
 }
 
 /* Whether v < count is a vertex: not an unused slot, not a repeated row. */

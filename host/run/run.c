@@ -14,7 +14,6 @@
 #include "host/formats/claims.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
-#include "host/mesh/facets.h"
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
 #include "memory_needed.h"
@@ -216,9 +215,10 @@ static int on_nodes(const struct host_run_options *options,
     }
     host_service_end(&service);
     if (status == 0 && options->stats != NULL) {
-        status = host_hull_facets(tets,
-                                  (uint64_t)order->bricks * INCODE_BRICK_POINTS,
-                                  &result->hull_facets, error);
+        struct host_sites sites = host_sites_of_order(order);
+        status = host_check(&sites, tets, HOST_CHECK_TILING, NULL,
+                            &result->check, error);
+        result->hull_facets = result->check.hull_facets;
     }
     if (status == 0) {
         stretch = begin_stretch();

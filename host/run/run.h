@@ -99,7 +99,7 @@ struct host_run_result {
     bool limited;            /* the kernel held the nodes to their memory */
     const char *memory_held; /* see boards.h; NULL: nothing to say */
     bool verified;
-    struct host_verify_report check;
+    struct host_check_report check;
 };
 
 void host_run_defaults(struct host_run_options *options);
