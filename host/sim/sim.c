@@ -181,7 +181,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
 
 static int compare(struct host_sim_run *r, struct host_error *error)
 {
-    static struct host_verify_report report;
+    static struct host_check_report report;
     struct host_tetrahedra right = {0};
     struct host_digest digest = {{0}};
     int status = host_reference(&r->points, &right, error);

@@ -352,7 +352,7 @@ static void test_cubes(void **unused)
         struct host_points points = {0};
         struct host_error error = {0};
         struct host_digest first, digest;
-        static struct host_verify_report report;
+        static struct host_check_report report;
         assert_int_equal(host_gen(sets[s].kind, sets[s].n, 3, &points, &error),
                          0);
         for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
