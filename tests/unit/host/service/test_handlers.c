@@ -202,17 +202,22 @@ static int pong_of(unsigned i, uint32_t pinged, uint32_t start,
 }
 
 /* What a loss may explain counts once every node that has not left has answered
- * a ping that was sent after it; a node that has started again is the loss. */
+ * a ping that was sent after it; a node that has started again is the loss.
+ * What counts ends what nodes do together, then the node's part, then the
+ * run. */
 static void test_doubtful_fault(void **unused)
 {
     static const char text[] = "page 1 to all, expected the one below 8";
+    enum { A_LOSS, TOGETHER, ALONE, LAST, CASES };
     (void)unused;
-    for (unsigned k = 0; k < 2; k++) {
+    for (unsigned k = 0; k < CASES; k++) {
         struct host_error error = {0};
         begin();
+        service.ledger.alone = k >= ALONE;
         for (unsigned i = 0; i < NODES; i++) {
             service.report[i].up = true;
             service.node[i].start = 7;
+            service.node[i].aside = k == LAST && i != 1;
         }
         service.node[3].left = true;
         assert_int_equal(send(1, NODE_FAULT, text, sizeof text - 1, &error), 0);
@@ -225,12 +230,21 @@ static void test_doubtful_fault(void **unused)
         assert_int_equal(pong_of(0, 0, 7, &error), 0); /* not to that one */
         assert_int_equal(pong_of(0, 1, 7, &error), 0);
         assert_int_equal(pong_of(2, 1, 7, &error), 0);
-        int status = pong_of(1, 1, k == 0 ? 7 : 8, &error);
-        assert_int_equal(status, k == 0 ? HOST_CUBE : 0);
-        assert_int_equal(service.loss, k == 1);
-        if (k == 0) {
+        assert_false(service.loss);
+        int status = pong_of(1, 1, k == A_LOSS ? 8 : 7, &error);
+        assert_int_equal(status, k == LAST ? HOST_CUBE : 0);
+        assert_int_equal(service.loss, k != LAST);
+        assert_int_equal(service.excluded, k == ALONE);
+        assert_int_equal(service.node[1].aside, k == ALONE);
+        assert_ptr_equal(service.strategy,
+                         k == TOGETHER ? &host_redo : &host_spatial);
+        assert_int_equal(service.ledger.alone, k != A_LOSS);
+        if (k == LAST) {
             assert_non_null(strstr(error.text, "node 1: page 1 to all, "));
             assert_non_null(strstr(error.text, "; please report this"));
+        } else if (k != A_LOSS) {
+            assert_non_null(strstr(said, "node 1"));
+            assert_non_null(strstr(said, "reports: page 1 to all, "));
         }
         end();
     }
