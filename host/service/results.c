@@ -318,7 +318,8 @@ int host_results_take(struct host_service *service,
     /* Four bytes are the least that a tetrahedron takes. */
     size_t room = message->size / 4u + 1, count;
     node_result_open(&reader, message->data + header, message->size - header,
-                     s->order->bricks * INCODE_BRICK_POINTS);
+                     s->order->bricks * INCODE_BRICK_POINTS, message->source,
+                     s->machine->nodes);
     do {
         uint32_t(*rows)[4] = host_tetrahedra_room(s->tets, room, error);
         if (rows == NULL) {

@@ -167,6 +167,7 @@ static void prepare(struct host_service *s)
     memcpy(s->setup.setup.lo, order->lo, sizeof order->lo);
     memcpy(s->setup.setup.hi, order->hi, sizeof order->hi);
     memcpy(s->setup.setup.cells, order->cells, sizeof order->cells);
+    s->work.page_key = s->setup.page_key;
     s->started = true;
 }
 

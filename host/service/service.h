@@ -116,8 +116,8 @@ struct host_service {
     struct host_tetrahedra *tets; /* takes rows of vertex numbers */
     const struct host_strategy *strategy;
     struct host_sharing sharing;
-    struct node_setup_message setup;
-    unsigned window;      /* frames; 0: a large one */
+    struct node_setup_message setup; /* page_key: drawn anew for each run */
+    unsigned window;                 /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     enum host_verifying verifying;
     bool foreign; /* its nodes are not processes that this program started */

@@ -54,7 +54,7 @@ static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick)
     const uint32_t apexes[1][3] = {{1, 2, 3}};
     struct node_result_header header = {epoch, 0};
     memcpy(data, &header, sizeof header);
-    node_result_begin(&writer, data + sizeof header, 100);
+    node_result_begin(&writer, data + sizeof header, 100, 0);
     assert_int_equal(node_result_star(&writer, 0, apexes, 1), 1);
     assert_int_equal(node_result_commit(&writer, brick), 1);
     return sizeof header + writer.size;
@@ -347,8 +347,8 @@ static void test_texts(void **unused)
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 10, expected 11"},
-        {NODE_READY, &ready, 4, "protocol version 10, expected 11"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 11, expected 12"},
+        {NODE_READY, &ready, 4, "protocol version 11, expected 12"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
         {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 40"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
@@ -376,7 +376,7 @@ static void test_texts(void **unused)
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
          "same version"}};
-    assert_int_equal(NODE_PROTOCOL, 11);
+    assert_int_equal(NODE_PROTOCOL, 12);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();
