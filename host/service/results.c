@@ -336,7 +336,10 @@ int host_results_take(struct host_service *service,
                 return host_results_refuse(s, message->source, why, error);
             }
         }
-        if (host_ledger_found(&s->ledger, message->source, count, error) != 0) {
+        /* Of one that works alone no other node has found anything. */
+        uint32_t finder =
+            s->ledger.alone ? message->source : (uint32_t)reader.finder;
+        if (host_ledger_found(&s->ledger, finder, count, error) != 0) {
             return error->code;
         }
         host_tetrahedra_keep(s->tets, count);

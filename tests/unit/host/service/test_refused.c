@@ -184,7 +184,7 @@ static void test_floods(void **unused)
                .faces = {{{v, v + 1, v + 2}}, {{v, v + 2, v + 1}}}};
     size_t size = batch_of(data, row, order.region[1].first);
     struct node_result_writer writer;
-    node_result_begin(&writer, data + 8, 100);
+    node_result_begin(&writer, data + 8, 100, 1);
     const uint32_t apexes[1][3] = {{v + 1, v + 2, v + 3}};
     assert_int_equal(node_result_star(&writer, v, apexes, 1), 1);
     assert_true(8 + writer.size < size); /* no commit */
