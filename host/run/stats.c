@@ -188,6 +188,7 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "host_bytes_received", r->bytes_received);
     put(o, "retransmitted_frames", r->retransmitted);
     put(o, "nodes_lost", r->lost);
+    put(o, "nodes_excluded", r->excluded);
     put(o, "node_restarts", r->restarts);
     put(o, "generations", r->generations);
     put(o, "missing_wires", r->missing_wires);
