@@ -62,7 +62,12 @@ static int open_world(struct host_sim_run *r, struct host_error *error)
         .context = r,
         .second = host_second_host_round,
         .second_context = &r->second,
+        .liar = p->wanted[HOST_SIM_LIAR] ? &r->liar : NULL,
+        .liar_node = p->liar.node,
     };
+    r->liar.way = p->liar.way;
+    r->liar.one_in = p->liar.one_in;
+    r->liar.random = sim_seed(p->seed, 5);
     if (host_world_open(&r->world, &o, error) != 0) {
         return error->code;
     }
