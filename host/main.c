@@ -196,7 +196,7 @@ static int command_verify(int argc, char **argv, struct host_error *error)
         {"format", KEY_FORMAT_IN, "NAME", 0,
          "What POINTS holds, where no extension tells:", 0},
         {0}};
-    static struct host_verify_report report;
+    static struct host_check_report report;
     struct host_points points = {0};
     struct host_tetrahedra tets = {0};
     struct simple s = {0};

@@ -90,7 +90,8 @@ bool incode_builder_take(struct incode_builder *b,
         return true;
     }
     memcpy(&lent->list, list, incode_list_bytes(list->count));
-    lent->answers.kind = list->kind;
+    lent->answers.kind = (uint16_t)list->kind;
+    lent->answers.builder = b->number;
     lent->answers.count = list->count;
     for (uint32_t i = 0; i < list->count; i++) {
         memcpy(lent->answers.v[i], list->v[i], sizeof list->v[i]);

@@ -38,6 +38,7 @@ struct incode_builder {
     struct incode_maker maker;
     struct incode_lent *lent;
     uint32_t lists;         /* places for them */
+    uint16_t number;        /* of the builder, in its answers; 0 at first */
     uint64_t clock;         /* lists taken */
     uint64_t built, faults; /* tetrahedra found, searches that had to wait */
     size_t bytes;           /* of memory */

@@ -36,7 +36,9 @@ struct incode_list {
  * orientation, its first vertex that of the list; COUNT: brick, points, 0, 0.
  */
 struct incode_answers {
-    uint32_t kind, count;
+    uint16_t kind;
+    uint16_t builder; /* whose they are, as their carrier numbers builders */
+    uint32_t count;
     uint32_t v[INCODE_LIST_MAX][4];
 };
 

@@ -206,6 +206,18 @@ size_t incode_triangulator_copy(const struct incode_triangulator *t,
     return incode_pager_copy(&t->maker.pager, page, data);
 }
 
+uint64_t *incode_triangulator_label(const struct incode_triangulator *t,
+                                    uint32_t page)
+{
+    return incode_pager_label(&t->maker.pager, page);
+}
+
+bool incode_triangulator_awaits(const struct incode_triangulator *t,
+                                uint32_t page)
+{
+    return incode_pager_loading(&t->maker.pager, page);
+}
+
 bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
 {
     /* No step of this node's own lets go what the shuffle keeps back. */

@@ -177,6 +177,15 @@ bool incode_triangulator_has(const struct incode_triangulator *t,
 size_t incode_triangulator_copy(const struct incode_triangulator *t,
                                 uint32_t page, void *data);
 
+/* The caller's label of a page that is there or on its way, 0 at first; NULL:
+ * it is neither. */
+uint64_t *incode_triangulator_label(const struct incode_triangulator *t,
+                                    uint32_t page);
+
+/* Whether a page is on its way. */
+bool incode_triangulator_awaits(const struct incode_triangulator *t,
+                                uint32_t page);
+
 /* Whether a page that is not there is on its way; where nothing has to make
  * room for it, it is asked for. */
 bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page);

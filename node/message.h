@@ -22,7 +22,7 @@
 #include "transport/cube.h"
 
 enum {
-    NODE_PROTOCOL = 11,             /* both ends must agree */
+    NODE_PROTOCOL = 12,             /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
     NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got, */
     NODE_PAGES_LENT_MAX = 8,        /* and of another node of an exchange */
@@ -38,7 +38,8 @@ enum node_message_type {
     /* From the host. */
     NODE_SETUP = 1,   /* struct node_setup_message */
     NODE_JOB,         /* struct node_job_message */
-    NODE_PAGE,        /* uint32 page, then its bytes; also from a node */
+    NODE_PAGE,        /* struct node_page_head, then the page's bytes; also from
+                         a node */
     NODE_CREDIT,      /* uint32: NODE_RESULT messages allowed since the setup */
     NODE_UNSPILL,     /* struct node_spill_header, then faces */
     NODE_REPORT,      /* nothing: asks for NODE_FINISHED, without a job */
@@ -69,6 +70,7 @@ enum node_message_type {
                              asked the sender for, who has them not */
     NODE_ANSWER,          /* struct node_answer_head, then what was asked for */
     NODE_IMAGE_STATE,     /* of a loader: loader/messages.h */
+    NODE_WRONG_PAGE,      /* struct node_wrong_page_message */
     /* From a face manager to a builder, and back: incode/list.h. */
     NODE_LIST = 64, /* struct incode_list, as much as is in use */
     NODE_ANSWERS,   /* struct incode_answers, likewise */
@@ -171,6 +173,9 @@ struct node_setup_message {
     /* Of a manager: its builders, node i in bit i % 8 of byte i / 8; one or
      * more, and not itself. */
     uint8_t builders[(NODE_BUILDERS_MAX + 1) / 8];
+
+    /* Of the tags of all pages of the run: page_check.h. */
+    uint64_t page_key;
 };
 
 static inline bool node_is_builder(const struct node_setup_message *setup,
@@ -184,6 +189,27 @@ static inline void node_add_builder(struct node_setup_message *setup,
 {
     setup->builders[node / 8] |= (uint8_t)(1u << node % 8);
 }
+
+/* tag: of what follows, by the host (page_check.h); its low word first. */
+struct node_page_head {
+    uint32_t page;
+    uint32_t tag[2];
+};
+
+/* As much of it as the page has bytes. */
+struct node_page_message {
+    struct node_page_head head;
+    uint8_t data[INCODE_PAGE_BYTES];
+};
+
+/* A page that `sender` has sent is not as the host made it, or was not the
+ * sender's to send: its number as it came, or INCODE_NONE.  The node has not
+ * used it, and asks the host for it if it still wants it.  sender CUBE_HOST: it
+ * was altered on the way from the host. */
+struct node_wrong_page_message {
+    uint32_t page;
+    uint32_t sender;
+};
 
 /* A range of bricks, for a worker or a face manager that has no other. */
 struct node_job_message {
@@ -324,7 +350,7 @@ static_assert(CUBE_PAYLOAD_MAX / sizeof(struct node_shared) <= INCODE_TAKEN_MAX,
               "a message of tetrahedra may come at a time");
 static_assert(sizeof(struct node_wave_answer_message) == 32, "wave layout");
 static_assert(sizeof(struct node_spill_header) == 20, "spill layout");
-static_assert(sizeof(struct node_setup_message) == 232, "setup layout");
+static_assert(sizeof(struct node_setup_message) == 240, "setup layout");
 static_assert(offsetof(struct node_setup_message, setup) == 16, "setup layout");
 static_assert(sizeof(struct node_map) == 32 + 8 * NODE_TABLES_MAX,
               "map layout");
@@ -345,7 +371,8 @@ static_assert(sizeof(struct incode_answers) <= CUBE_PAYLOAD_MAX,
 static_assert(sizeof(struct node_found_message) <= CUBE_PAYLOAD_MAX &&
                   sizeof(struct incode_loan) <= CUBE_PAYLOAD_MAX,
               "a loan fits a message");
-static_assert(4 + INCODE_PAGE_BYTES <= CUBE_PAYLOAD_MAX,
+static_assert(sizeof(struct node_page_head) == 12, "page layout");
+static_assert(sizeof(struct node_page_message) <= CUBE_PAYLOAD_MAX,
               "a page fits a message");
 static_assert(sizeof(struct node_spill_header) +
                       NODE_FACES_A_MESSAGE * sizeof(struct incode_face) <=

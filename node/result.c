@@ -5,7 +5,7 @@
 
 #include "incode/pages/bricks.h"
 
-enum { KIND_TETRAHEDRON, KIND_STAR, KIND_COMMIT };
+enum { KIND_TETRAHEDRON, KIND_STAR, KIND_COMMIT, KIND_FINDER };
 
 static inline uint32_t zigzag(uint32_t difference)
 {
@@ -32,12 +32,13 @@ static inline uint8_t *put(uint8_t *at, uint32_t value, uint32_t length)
 }
 
 void node_result_begin(struct node_result_writer *writer, uint8_t *buffer,
-                       size_t size_max)
+                       size_t size_max, uint16_t sender)
 {
     writer->buffer = buffer;
     writer->size = 0;
     writer->size_max = size_max;
     writer->vertex = 0;
+    writer->finder = sender;
 }
 
 static void put_single(struct node_result_writer *writer, uint32_t kind,
@@ -48,6 +49,21 @@ static void put_single(struct node_result_writer *writer, uint32_t kind,
     uint8_t *at = writer->buffer + writer->size;
     *at = (uint8_t)(kind | length << 2);
     writer->size = (size_t)(put(at + 1, value, length) - writer->buffer);
+}
+
+int node_result_finder(struct node_result_writer *writer, uint16_t node)
+{
+    if (node == writer->finder) {
+        return 1;
+    }
+    if (writer->size_max - writer->size < NODE_RESULT_FINDER_MAX +
+                                              NODE_RESULT_STAR_MAX +
+                                              NODE_RESULT_TETRAHEDRON_MAX) {
+        return 0;
+    }
+    put_single(writer, KIND_FINDER, node);
+    writer->finder = node;
+    return 1;
 }
 
 size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
@@ -88,13 +104,16 @@ int node_result_commit(struct node_result_writer *writer, uint32_t brick)
 }
 
 void node_result_open(struct node_result_reader *reader, const uint8_t *data,
-                      size_t size, uint32_t vertices)
+                      size_t size, uint32_t vertices, uint32_t sender,
+                      uint32_t nodes)
 {
     reader->next = data;
     reader->end = data + size;
     reader->vertex = 0;
     reader->vertices = vertices;
     reader->brick = 0;
+    reader->finder = sender;
+    reader->nodes = nodes;
     reader->in_star = 0;
 }
 
@@ -132,7 +151,7 @@ static size_t record_size(uint32_t head)
     if ((head & 3) == KIND_TETRAHEDRON) {
         return first + 2 + (head >> 4 & 3) + (head >> 6);
     }
-    return (head & 3) <= KIND_COMMIT && head >> 4 == 0 ? first : 0;
+    return head >> 4 == 0 ? first : 0;
 }
 
 /* One record near the end of the batch, by way of a padded copy.  Returns its
@@ -161,6 +180,10 @@ static size_t read_slowly(struct node_result_reader *reader, uint32_t row[4],
         reader->vertex += difference;
         reader->in_star = 1;
         return reader->vertex < reader->vertices ? size : 0;
+    }
+    if (kind == KIND_FINDER) {
+        reader->finder = difference;
+        return reader->finder < reader->nodes ? size : 0;
     }
     reader->brick = reader->vertex / INCODE_BRICK_POINTS + difference;
     *committed = 1;
@@ -206,6 +229,9 @@ enum node_result_event node_result_read(struct node_result_reader *reader,
             if (*count == rows_max) {
                 continue;
             }
+        }
+        if (*count > 0 && (*reader->next & 3) == KIND_FINDER) {
+            return NODE_RESULT_ROWS; /* those before it have another */
         }
         size_t size = read_slowly(reader, rows[*count], &rows_read, &committed);
         if (size == 0) {

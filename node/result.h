@@ -2,18 +2,23 @@
  * node to the host.
  *
  * A batch is a row of records.  The first byte of a record is its head: bits
- * 0-1 the kind (0 tetrahedron, 1 star, 2 commit), then two bits for each value
- * that follows, its length in bytes less one; unused length bits are 0.  Values
- * are little-endian zigzag differences: a star's vertex from the vertex before
- * it in the batch (0 at its start), a tetrahedron's three apexes from the
- * star's vertex, a committed brick from the brick of that vertex.
+ * 0-1 the kind (0 tetrahedron, 1 star, 2 commit, 3 finder), then two bits for
+ * each value that follows, its length in bytes less one; unused length bits are
+ * 0.  Values are little-endian zigzag differences: a star's vertex from the
+ * vertex before it in the batch (0 at its start), a tetrahedron's three apexes
+ * from the star's vertex, a committed brick from the brick of that vertex, a
+ * finder from 0.
+ *
+ * A finder is the node that has found the tetrahedra from there on, up to the
+ * next finder or the end of the batch; at the start it is the sender.
  *
  * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
  * read whatever its bytes are, without reading past its end.
  *
- *     node_result_begin(&writer, buffer, sizeof buffer - NODE_RESULT_SLACK);
- *     written = node_result_star(&writer, vertex, apexes, count);
- *     node_result_open(&reader, buffer, writer.size, vertices);
+ *     node_result_begin(&writer, buffer, sizeof buffer - NODE_RESULT_SLACK, 1);
+ *     if (node_result_finder(&writer, 5))
+ *         written = node_result_star(&writer, vertex, apexes, count);
+ *     node_result_open(&reader, buffer, writer.size, vertices, 1, nodes);
  *     while (node_result_read(&reader, rows, 64, &count) == NODE_RESULT_ROWS)
  *         tetrahedra += count;
  */
@@ -27,6 +32,7 @@ enum {
     NODE_RESULT_TETRAHEDRON_MAX = 13, /* bytes of a record, at most */
     NODE_RESULT_STAR_MAX = 5,
     NODE_RESULT_COMMIT_MAX = 5,
+    NODE_RESULT_FINDER_MAX = 4,
     NODE_RESULT_SLACK = 4 /* bytes of a writer's buffer beyond its use */
 };
 
@@ -34,11 +40,17 @@ struct node_result_writer {
     uint8_t *buffer;
     size_t size, size_max; /* bytes written; most that may be written */
     uint32_t vertex;
+    uint16_t finder; /* of what is written next */
 };
 
-/* buffer: size_max + NODE_RESULT_SLACK bytes. */
+/* buffer: size_max + NODE_RESULT_SLACK bytes; sender: the node whose batch it
+ * is. */
 void node_result_begin(struct node_result_writer *writer, uint8_t *buffer,
-                       size_t size_max);
+                       size_t size_max, uint16_t sender);
+
+/* What is written next was found by that node.  Returns 1, or 0 where a
+ * tetrahedron might not fit behind it. */
+int node_result_finder(struct node_result_writer *writer, uint16_t node);
 
 /* Writes as many of the star's tetrahedra (vertex, apexes[i]) as are sure to
  * fit; returns how many. */
@@ -52,20 +64,24 @@ struct node_result_reader {
     const uint8_t *next, *end;
     uint32_t vertex, vertices; /* vertex numbers must be below `vertices` */
     uint32_t brick;            /* after NODE_RESULT_COMMIT */
+    uint32_t finder, nodes;    /* of the rows read last; below `nodes` */
     int in_star;
 };
 
 enum node_result_event {
-    NODE_RESULT_ROWS,   /* `*count` rows, perhaps 0; read on */
+    NODE_RESULT_ROWS,   /* `*count` rows, perhaps few or 0; read on */
     NODE_RESULT_COMMIT, /* `*count` rows, and then reader->brick committed */
     NODE_RESULT_END,    /* `*count` rows, the last */
     NODE_RESULT_GARBAGE /* not such a batch; reading is over */
 };
 
+/* sender: below `nodes`. */
 void node_result_open(struct node_result_reader *reader, const uint8_t *data,
-                      size_t size, uint32_t vertices);
+                      size_t size, uint32_t vertices, uint32_t sender,
+                      uint32_t nodes);
 
-/* Reads up to rows_max tetrahedra as rows of four vertex numbers. */
+/* Reads up to rows_max tetrahedra as rows of four vertex numbers, all of them
+ * found by the node reader->finder. */
 enum node_result_event node_result_read(struct node_result_reader *reader,
                                         uint32_t (*rows)[4], size_t rows_max,
                                         size_t *count);

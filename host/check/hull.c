@@ -4,24 +4,27 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/mesh/adjacency.h"
 #include "incode/predicates/predicates.h"
 
 enum {
     DIRECTIONS = 64,       /* rays tried before giving up */
     INSIDE_TRIES = 100000, /* tetrahedra tried for a point inside */
+    TURN = 1 << 10,        /* facets or vertices a turn of a thread */
+    FACETS_MAX = 1 << 30,  /* as edges are numbered */
 };
 
-int host_hull_add(struct host_hull *hull, uint32_t tet, uint32_t corner,
+int host_hull_add(struct host_hull *hull, uint64_t tet, uint32_t corner,
                   struct host_error *error)
 {
     if (hull->count == hull->capacity) {
         size_t capacity = 2 * hull->capacity + 1024;
         void *grown = realloc(hull->facet, capacity * sizeof *hull->facet);
-        if (grown == NULL) {
+        if (grown == NULL || hull->count >= FACETS_MAX) {
+            hull->facet = grown == NULL ? hull->facet : grown;
             return host_fail_memory(error, "the facets of the hull");
         }
         hull->facet = grown;
@@ -38,23 +41,40 @@ void host_hull_free(struct host_hull *hull)
     hull->count = hull->capacity = 0;
 }
 
+/* An edge at its lower vertex. */
+struct edge {
+    uint32_t high;
+    uint32_t facet; /* and which of its edges, times 4 */
+};
+
 struct check {
     struct host_hull *hull;
     const struct host_hull_listener *listener;
-    struct incode_tally tally;
-    const double *xyz;
+    bool scaled;
+    int power[3];  /* by which coordinates are scaled */
+    uint32_t *end; /* [sites + 1] of the edges of a vertex */
+    struct edge *edge;
+    uint8_t *on; /* [sites] 1: a vertex of the hull */
+    uint64_t next;
     bool broken;
+    double inside[3], beyond[3]; /* a ray */
+    uint64_t crossed;
+    bool grazed; /* the ray meets an edge */
 };
 
-static void fault(struct check *c, const uint32_t *v, int n, const char *what)
+static void fault(struct check *c, const uint64_t *tets, int tet_count,
+                  const uint32_t *v, int n, const char *what)
 {
-    c->broken = true;
-    c->listener->fault(c->listener->context, v, n, what);
+    __atomic_store_n(&c->broken, true, __ATOMIC_RELAXED);
+    c->listener->fault(c->listener->context, tets, tet_count, v, n, what);
 }
 
-static const double *at(const struct check *c, uint32_t vertex)
+static void at(const struct check *c, uint32_t vertex, double p[3])
 {
-    return c->xyz + 3 * (size_t)vertex;
+    host_site(c->hull->sites, vertex, p);
+    for (int d = 0; d < 3 && c->scaled; d++) {
+        p[d] = scalbn(p[d], c->power[d]);
+    }
 }
 
 static void outward(const struct check *c, size_t facet, uint32_t v[3])
@@ -64,115 +84,184 @@ static void outward(const struct check *c, size_t facet, uint32_t v[3])
 }
 
 /* +1 where p lies outside the facet's plane. */
-static int side(struct check *c, const uint32_t v[3], const double *p)
+static int side(const struct check *c, const uint32_t v[3], const double *p)
 {
-    return incode_orient3d(&c->tally, at(c, v[0]), at(c, v[1]), at(c, v[2]), p);
+    struct incode_tally tally = {0};
+    double a[3][3];
+    for (int k = 0; k < 3; k++) {
+        at(c, v[k], a[k]);
+    }
+    return incode_orient3d(&tally, a[0], a[1], a[2], p);
+}
+
+static int side_of_vertex(const struct check *c, const uint32_t v[3],
+                          uint32_t vertex)
+{
+    double p[3];
+    at(c, vertex, p);
+    return side(c, v, p);
+}
+
+/* Calls function(c, facet or vertex) for all of them, on all threads. */
+struct all {
+    struct check *c;
+    void (*function)(struct check *c, size_t i);
+    uint64_t count;
+};
+
+static void run_some(void *context, unsigned part)
+{
+    (void)part;
+    const struct all *all = context;
+    uint64_t i;
+    while ((i = __atomic_fetch_add(&all->c->next, TURN, __ATOMIC_RELAXED)) <
+           all->count) {
+        for (uint64_t k = i; k < all->count && k < i + TURN; k++) {
+            all->function(all->c, (size_t)k);
+        }
+    }
+}
+
+static void for_all(struct check *c, uint64_t count,
+                    void (*function)(struct check *c, size_t i))
+{
+    struct all all = {c, function, count};
+    c->next = 0;
+    host_fork_all(count > TURN ? host_threads() : 1, run_some, &all);
 }
 
 /* --- Edges ------------------------------------------------------------ */
 
-struct edge {
-    uint32_t low, high;
-    uint32_t facet; /* and which of its edges, times 4; 2^30 facets at most */
-};
-
-static int compare_edges(const void *p, const void *q)
-{
-    const struct edge *a = p, *b = q;
-    if (a->low != b->low) {
-        return a->low < b->low ? -1 : 1;
-    }
-    return a->high < b->high ? -1 : a->high > b->high;
-}
-
 /* No dent: the other facet's third vertex is not above this one.  Where it is
  * level, both must face the same way, or the surface folds back. */
-static bool is_dent(struct check *c, const struct edge *a, const struct edge *b)
+static bool is_dent(const struct check *c, const struct edge *a,
+                    const struct edge *b)
 {
     uint32_t f[3], g[3];
     outward(c, a->facet / 4, f);
     outward(c, b->facet / 4, g);
-    uint32_t far = g[(b->facet % 4 + 2) % 3];
-    int s = side(c, f, at(c, far));
+    int s = side_of_vertex(c, f, g[(b->facet % 4 + 2) % 3]);
     if (s != 0) {
         return s > 0;
     }
     const struct host_hull_facet *facet = &c->hull->facet[a->facet / 4];
-    uint32_t apex = c->hull->tets->v[facet->tet][facet->corner];
-    return side(c, g, at(c, apex)) >= 0;
+    return side_of_vertex(c, g, c->hull->tets->v[facet->tet][facet->corner]) >=
+           0;
 }
 
-static void check_edges(struct check *c, const struct edge *edge, size_t n)
+static void check_edge(struct check *c, uint32_t low, const struct edge *edge,
+                       size_t n)
 {
-    for (size_t i = 0; i < n;) {
-        size_t j = i + 1;
-        while (j < n && compare_edges(&edge[i], &edge[j]) == 0) {
-            j++;
-        }
-        uint32_t v[2] = {edge[i].low, edge[i].high};
-        if (j - i != 2) {
-            fault(c, v, 2, "is an edge of other than two hull facets");
-            i = j;
-            continue;
-        }
-        uint32_t f[3], g[3];
-        outward(c, edge[i].facet / 4, f);
-        outward(c, edge[i + 1].facet / 4, g);
-        if (f[edge[i].facet % 4] == g[edge[i + 1].facet % 4]) {
-            fault(c, v, 2, "has hull facets of opposite orientation");
-        } else if (is_dent(c, &edge[i], &edge[i + 1])) {
-            fault(c, v, 2, "is a dent of the hull");
-        }
-        i = j;
+    uint32_t v[2] = {low, edge->high}, f[3], g[3];
+    uint64_t tets[2] = {c->hull->facet[edge[0].facet / 4].tet,
+                        c->hull->facet[edge[n > 1].facet / 4].tet};
+    if (n != 2) {
+        fault(c, tets, n > 1 ? 2 : 1, v, 2,
+              "is an edge of other than two hull facets");
+        return;
+    }
+    outward(c, edge[0].facet / 4, f);
+    outward(c, edge[1].facet / 4, g);
+    if (f[edge[0].facet % 4] == g[edge[1].facet % 4]) {
+        fault(c, tets, 2, v, 2, "has hull facets of opposite orientation");
+    } else if (is_dent(c, &edge[0], &edge[1])) {
+        fault(c, tets, 2, v, 2, "is a dent of the hull");
     }
 }
 
-static int compare_words(const void *p, const void *q)
+static int compare_edges(const void *p, const void *q)
 {
-    const uint32_t *a = p, *b = q;
-    return *a < *b ? -1 : *a > *b;
+    const struct edge *a = p, *b = q;
+    if (a->high != b->high) {
+        return a->high < b->high ? -1 : 1;
+    }
+    return a->facet < b->facet ? -1 : a->facet > b->facet;
 }
 
-static int count_vertices(struct check *c, struct host_error *error)
+static void sort_edges(struct edge *edge, size_t n)
 {
-    size_t n = 3 * c->hull->count;
-    uint32_t *v = malloc((n + 1) * sizeof *v);
-    if (v == NULL) {
-        return host_fail_memory(error, "the vertices of the hull");
+    enum { FEW_MAX = 64 };
+    if (n > FEW_MAX) {
+        qsort(edge, n, sizeof *edge, compare_edges);
+        return;
     }
-    for (size_t i = 0; i < c->hull->count; i++) {
-        outward(c, i, v + 3 * i);
-    }
-    qsort(v, n, sizeof *v, compare_words);
-    c->hull->vertices = n > 0;
     for (size_t i = 1; i < n; i++) {
-        c->hull->vertices += v[i] != v[i - 1];
+        struct edge e = edge[i];
+        size_t j = i;
+        for (; j > 0 && compare_edges(&e, &edge[j - 1]) < 0; j--) {
+            edge[j] = edge[j - 1];
+        }
+        edge[j] = e;
     }
-    free(v);
-    return 0;
 }
 
-static int walk_edges(struct check *c, struct host_error *error)
+static void check_vertex(struct check *c, size_t v)
 {
-    size_t n = 3 * c->hull->count;
-    struct edge *edge = malloc((n + 1) * sizeof *edge);
-    if (edge == NULL || c->hull->count >= (size_t)1 << 30) {
-        free(edge);
-        return host_fail_memory(error, "the edges of the hull");
+    struct edge *edge = c->edge + c->end[v];
+    size_t n = c->end[v + 1] - c->end[v];
+    sort_edges(edge, n);
+    for (size_t i = 0, j; i < n; i = j) {
+        for (j = i + 1; j < n && edge[j].high == edge[i].high; j++) {
+        }
+        check_edge(c, (uint32_t)v, edge + i, j - i);
     }
-    for (size_t i = 0; i < c->hull->count; i++) {
-        uint32_t v[3];
-        outward(c, i, v);
-        for (uint32_t k = 0; k < 3; k++) {
-            uint32_t p = v[k], q = v[(k + 1) % 3];
-            edge[3 * i + k] = (struct edge){p < q ? p : q, p < q ? q : p,
-                                            (uint32_t)(4 * i + k)};
+    if (c->on[v] != 0) {
+        (void)__atomic_fetch_add(&c->hull->vertices, 1, __ATOMIC_RELAXED);
+    }
+}
+
+/* Counts, then fills: afterwards end[v] is where the edges of v begin. */
+static void list_edges(struct check *c)
+{
+    uint32_t *next = c->end + 1, sum = 0;
+    for (int fill = 0; fill < 2; fill++) {
+        for (size_t i = 0; i < c->hull->count; i++) {
+            uint32_t v[3];
+            outward(c, i, v);
+            for (uint32_t k = 0; k < 3; k++) {
+                uint32_t p = v[k], q = v[(k + 1) % 3];
+                uint32_t low = p < q ? p : q, high = p < q ? q : p;
+                if (fill != 0) {
+                    c->edge[next[low]] =
+                        (struct edge){high, (uint32_t)(4 * i + k)};
+                }
+                next[low]++;
+                c->on[p] = 1;
+            }
+        }
+        for (uint64_t i = 0; i < c->hull->sites->count && fill == 0; i++) {
+            uint32_t here = next[i];
+            next[i] = sum;
+            sum += here;
         }
     }
-    qsort(edge, n, sizeof *edge, compare_edges);
-    check_edges(c, edge, n);
-    free(edge);
-    return 0;
+}
+
+/* A closed surface of triangles with as many vertices as a sphere's. */
+static void check_euler(struct check *c)
+{
+    if (c->hull->count + 4 != 2 * c->hull->vertices) {
+        fault(c, NULL, 0, NULL, 0, "its Euler characteristic is not 2");
+    }
+}
+
+static int check_edges(struct check *c, struct host_error *error)
+{
+    size_t sites = (size_t)c->hull->sites->count, n = 3 * c->hull->count;
+    c->end = host_map((sites + 1) * sizeof *c->end);
+    c->on = host_map(sites);
+    c->edge = host_map(n * sizeof *c->edge);
+    if (c->end != NULL && c->on != NULL && c->edge != NULL) {
+        list_edges(c);
+        for_all(c, sites, check_vertex);
+        check_euler(c);
+    } else {
+        host_fail_memory(error, "the edges of the hull");
+    }
+    host_unmap(c->end, (sites + 1) * sizeof *c->end);
+    host_unmap(c->on, sites);
+    host_unmap(c->edge, n * sizeof *c->edge);
+    return error->code;
 }
 
 /* --- Wound once ------------------------------------------------------- */
@@ -194,29 +283,39 @@ static void blend(const struct check *c, const uint32_t *v, int n,
         weight[i] = 1 + (double)(z >> 11) * 0x1p-53;
         sum += weight[i];
     }
-    for (int d = 0; d < 3; d++) {
-        p[d] = 0;
-        for (int i = 0; i < n; i++) {
-            p[d] += weight[i] / sum * at(c, v[i])[d];
+    p[0] = p[1] = p[2] = 0;
+    for (int i = 0; i < n; i++) {
+        double q[3];
+        at(c, v[i], q);
+        for (int d = 0; d < 3; d++) {
+            p[d] += weight[i] / sum * q[d];
         }
+    }
+    for (int d = 0; d < 3; d++) {
         /* The weights' rounding may lead beyond the largest double. */
         p[d] = fmax(fmin(p[d], DBL_MAX), -DBL_MAX);
     }
 }
 
 /* A double point strictly inside some tetrahedron. */
-static bool find_inside(struct check *c, double p[3])
+static bool find_inside(struct check *c)
 {
     uint64_t count = c->hull->tets->count;
     uint64_t tries = count < INSIDE_TRIES ? count : INSIDE_TRIES;
     for (uint64_t i = 0; i < tries; i++) {
         const uint32_t *v = c->hull->tets->v[count / tries * i];
-        blend(c, v, 4, i, p);
         bool inside = true;
+        for (int k = 0; k < 4; k++) {
+            inside = inside && v[k] < c->hull->sites->count;
+        }
+        if (!inside) {
+            continue;
+        }
+        blend(c, v, 4, i, c->inside);
         for (uint32_t k = 0; k < 4 && inside; k++) {
             uint32_t f[3];
             host_facet_outward(v, k, f);
-            inside = side(c, f, p) < 0;
+            inside = side(c, f, c->inside) < 0;
         }
         if (inside) {
             return true;
@@ -225,129 +324,134 @@ static bool find_inside(struct check *c, double p[3])
     return false;
 }
 
-/* How many facets the ray from o through r crosses: -1 where it meets an
- * edge.  All facets face away from o. */
-static int64_t crossings(struct check *c, const double *o, const double *r)
+static void facet_fault(struct check *c, size_t facet, const char *what)
 {
-    int64_t count = 0;
-    for (size_t i = 0; i < c->hull->count; i++) {
-        uint32_t v[3];
-        outward(c, i, v);
-        int lowest = 1;
-        for (int k = 0; k < 3 && lowest >= 0; k++) {
-            /* positive: r lies to the left of the edge, seen from o */
-            int s = incode_orient3d(&c->tally, o, at(c, v[k]),
-                                    at(c, v[(k + 1) % 3]), r);
-            lowest = s < lowest ? s : lowest;
-        }
-        if (lowest == 0) {
-            return -1;
-        }
-        count += lowest > 0;
+    uint32_t v[3];
+    outward(c, facet, v);
+    fault(c, &c->hull->facet[facet].tet, 1, v, 3, what);
+}
+
+static void check_facing(struct check *c, size_t facet)
+{
+    uint32_t v[3];
+    outward(c, facet, v);
+    if (side(c, v, c->inside) >= 0) {
+        facet_fault(c, facet, "is a hull facet that faces inward");
     }
-    return count;
+}
+
+/* Whether the ray crosses a facet; all of them face away from its start. */
+static void cross(struct check *c, size_t facet)
+{
+    struct incode_tally tally = {0};
+    uint32_t v[3];
+    double p[3][3];
+    int lowest = 1;
+    outward(c, facet, v);
+    for (int k = 0; k < 3; k++) {
+        at(c, v[k], p[k]);
+    }
+    for (int k = 0; k < 3 && lowest >= 0; k++) {
+        /* positive: the ray passes on the left of the edge */
+        int s =
+            incode_orient3d(&tally, c->inside, p[k], p[(k + 1) % 3], c->beyond);
+        lowest = s < lowest ? s : lowest;
+    }
+    if (lowest == 0) {
+        __atomic_store_n(&c->grazed, true, __ATOMIC_RELAXED);
+    } else if (lowest > 0) {
+        (void)__atomic_fetch_add(&c->crossed, 1, __ATOMIC_RELAXED);
+    }
 }
 
 /* Without a double inside any tetrahedron (an axis that spans more powers of
  * two than doubles have) no ray can be drawn: then no vertex of the hull may
- * lie above any facet, and that the surface is wound once follows from Euler's
- * relation, which host_verify checks. */
-static void check_thin(struct check *c)
+ * lie above any facet.  So each sheet of the surface covers the boundary of one
+ * convex body, and with all its extreme vertices; two sheets would have an
+ * Euler characteristic beyond 2 for the vertices that they share. */
+static void check_thin(struct check *c, size_t facet)
 {
-    for (size_t i = 0; i < c->hull->count; i++) {
-        uint32_t v[3], w[3];
-        outward(c, i, v);
-        for (size_t j = 0; j < c->hull->count; j++) {
-            outward(c, j, w);
-            for (int k = 0; k < 3; k++) {
-                if (side(c, v, at(c, w[k])) > 0) {
-                    fault(c, v, 3, "is a hull facet with a vertex above it");
-                    return;
-                }
+    uint32_t v[3], w[3];
+    outward(c, facet, v);
+    for (size_t j = 0; j < c->hull->count; j++) {
+        outward(c, j, w);
+        for (int k = 0; k < 3; k++) {
+            if (side_of_vertex(c, v, w[k]) > 0) {
+                facet_fault(c, facet, "is a hull facet with a vertex above it");
+                return;
             }
         }
     }
 }
 
-/* The points as large as they may be, axis by axis: exact, and no orientation
- * changes, but a body of denormals gets an inside.  NULL without memory. */
-static double *magnified(const struct check *c)
+static void check_rays(struct check *c)
 {
-    const struct host_points *points = c->hull->points;
-    double *xyz = host_map(points->count * 3 * sizeof *xyz);
-    for (uint64_t d = 0; d < 3 && xyz != NULL; d++) {
-        double largest = 0;
-        for (uint64_t i = 0; i < points->count; i++) {
-            largest = fmax(largest, fabs(points->xyz[3 * i + d]));
-        }
-        int exponent = 0;
-        (void)frexp(largest, &exponent);
-        for (uint64_t i = 0; i < points->count; i++) {
-            xyz[3 * i + d] = scalbn(points->xyz[3 * i + d], 1000 - exponent);
-        }
-        if (exponent > 1000) { /* scaling down might round */
-            for (uint64_t i = 0; i < points->count; i++) {
-                xyz[3 * i + d] = points->xyz[3 * i + d];
+    for (uint64_t i = 0; i < DIRECTIONS; i++) {
+        uint32_t v[3];
+        size_t facet = (size_t)(mix(i + 77) % c->hull->count);
+        outward(c, facet, v);
+        blend(c, v, 3, i, c->beyond);
+        c->crossed = 0;
+        c->grazed = false;
+        for_all(c, c->hull->count, cross);
+        if (!c->grazed) {
+            if (c->crossed > 1) {
+                facet_fault(c, facet, "is a hull facet covered by another");
             }
+            return;
         }
     }
-    return xyz;
+    for_all(c, c->hull->count, check_thin);
+}
+
+/* The points as large as they may be, axis by axis: exact, and no orientation
+ * changes, but a body of denormals gets an inside. */
+static void magnify(struct check *c)
+{
+    const struct host_sites *sites = c->hull->sites;
+    double most[3] = {0}, p[3];
+    for (uint64_t i = 0; i < sites->count; i++) {
+        host_site(sites, (uint32_t)i, p);
+        for (int d = 0; d < 3; d++) {
+            most[d] = fmax(most[d], fabs(p[d]));
+        }
+    }
+    for (int d = 0; d < 3; d++) {
+        int exponent = 0;
+        (void)frexp(most[d], &exponent);
+        /* scaling down might round */
+        c->power[d] = exponent > 1000 ? 0 : 1000 - exponent;
+    }
+    c->scaled = true;
 }
 
 static void check_winding(struct check *c)
 {
-    double o[3], r[3];
-    if (!find_inside(c, o)) {
-        check_thin(c);
+    bool inside = find_inside(c);
+    if (!inside) {
+        magnify(c);
+        inside = find_inside(c);
+    }
+    if (!inside) {
+        for_all(c, c->hull->count, check_thin);
         return;
     }
-    for (size_t i = 0; i < c->hull->count; i++) {
-        uint32_t v[3];
-        outward(c, i, v);
-        if (side(c, v, o) >= 0) {
-            fault(c, v, 3, "is a hull facet that faces inward");
-            return;
-        }
+    for_all(c, c->hull->count, check_facing);
+    if (!c->broken) {
+        check_rays(c);
     }
-    for (uint64_t i = 0; i < DIRECTIONS && c->hull->count > 0; i++) {
-        uint32_t v[3];
-        size_t facet = (size_t)(mix(i + 77) % c->hull->count);
-        outward(c, facet, v);
-        blend(c, v, 3, i, r);
-        int64_t count = crossings(c, o, r);
-        if (count > 1) {
-            fault(c, v, 3, "is a hull facet covered by another");
-        }
-        if (count >= 0) {
-            return;
-        }
-    }
-    check_thin(c);
 }
 
 int host_hull_check(struct host_hull *hull,
                     const struct host_hull_listener *listener,
                     struct host_error *error)
 {
-    struct check c = {
-        .hull = hull, .listener = listener, .xyz = hull->points->xyz};
+    struct check c = {.hull = hull, .listener = listener};
+    hull->vertices = 0;
     if (hull->count == 0) {
-        fault(&c, NULL, 0, "there is no hull");
-        return 0;
+        fault(&c, NULL, 0, NULL, 0, "there is no hull");
+    } else if (check_edges(&c, error) == 0 && !c.broken) {
+        check_winding(&c);
     }
-    if (walk_edges(&c, error) != 0 || count_vertices(&c, error) != 0 ||
-        c.broken) {
-        return error->code;
-    }
-    double inside[3], *large = NULL;
-    if (!find_inside(&c, inside)) {
-        large = magnified(&c);
-        if (large == NULL) {
-            return host_fail_memory(error, "the points");
-        }
-        c.xyz = large;
-    }
-    check_winding(&c);
-    host_unmap(large, hull->points->count * 3 * sizeof *large);
     return error->code;
 }

@@ -32,6 +32,7 @@ enum {
     KEY_JOBS_PER_WORKER,
     KEY_STATS,
     KEY_VERIFY,
+    KEY_NO_VERIFY,
     KEY_NO_PROGRESS,
     KEY_TABLE,
     KEY_MAP,

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -14,7 +15,6 @@
 #include "host/formats/claims.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
-#include "host/mesh/facets.h"
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
 #include "memory_needed.h"
@@ -112,6 +112,16 @@ static uint64_t at_least(uint64_t count, uint64_t least)
     return count > least ? count : least;
 }
 
+/* Nobody has to guess it: page_check.h. */
+static uint64_t draw_key(void)
+{
+    uint64_t key;
+    if (getrandom(&key, sizeof key, 0) != (ssize_t)sizeof key) {
+        key = host_now_us();
+    }
+    return key;
+}
+
 /* The part on the nodes: ordered points in, rows of input rows out. */
 static int run_service(const struct host_run_options *options,
                        const struct host_order *order,
@@ -125,6 +135,7 @@ static int run_service(const struct host_run_options *options,
     service->setup.setup.face_rule = (uint8_t)options->face_rule;
     service->setup.setup.build = (uint8_t)result->build;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
+    service->setup.page_key = draw_key();
     int status = host_service_run(service, error);
     host_run_sum(service, result);
     /* A tetrahedron builder that was lost has taken its counts with it. */
@@ -177,6 +188,24 @@ static int order_points(const struct host_run_options *options,
     return status;
 }
 
+/* What the check has found, and its time, which is not the triangulation's. */
+static void take_check(const struct host_service *service,
+                       struct host_run_result *result, int status)
+{
+    const struct host_audit *audit = &service->audit;
+    double spent = 1e-6 * (double)audit->spent_us;
+    result->check = audit->report;
+    result->hull_facets = audit->report.hull_facets;
+    result->excluded = service->excluded;
+    result->verified = status == 0 && audit->exact;
+    result->time_verify_s += spent;
+    result->time_triangulation_s -= spent;
+    if (status == HOST_UNVERIFIED) {
+        host_progress_erase();
+        fputs(audit->report.text, stderr);
+    }
+}
+
 /* On nodes that are there, which it ends. */
 static int on_nodes(const struct host_run_options *options,
                     struct host_machine *machine,
@@ -201,6 +230,8 @@ static int on_nodes(const struct host_run_options *options,
     service.memory = options->quiet ? 0 : result->memory;
     service.memory_of = options->cube;
     service.patience_us = options->patience_s * UINT64_C(1000000);
+    service.verifying = options->verifying;
+    service.foreign = options->cube != NULL;
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);
     struct stretch stretch = begin_stretch();
@@ -209,17 +240,13 @@ static int on_nodes(const struct host_run_options *options,
         status = run_service(options, order, &service, tets, result, error);
     }
     end_stretch(&stretch, result);
+    take_check(&service, result, status);
     result->tetrahedra = tets->count;
     if (status == 0) {
         status = host_service_wires(&service, error);
         result->missing_wires = service.missing_wires;
     }
     host_service_end(&service);
-    if (status == 0 && options->stats != NULL) {
-        status = host_hull_facets(tets,
-                                  (uint64_t)order->bricks * INCODE_BRICK_POINTS,
-                                  &result->hull_facets, error);
-    }
     if (status == 0) {
         stretch = begin_stretch();
         host_tetrahedra_map(tets, order->row);
@@ -388,22 +415,6 @@ static int check_outputs(const struct host_run_options *options,
     return 0;
 }
 
-static int verify(const struct host_points *points,
-                  struct host_tetrahedra *tets, struct host_run_result *result,
-                  struct host_error *error)
-{
-    uint64_t start = host_now_us();
-    host_progress_phase("checking", NULL);
-    int status = host_verify(points, tets, &result->check, error);
-    result->time_verify_s = seconds_since(start);
-    result->verified = status == 0;
-    if (status == HOST_UNVERIFIED) {
-        host_progress_erase();
-        fputs(result->check.text, stderr);
-    }
-    return status;
-}
-
 /* The digest, on a thread of its own, while others read the tetrahedra. */
 struct digest {
     const struct host_tetrahedra *tets;
@@ -419,16 +430,12 @@ static void make_digest(void *argument)
     d->cpu_s += used_seconds(CLOCK_THREAD_CPUTIME_ID);
 }
 
-/* What is done with tetrahedra in their order. */
-static int check_and_write(const struct host_run_options *options,
-                           const struct host_points *points,
-                           struct host_tetrahedra *tets,
-                           struct host_run_result *result,
-                           struct host_error *error)
+static int write_outputs(const struct host_run_options *options,
+                         const struct host_points *points,
+                         const struct host_tetrahedra *tets,
+                         struct host_run_result *result,
+                         struct host_error *error)
 {
-    if (options->verify && verify(points, tets, result, error) != 0) {
-        return error->code;
-    }
     uint64_t start = host_now_us();
     for (unsigned i = 0; i < options->outputs; i++) {
         if (host_write(options->output[i], points, tets, error) != 0) {
@@ -439,7 +446,7 @@ static int check_and_write(const struct host_run_options *options,
     return 0;
 }
 
-/* Order, check, digest and files, once the tetrahedra are here. */
+/* Order, digest and files, once the tetrahedra are here. */
 static int finish(const struct host_run_options *options,
                   const struct host_points *points,
                   struct host_tetrahedra *tets, struct host_run_result *result,
@@ -453,10 +460,7 @@ static int finish(const struct host_run_options *options,
     result->host_cpu_s += used_seconds(CLOCK_PROCESS_CPUTIME_ID);
     host_fork_start(&fork, make_digest, &digest);
     result->time_write_s = seconds_since(start);
-    if (options->verify) {
-        host_fork_join(&fork); /* it may order them once more */
-    }
-    check_and_write(options, points, tets, result, error);
+    write_outputs(options, points, tets, result, error);
     start = host_now_us();
     host_fork_join(&fork);
     result->host_cpu_s += digest.cpu_s;

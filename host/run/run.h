@@ -14,7 +14,7 @@
 
 #include <sys/types.h>
 
-#include "host/check/verify.h"
+#include "host/check/check.h"
 #include "host/machines/boards.h"
 #include "host/machines/throttle.h"
 #include "host/mesh/points.h"
@@ -49,7 +49,8 @@ struct host_run_options {
     uint64_t patience_s; /* for a node that does not answer */
     const char *cube;    /* a file that describes real nodes, or NULL */
     const char *stats;   /* a file for the statistics, or NULL */
-    bool verify, quiet, progress, table, map;
+    enum host_verifying verifying;
+    bool quiet, progress, table, map;
     /* For tests. */
     unsigned window;
     uint64_t shuffle_seed;
@@ -90,6 +91,7 @@ struct host_run_result {
     unsigned lost;                  /* nodes that the run had to do without */
     unsigned restarts, generations; /* of nodes; of the cube's wiring */
     unsigned missing_wires;         /* that were named */
+    unsigned excluded;              /* nodes, as their work was wrong */
     uint64_t candidates, candidates_histogram[24];
     uint64_t vertices, vertices_waited;
     uint64_t stars_lent, stars_borrowed,
@@ -98,8 +100,8 @@ struct host_run_result {
     struct host_node_report node[HOST_NODES_MAX];
     bool limited;            /* the kernel held the nodes to their memory */
     const char *memory_held; /* see boards.h; NULL: nothing to say */
-    bool verified;
-    struct host_verify_report check;
+    bool verified;           /* exactly */
+    struct host_check_report check;
 };
 
 void host_run_defaults(struct host_run_options *options);

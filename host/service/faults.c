@@ -1,6 +1,9 @@
 #include "faults.h"
 
+#include <stdio.h>
 #include <string.h>
+
+#include "notices.h"
 
 void host_faults_begin(struct host_service *service)
 {
@@ -89,6 +92,30 @@ static bool all_vouch(const struct host_service *s)
     return true;
 }
 
+/* What nodes send each other may be at fault, where they do; a node that works
+ * alone is at fault itself.  The run goes on as long as another node is left.
+ */
+static int believe(struct host_service *s, struct host_error *error)
+{
+    char why[NODE_FAULT_TEXT_MAX + 40];
+    unsigned node = s->fault.node;
+    s->fault.told = false;
+    if (!s->ledger.alone) {
+        host_notice(s, node,
+                    "reports: %s; what is left is done by each node alone",
+                    s->fault.text);
+        host_audit_alone(s);
+        s->loss = true;
+        return 0;
+    }
+    if (!host_audit_is_other(s, node)) {
+        return fail(s, error);
+    }
+    snprintf(why, sizeof why, "reports: %s", s->fault.text);
+    host_audit_exclude(s, node, why);
+    return 0;
+}
+
 int host_faults_answered(struct host_service *service, unsigned node,
                          uint32_t count, struct host_error *error)
 {
@@ -96,5 +123,6 @@ int host_faults_answered(struct host_service *service, unsigned node,
     if (n->vouches == HOST_ASKED && (int32_t)(count - n->asked) >= 0) {
         n->vouches = HOST_VOUCHES;
     }
-    return service->fault.told && all_vouch(service) ? fail(service, error) : 0;
+    return service->fault.told && all_vouch(service) ? believe(service, error)
+                                                     : 0;
 }

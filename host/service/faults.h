@@ -6,6 +6,9 @@
  * the fault had come, and none has told of a loss: a loss begins a new
  * generation, in which all begin anew.  What no loss explains counts at once.
  *
+ * What counts ends the work of that node, not the run, as long as another node
+ * is left: first all go on alone, then the node is excluded (audit.h).
+ *
  * Memory: none of its own.  Work: one pass over the nodes a fault.
  *
  *     if (message.type == NODE_FAULT)

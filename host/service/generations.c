@@ -80,7 +80,9 @@ int host_generation_begin(struct host_service *service, uint64_t now_us,
     if (check_outdone(s, error) != 0 || check_renewed(s, error) != 0) {
         return error->code;
     }
+    s->late = false;
     if (s->started) {
+        s->audit.lost_work = true;
         s->strategy->lose(&s->work);
         host_spill_clear(&s->spill);
         host_sending_begin(s);
@@ -112,7 +114,10 @@ int host_generation_renew(struct host_service *service, uint64_t now_us,
     unsigned dimension = s->machine->dimension;
     s->loss = false;
     if (s->started && s->ledger.committed == s->ledger.bricks) {
-        s->over = true; /* nothing is lost that is needed */
+        /* Nothing is lost that is needed, if the result is right. */
+        s->audit.lost_work = true;
+        s->late = true;
+        s->over = s->reporting;
         return 0;
     }
     if (check_progress(s, error) != 0) {

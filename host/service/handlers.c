@@ -240,6 +240,50 @@ static int take_ready(struct host_service *s,
     return 0;
 }
 
+/* A page that `sender` gave to the reporter is not as it was made here.  The
+ * sender does no more work; where that is the host itself, the page was altered
+ * on its way to the reporter, or by it: then the reporter does none. */
+static int host_excluded_page(struct host_service *s, unsigned reporter,
+                              unsigned sender, uint32_t page,
+                              struct host_error *error)
+{
+    char why[120];
+    bool by_node = sender != CUBE_HOST;
+    unsigned node = by_node ? sender : reporter;
+    if (s->work.lost[node] || s->node[node].left) {
+        return 0;
+    }
+    if (page == INCODE_NONE) {
+        snprintf(why, sizeof why, "sent node %u a page cut short", reporter);
+    } else if (by_node) {
+        snprintf(why, sizeof why, "sent node %u a wrong page %u", reporter,
+                 page);
+    } else {
+        snprintf(why, sizeof why,
+                 "got page %u altered from the host, by itself or on the way",
+                 page);
+    }
+    return host_results_refuse(s, node, why, error);
+}
+
+static int take_wrong_page(struct host_service *s,
+                           const struct cube_message *message,
+                           struct host_error *error)
+{
+    struct node_wrong_page_message wrong;
+    if (message->size != sizeof wrong) {
+        return wrong_size(message, "report of a wrong page", sizeof wrong,
+                          error);
+    }
+    memcpy(&wrong, message->data, sizeof wrong);
+    if (wrong.sender == message->source ||
+        (wrong.sender != CUBE_HOST && wrong.sender >= s->machine->nodes)) {
+        return unsound(message, error, "a wrong page of node %u", wrong.sender);
+    }
+    return host_excluded_page(s, message->source, wrong.sender, wrong.page,
+                              error);
+}
+
 /* What the strategy's roles have to say.  An error that it has set stays. */
 static int take_other(struct host_service *s,
                       const struct cube_message *message,
@@ -289,6 +333,8 @@ static int take(struct host_service *service,
         return take_finished(service, message, error);
     case NODE_FAULT:
         return host_faults_take(service, message, error);
+    case NODE_WRONG_PAGE:
+        return take_wrong_page(service, message, error);
     case NODE_ANSWER:
         return host_onlooking_take(&service->onlooking, service->machine,
                                    message)

@@ -11,8 +11,9 @@ int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
     ledger->nodes = nodes;
     ledger->piece_max = bricks;
     ledger->open = malloc((size_t)bricks + 1);
+    ledger->by = calloc((size_t)bricks + 1, sizeof *ledger->by);
     ledger->job = calloc(nodes, sizeof *ledger->job);
-    if (ledger->open == NULL || ledger->job == NULL) {
+    if (ledger->open == NULL || ledger->by == NULL || ledger->job == NULL) {
         host_ledger_free(ledger);
         return host_fail_memory(error, "the list of bricks");
     }
@@ -23,7 +24,9 @@ int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
 void host_ledger_free(struct host_ledger *ledger)
 {
     free(ledger->open);
+    free(ledger->by);
     free(ledger->job);
+    free(ledger->found);
     memset(ledger, 0, sizeof *ledger);
 }
 
@@ -71,6 +74,10 @@ uint32_t host_ledger_open(struct host_ledger *ledger, uint32_t node,
     job->first = first;
     job->last = last;
     job->committed = 0;
+    job->rows = 0;
+    job->rows_max = HOST_LEDGER_ROWS_MIN + (uint64_t)(last - first) *
+                                               INCODE_BRICK_POINTS *
+                                               HOST_LEDGER_ROWS_A_POINT;
     return job->epoch;
 }
 
@@ -90,6 +97,8 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
         return -1;
     }
     ledger->open[brick] = 0;
+    ledger->by[brick] =
+        (uint16_t)(node | (ledger->alone ? HOST_LEDGER_ALONE : 0));
     ledger->committed++;
     job->committed++;
     return 0;
@@ -116,24 +125,97 @@ uint32_t host_ledger_owner(const struct host_ledger *ledger,
     return v[incode_owner(ledger->owner_rule, v, p)] / INCODE_BRICK_POINTS;
 }
 
+int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
+                      struct host_error *error)
+{
+    size_t runs = ledger->runs;
+    uint64_t before = runs == 0 ? 0 : ledger->found[runs - 1].end;
+    if (count == 0) {
+        return 0;
+    }
+    if (runs > 0 && ledger->found[runs - 1].node == node) {
+        ledger->found[runs - 1].end = before + count;
+        return 0;
+    }
+    if (runs == ledger->runs_max) {
+        size_t more = runs == 0 ? 64 : 2 * runs;
+        void *moved = realloc(ledger->found, more * sizeof *ledger->found);
+        if (moved == NULL) {
+            return host_fail_memory(error, "the list of who found what");
+        }
+        ledger->found = moved;
+        ledger->runs_max = more;
+    }
+    ledger->found[ledger->runs++] = (struct host_found){before + count, node};
+    return 0;
+}
+
+uint32_t host_ledger_finder(const struct host_ledger *ledger, uint64_t i)
+{
+    size_t low = 0, high = ledger->runs;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (ledger->found[middle].end <= i) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    assert(low < ledger->runs);
+    return ledger->found[low].node;
+}
+
+void host_ledger_reopen(struct host_ledger *ledger, uint32_t brick)
+{
+    assert(brick < ledger->bricks && host_ledger_committed(ledger, brick));
+    ledger->open[brick] = UINT8_MAX;
+    ledger->committed--;
+}
+
+/* Keeps the tetrahedra of committed bricks, in their order, and their finders:
+ * what is kept never has more runs than before. */
+static uint64_t keep_committed(struct host_ledger *ledger,
+                               const struct host_order *order,
+                               struct host_tetrahedra *tets)
+{
+    uint64_t kept = 0, i = 0;
+    size_t runs = 0;
+    for (size_t r = 0; r < ledger->runs; r++) {
+        struct host_found run = ledger->found[r];
+        uint64_t before = kept;
+        for (; i < run.end; i++) {
+            if (host_ledger_committed(
+                    ledger, host_ledger_owner(ledger, order, tets->v[i]))) {
+                memmove(tets->v[kept], tets->v[i], sizeof tets->v[0]);
+                kept++;
+            }
+        }
+        if (kept == before) {
+            continue;
+        }
+        if (runs > 0 && ledger->found[runs - 1].node == run.node) {
+            runs--;
+        }
+        ledger->found[runs++] = (struct host_found){kept, run.node};
+    }
+    assert(i == tets->count);
+    ledger->runs = runs;
+    return kept;
+}
+
 uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
                              const struct host_order *order,
                              struct host_tetrahedra *tets)
 {
-    uint64_t kept = 0, count = tets->count;
+    uint64_t count = tets->count;
     uint32_t left = ledger->bricks - ledger->committed;
-    for (uint64_t i = 0; i < count; i++) {
-        if (host_ledger_committed(
-                ledger, host_ledger_owner(ledger, order, tets->v[i]))) {
-            memmove(tets->v[kept], tets->v[i], sizeof tets->v[0]);
-            kept++;
-        }
+    if (left > 0) {
+        host_tetrahedra_cut(tets, keep_committed(ledger, order, tets));
     }
-    host_tetrahedra_cut(tets, kept);
     for (uint32_t i = 0; i < ledger->nodes; i++) {
         ledger->job[i].epoch = 0;
     }
     ledger->cursor = 0;
     ledger->piece_max = left / pieces + 1;
-    return count - kept;
+    return count - tets->count;
 }

@@ -3,9 +3,14 @@
  * a loss left uncommitted is dropped by host_ledger_abandon, and those bricks
  * are given out again, in ranges.
  *
- * Memory: a byte a brick and 16 bytes a node.  Work: constant a call, but for
- * host_ledger_abandon, one pass over the tetrahedra, and host_ledger_next,
- * which passes over the bricks once between two calls of the former.
+ * The ledger also knows which node committed a brick and which node found a
+ * tetrahedron, so that the check of the result (audit.h) can name the node.
+ *
+ * Memory: 3 bytes a brick, 40 bytes a node and 16 bytes for each change of the
+ * finder between two tetrahedra that follow each other.  Work: constant a call,
+ * but for host_ledger_abandon, one pass over the tetrahedra, and
+ * host_ledger_next, which passes over the bricks once between two calls of the
+ * former.
  *
  *     while (host_ledger_next(&ledger, &order, &first, &last))
  *         epoch = host_ledger_open(&ledger, node, first, last);
@@ -28,8 +33,22 @@ struct host_job {
     uint32_t epoch; /* 0: the node has no job */
     uint32_t first, last;
     uint32_t committed; /* bricks of [first, last) */
+    uint64_t rows;      /* tetrahedra that have come for it, and how many may */
+    uint64_t rows_max;  /* before they are looked through: results.h */
 };
-static_assert(sizeof(struct host_job) == 16, "16 bytes a node");
+
+/* Tetrahedra up to `end` (those before it belong to earlier runs) were found by
+ * a node. */
+struct host_found {
+    uint64_t end;
+    uint32_t node;
+};
+
+enum {
+    HOST_LEDGER_ROWS_A_POINT = 16, /* of a job, before they are looked through:
+                                      evenly spread points have 6.8 */
+    HOST_LEDGER_ROWS_MIN = 4096
+};
 
 struct host_ledger {
     uint32_t bricks, nodes;
@@ -39,8 +58,15 @@ struct host_ledger {
     uint32_t cursor;    /* bricks below it are committed or given out */
     uint32_t piece_max; /* bricks of a range, at most */
     uint8_t *open; /* [bricks] all bits set, or none where it is committed */
-    struct host_job *job; /* [nodes] */
+    bool alone;    /* nodes hear nothing of each other: a brick is the
+                      work of the node that commits it */
+    uint16_t *by;  /* [bricks] who has committed it, and ALONE */
+    struct host_job *job;     /* [nodes] */
+    struct host_found *found; /* [runs] */
+    size_t runs, runs_max;
 };
+
+#define HOST_LEDGER_ALONE UINT16_C(0x8000)
 
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error);
@@ -72,6 +98,18 @@ static inline bool host_ledger_committed(const struct host_ledger *ledger,
 {
     return ledger->open[brick] == 0;
 }
+
+/* The next `count` tetrahedra were found by that node; without memory, the
+ * error is set. */
+int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
+                      struct host_error *error);
+
+/* The node that found tetrahedron i. */
+uint32_t host_ledger_finder(const struct host_ledger *ledger, uint64_t i);
+
+/* A committed brick is to be done again: its tetrahedra are dropped by the next
+ * host_ledger_abandon. */
+void host_ledger_reopen(struct host_ledger *ledger, uint32_t brick);
 
 /* Closes the job of a node that has said it is done: 0, or -1 where a brick
  * of it is not committed. */

@@ -31,6 +31,7 @@ struct host_machine {
     uint32_t epoch;        /* of this start of the host, never repeated */
     struct link_pipe pipe; /* the bytes to and from node 0 */
     uint32_t serial_baud;  /* of the slowest serial wire; 0: there is none */
+    bool virtual_time;     /* time stands still while the host works */
     bool slow; /* its nodes may be silent for seconds, and where it starts them
                   need as long as the user has patience, as this machine
                   emulates them */

@@ -1,8 +1,12 @@
 #include "results.h"
 
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
+#include "host/check/judge.h"
 #include "idle_nodes.h"
+#include "notices.h"
 #include "node/result.h"
 
 enum { WHY_BYTES = 120 };
@@ -76,15 +80,111 @@ static void describe(const struct host_service *s, const struct host_job *job,
                  : "which is not of its job");
 }
 
+/* A second time it is given up, not the run: unless it is the last. */
 int host_results_refuse(struct host_service *service, unsigned node,
                         const char *why, struct host_error *error)
 {
-    return host_idle_leave(service, node, why)
-               ? 0
-               : host_fail(error, HOST_CUBE,
-                           "node %u: %s, and had its new start before; are "
-                           "host and node of one version? run make",
-                           node, why);
+    struct host_service *s = service;
+    if (host_idle_leave(s, node, why)) {
+        return 0;
+    }
+    if (!host_audit_is_other(s, node)) {
+        return host_fail(error, HOST_UNVERIFIED,
+                         "node %u: %s, and had its new start before; no other "
+                         "node is left to do its work; are host and node of "
+                         "one version? run make",
+                         node, why);
+    }
+    char again[WHY_BYTES + 20];
+    snprintf(again, sizeof again, "%s, again", why);
+    host_audit_exclude(s, node, again);
+    return 0;
+}
+
+/* --- bounds --------------------------------------------------------------- */
+
+/* How many of the tetrahedra, or faces, are judged where a bound is passed,
+ * spread over all. */
+enum { SAMPLE = 64, SPILLED_A_BRICK = 1024, SPILLED_MIN = 65536 };
+
+static int compare_rows(const void *p, const void *q)
+{
+    return memcmp(p, q, 4 * sizeof(uint32_t));
+}
+
+static void ascend(uint32_t *v, unsigned count)
+{
+    for (unsigned i = 1; i < count; i++) {
+        for (unsigned k = i; k > 0 && v[k] < v[k - 1]; k--) {
+            uint32_t w = v[k];
+            v[k] = v[k - 1];
+            v[k - 1] = w;
+        }
+    }
+}
+
+/* The tetrahedra that the node's job has, in a list of their own; NULL without
+ * memory. */
+static uint32_t (*rows_of_job(const struct host_service *s,
+                              const struct host_job *job, uint64_t *count))[4]
+{
+    uint32_t(*rows)[4] = malloc((size_t)(job->rows + 1) * sizeof *rows);
+    *count = 0;
+    for (uint64_t i = 0; rows != NULL && i < s->tets->count; i++) {
+        uint32_t brick = host_ledger_owner(&s->ledger, s->order, s->tets->v[i]);
+        if (brick >= job->first && brick < job->last && *count < job->rows) {
+            memcpy(rows[(*count)++], s->tets->v[i], sizeof *rows);
+        }
+    }
+    return rows;
+}
+
+/* Why rows cannot all be tetrahedra of the triangulation; NULL: most are. */
+static const char *why_too_many(const struct host_judge *judge,
+                                uint32_t (*rows)[4], uint64_t count)
+{
+    uint64_t step = count / SAMPLE + 1;
+    for (uint64_t i = 0; i < count; i += step) {
+        if (!host_judge_tetrahedron(judge, rows[i])) {
+            return "more results than its points allow, and wrong ones";
+        }
+    }
+    for (uint64_t i = 0; i < count; i++) {
+        ascend(rows[i], 4);
+    }
+    qsort(rows, (size_t)count, sizeof *rows, compare_rows);
+    for (uint64_t i = 1; i < count; i++) {
+        if (memcmp(rows[i], rows[i - 1], sizeof *rows) == 0) {
+            return "more results than its points allow, and some twice";
+        }
+    }
+    return NULL;
+}
+
+/* The bound of a job's results is passed: they are looked through, and where
+ * they are right, as about a hub or on two skew lines, the bound is doubled.
+ * So a node makes the host keep twice what is true, and a constant. */
+static int look_through_rows(struct host_service *s, unsigned node,
+                             struct host_error *error)
+{
+    struct host_job *job = &s->ledger.job[node];
+    const struct host_sites sites = host_sites_of_order(s->order);
+    struct host_judge judge;
+    uint64_t count = 0;
+    if (host_judge_make(&judge, &sites, error) != 0) {
+        return error->code;
+    }
+    uint32_t(*rows)[4] = rows_of_job(s, job, &count);
+    const char *why = rows == NULL ? NULL : why_too_many(&judge, rows, count);
+    if (rows == NULL) {
+        host_fail_memory(error, "a look at a node's results");
+    }
+    free(rows);
+    host_judge_free(&judge);
+    job->rows_max = 2 * job->rows;
+    return error->code != 0 ? error->code
+           : why != NULL    ? host_results_refuse(s, node, why, error)
+                            : 0;
 }
 
 static bool is_spilled(const struct host_service *s, const struct host_job *job,
@@ -98,13 +198,87 @@ static bool is_spilled(const struct host_service *s, const struct host_job *job,
     return is_point(s->order, f[0]) && (mark || face);
 }
 
+/* Whether a face is a facet of the triangulation: of the tetrahedron on one
+ * side of it or the other. */
+static bool is_facet(const struct host_judge *judge, const uint32_t f[3])
+{
+    for (int side = 0; side < 2; side++) {
+        uint32_t t[4] = {f[0], f[side == 0 ? 1 : 2], f[side == 0 ? 2 : 1], 0};
+        t[3] = host_judge_apex(judge, t);
+        if (t[3] != INCODE_NONE && host_judge_tetrahedron(judge, t)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static int compare_faces(const void *p, const void *q)
+{
+    return memcmp(p, q, 3 * sizeof(uint32_t));
+}
+
+/* Why faces cannot all be open ones of the node's front; NULL: most are.  A
+ * face is open once in each direction; it begins with its smallest vertex. */
+static const char *why_spilled(const struct host_judge *judge,
+                               struct incode_face *faces, uint64_t count)
+{
+    uint64_t step = count / SAMPLE + 1;
+    for (uint64_t i = 0; i < count; i += step) {
+        if (!is_facet(judge, faces[i].v)) {
+            return "more spilled faces than its points allow, and wrong ones";
+        }
+    }
+    for (uint64_t i = 0; i < count; i++) {
+        uint32_t *f = faces[i].v;
+        while (f[0] > f[1] || f[0] > f[2]) {
+            uint32_t first = f[0];
+            f[0] = f[1];
+            f[1] = f[2];
+            f[2] = first;
+        }
+    }
+    qsort(faces, (size_t)count, sizeof *faces, compare_faces);
+    for (uint64_t i = 1; i < count; i++) {
+        if (memcmp(&faces[i], &faces[i - 1], sizeof *faces) == 0) {
+            return "more spilled faces than its points allow, and some twice";
+        }
+    }
+    return NULL;
+}
+
+/* As look_through_rows, of the faces that wait here for the node. */
+static int look_through_faces(struct host_service *s, unsigned node,
+                              struct host_error *error)
+{
+    struct host_node *n = &s->node[node];
+    const struct host_sites sites = host_sites_of_order(s->order);
+    struct host_judge judge;
+    uint64_t count = 0;
+    struct incode_face *faces = NULL;
+    if (host_judge_make(&judge, &sites, error) != 0) {
+        return error->code;
+    }
+    if (host_spill_copy(&s->spill, node, &faces, &count, error) == 0) {
+        const char *why = why_spilled(&judge, faces, count);
+        n->spilled_max = 2 * n->spilled;
+        if (why != NULL) {
+            (void)host_results_refuse(s, node, why, error);
+        }
+    }
+    free(faces);
+    host_judge_free(&judge);
+    return error->code;
+}
+
 int host_results_spill(struct host_service *service, unsigned node,
                        const struct incode_face *faces, uint32_t count,
                        struct host_error *error)
 {
+    struct host_node *n = &service->node[node];
+    const struct host_job *job = &service->ledger.job[node];
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t *f = faces[i].v;
-        if (!is_spilled(service, &service->ledger.job[node], f)) {
+        if (!is_spilled(service, job, f)) {
             char why[WHY_BYTES];
             snprintf(why, sizeof why,
                      "spilled vertices %u, %u and %u, which are no face", f[0],
@@ -112,7 +286,17 @@ int host_results_spill(struct host_service *service, unsigned node,
             return host_results_refuse(service, node, why, error);
         }
     }
-    return host_spill_put(&service->spill, node, faces, count, error);
+    uint64_t least =
+        SPILLED_MIN + (uint64_t)SPILLED_A_BRICK * (job->last - job->first);
+    uint64_t before = service->spill.faces;
+    if (host_spill_put(&service->spill, node, faces, count, error) != 0) {
+        return error->code;
+    }
+    n->spilled += service->spill.faces - before;
+    n->spilled_max = n->spilled_max < least ? least : n->spilled_max;
+    return n->spilled <= n->spilled_max
+               ? 0
+               : look_through_faces(service, node, error);
 }
 
 /* Rows go straight to their place; a commit may follow any of them. */
@@ -122,14 +306,20 @@ int host_results_take(struct host_service *service,
 {
     struct host_service *s = service;
     const size_t header = sizeof(struct node_result_header);
-    const struct host_job *job = &s->ledger.job[message->source];
+    struct host_job *job = &s->ledger.job[message->source];
     struct node_result_reader reader;
     enum node_result_event event;
     char why[WHY_BYTES];
+    if (s->ledger.committed == s->ledger.bricks) {
+        return host_results_refuse(s, message->source,
+                                   "results when all bricks were committed",
+                                   error);
+    }
     /* Four bytes are the least that a tetrahedron takes. */
     size_t room = message->size / 4u + 1, count;
     node_result_open(&reader, message->data + header, message->size - header,
-                     s->order->bricks * INCODE_BRICK_POINTS);
+                     s->order->bricks * INCODE_BRICK_POINTS, message->source,
+                     s->machine->nodes);
     do {
         uint32_t(*rows)[4] = host_tetrahedra_room(s->tets, room, error);
         if (rows == NULL) {
@@ -146,7 +336,11 @@ int host_results_take(struct host_service *service,
                 return host_results_refuse(s, message->source, why, error);
             }
         }
+        if (host_ledger_found(&s->ledger, message->source, count, error) != 0) {
+            return error->code;
+        }
         host_tetrahedra_keep(s->tets, count);
+        job->rows += count;
         s->node[message->source].unreported += count;
         if (event == NODE_RESULT_COMMIT &&
             s->strategy->commit(&s->work, message->source, reader.brick) != 0) {
@@ -155,5 +349,7 @@ int host_results_take(struct host_service *service,
             return host_results_refuse(s, message->source, why, error);
         }
     } while (event != NODE_RESULT_END);
-    return 0;
+    return job->rows <= job->rows_max
+               ? 0
+               : look_through_rows(s, message->source, error);
 }

@@ -1,9 +1,11 @@
 #include "sending.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "failure_detector.h"
 #include "idle_nodes.h"
+#include "node/page_check.h"
 #include "paging.h"
 
 static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
@@ -31,24 +33,22 @@ bool host_sending_write_to_all(void *service, uint8_t type, const void *data,
         s->node[i].sent++;
     }
     if (type == NODE_PAGE_TO_ALL) {
-        s->page_bytes_to_all += size - sizeof(uint32_t);
+        s->page_bytes_to_all += size - sizeof(struct node_page_head);
     }
     return true;
 }
 
 static bool send_page(struct host_service *s, uint16_t to)
 {
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } body;
+    struct node_page_message body;
     struct host_node *node = &s->node[to];
     if (cube_room(s->cube, to) == 0) {
         return false;
     }
-    body.page = node->pages[node->pages_first];
-    size_t size = host_page(s->order, body.page, body.data);
-    if (!send_counted(s, to, NODE_PAGE, &body, 4 + size)) {
+    body.head.page = node->pages[node->pages_first];
+    size_t size = host_page(s->order, body.head.page, body.data);
+    if (!send_counted(s, to, NODE_PAGE, &body,
+                      node_page_seal(&body, s->setup.page_key, size))) {
         return false;
     }
     node->pages_first = (node->pages_first + 1) % HOST_PAGES_QUEUED_MAX;
@@ -76,6 +76,8 @@ static bool send_unspill(struct host_service *s, uint16_t to,
                         &body.header.count, error) != 0) {
         return false;
     }
+    assert(node->spilled >= body.header.count);
+    node->spilled -= body.header.count;
     body.header.last = list->faces == 0;
     body.header.sent = node->sent - node->missed;
     if (body.header.last) {
@@ -132,6 +134,7 @@ void host_sending_begin(struct host_service *service)
         node->setup_due = true;
         node->job_due = node->report_due = false;
         node->working = node->reported = false;
+        node->spilled = node->spilled_max = 0;
     }
 }
 

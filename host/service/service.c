@@ -15,6 +15,7 @@
 
 enum {
     IDLE_US_MAX = 20000,
+    AUDIT_US_MAX = 1000, /* the end of the check wakes nobody */
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
     CREDITS_SHARED = 128
@@ -29,8 +30,9 @@ static uint64_t now_of(const struct host_service *s)
 static void wait_for_wire(struct host_service *s, uint64_t now_us)
 {
     uint64_t due = cube_next_due_us(s->cube, now_us);
-    s->machine->idle(s->machine->context,
-                     due > IDLE_US_MAX ? IDLE_US_MAX : due);
+    uint64_t most =
+        s->audit.state == HOST_AUDIT_RUNS ? AUDIT_US_MAX : IDLE_US_MAX;
+    s->machine->idle(s->machine->context, due > most ? most : due);
 }
 
 /* Reads all that has come: bytes first, then messages. */
@@ -160,10 +162,12 @@ static void prepare(struct host_service *s)
     s->setup.credits = CREDITS_MIN + CREDITS_SHARED / s->machine->nodes;
     s->setup.setup.owner_rule = (uint8_t)s->strategy->owner_rule;
     s->ledger.owner_rule = s->strategy->owner_rule;
+    s->ledger.alone = !s->strategy->meshes;
     s->setup.setup.bricks = order->bricks;
     memcpy(s->setup.setup.lo, order->lo, sizeof order->lo);
     memcpy(s->setup.setup.hi, order->hi, sizeof order->hi);
     memcpy(s->setup.setup.cells, order->cells, sizeof order->cells);
+    s->work.page_key = s->setup.page_key;
     s->started = true;
 }
 
@@ -188,6 +192,22 @@ static bool all_reported(const struct host_service *s)
     return true;
 }
 
+/* All bricks are here: checks the result, and asks for the statistics when it
+ * is right. */
+static int conclude(struct host_service *s, struct host_error *error)
+{
+    bool passed;
+    if (host_audit_step(s, &passed, error) != 0) {
+        return error->code;
+    }
+    if (passed && s->late) {
+        s->over = true;
+    } else if (passed) {
+        ask_for_reports(s);
+    }
+    return 0;
+}
+
 int host_service_run(struct host_service *service, struct host_error *error)
 {
     struct host_service *s = service;
@@ -199,18 +219,16 @@ int host_service_run(struct host_service *service, struct host_error *error)
     }
     prepare(s);
     host_sending_begin(s);
-    bool asked = false;
-    while (!s->over && !(asked && all_reported(s))) {
+    while (!s->over && !(s->reporting && all_reported(s))) {
         if (host_service_round(s, error) != 0) {
             return error->code;
         }
         if (!s->dealt && s->ready == s->work.living) {
             host_sending_deal(s);
         }
-        if (!asked && s->ledger.committed == s->ledger.bricks &&
-            s->working == 0) {
-            ask_for_reports(s);
-            asked = true;
+        if (!s->reporting && s->ledger.committed == s->ledger.bricks &&
+            (s->working == 0 || s->late) && conclude(s, error) != 0) {
+            return error->code;
         }
         host_progress_show(s->ledger.committed, s->ledger.bricks,
                            s->tets->count);
@@ -273,6 +291,7 @@ void host_service_end(struct host_service *service)
         }
     }
     s->machine->stop(s->machine->context);
+    host_audit_free(&s->audit);
     host_ledger_free(&s->ledger);
     host_spill_free(&s->spill);
     free(s->node);

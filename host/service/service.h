@@ -5,7 +5,8 @@
  *
  * On any loss (failure_detector.h) it begins a new generation of the cube's
  * wiring: every node drops its job and its role, uncommitted tetrahedra are
- * dropped here, and their bricks are given out again, in ranges.
+ * dropped here, and their bricks are given out again, in ranges.  Before the
+ * run is over, the whole result is checked: audit.h.
  *
  * Memory: the cube's windows, 3 KiB a node, a byte a brick, the spilled faces
  * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
@@ -22,6 +23,7 @@
 
 #include "host/mesh/tetrahedra.h"
 #include "host/order/order.h"
+#include "audit.h"
 #include "host/service/strategies/strategy.h"
 #include "in_use.h"
 #include "ledger.h"
@@ -86,6 +88,9 @@ struct host_node {
      * that no statistics know of yet. */
     struct node_finished_message before;
     uint64_t unreported;
+    /* Faces that it has spilled and not got back, and how many there may be
+     * before they are looked through: results.h. */
+    uint64_t spilled, spilled_max;
 };
 
 /* What remains of a node when the run is over. */
@@ -111,9 +116,11 @@ struct host_service {
     struct host_tetrahedra *tets; /* takes rows of vertex numbers */
     const struct host_strategy *strategy;
     struct host_sharing sharing;
-    struct node_setup_message setup;
-    unsigned window;      /* frames; 0: a large one */
+    struct node_setup_message setup; /* page_key: drawn anew for each run */
+    unsigned window;                 /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
+    enum host_verifying verifying;
+    bool foreign; /* its nodes are not processes that this program started */
     /* Of a node, and the cube file that says so (NULL: an option does), for
      * what paging.h tells; 0: it tells nothing. */
     uint64_t memory;
@@ -127,6 +134,7 @@ struct host_service {
     unsigned restarts;                   /* of nodes, by the machine */
     unsigned generations;                /* of the cube's wiring; 1: no loss */
     unsigned missing_wires;              /* that were named: missing_links.h */
+    unsigned excluded;                   /* nodes, as their work was wrong */
     /* Private. */
     struct cube *cube;
     void *cube_memory;
@@ -137,9 +145,11 @@ struct host_service {
     bool started, finished;
     uint64_t pages_sent;
     bool paging_told;
-    bool reporting;      /* statistics are asked for: nothing else is left */
-    bool dealt;          /* the first jobs of this generation are out */
-    bool over;           /* all is here that is needed */
+    bool reporting; /* statistics are asked for: nothing else is left */
+    bool dealt;     /* the first jobs of this generation are out */
+    bool over;      /* all is here that is needed */
+    bool late;      /* a loss came after the last commit */
+    struct host_audit audit;
     uint32_t generation; /* of the wiring that is followed */
     bool loss;           /* a new generation is due */
     unsigned blamed;     /* the node of the last loss, as far as is known */

@@ -180,21 +180,26 @@ static int grow_table(struct host_spill *s, struct host_error *error)
     return 0;
 }
 
+static uint64_t in_blocks(const struct host_spill_list *list)
+{
+    return list->faces - (uint64_t)__builtin_popcountll(list->marks);
+}
+
 static int append(struct host_spill *s, struct host_spill_list *list,
                   struct incode_face face, struct host_error *error)
 {
     struct host_spill_block tail;
+    bool empty = in_blocks(list) == 0;
     tail.end = 0;
-    if (list->tail != HOST_SPILL_END && list->faces > 0 &&
-        load(s, list->tail, &tail, error) != 0) {
+    if (!empty && load(s, list->tail, &tail, error) != 0) {
         return error->code;
     }
-    if (list->faces == 0 || tail.end == HOST_SPILL_BLOCK_FACES) {
+    if (empty || tail.end == HOST_SPILL_BLOCK_FACES) {
         uint32_t block;
         if (new_block(s, &block, error) != 0) {
             return error->code;
         }
-        if (list->faces == 0) {
+        if (empty) {
             list->head = block;
         } else {
             tail.next = block;
@@ -208,7 +213,23 @@ static int append(struct host_spill *s, struct host_spill_list *list,
     }
     tail.faces[tail.end++] = face;
     list->faces++;
+    s->faces++;
     return store(s, list->tail, &tail, error);
+}
+
+static void mark(struct host_spill *s, struct host_spill_list *list,
+                 uint32_t vertex)
+{
+    uint64_t bit = UINT64_C(1) << (vertex % INCODE_BRICK_POINTS);
+    s->faces += (list->marks & bit) == 0;
+    list->faces += (list->marks & bit) == 0;
+    list->marks |= bit;
+}
+
+static struct host_spill_list empty_list(uint32_t brick)
+{
+    return (struct host_spill_list){
+        .head = HOST_SPILL_END, .tail = HOST_SPILL_END, .brick = brick};
 }
 
 int host_spill_put(struct host_spill *spill, uint32_t node,
@@ -225,14 +246,15 @@ int host_spill_put(struct host_spill *spill, uint32_t node,
             }
             entry = find(spill, node, brick);
             spill->table_used++;
-            *entry = (struct host_spill_entry){
-                node, brick, {HOST_SPILL_END, HOST_SPILL_END, 0}, true};
+            *entry =
+                (struct host_spill_entry){node, brick, empty_list(brick), true};
         }
-        if (append(spill, &entry->list, faces[i], error) != 0) {
+        if (faces[i].v[1] == INCODE_NONE) {
+            mark(spill, &entry->list, faces[i].v[0]);
+        } else if (append(spill, &entry->list, faces[i], error) != 0) {
             return error->code;
         }
     }
-    spill->faces += count;
     spill->faces_total += count;
     if (spill->faces > spill->faces_max) {
         spill->faces_max = spill->faces;
@@ -243,10 +265,9 @@ int host_spill_put(struct host_spill *spill, uint32_t node,
 struct host_spill_list host_spill_detach(struct host_spill *spill,
                                          uint32_t node, uint32_t brick)
 {
-    struct host_spill_list empty = {HOST_SPILL_END, HOST_SPILL_END, 0};
     struct host_spill_entry *entry = find(spill, node, brick);
-    struct host_spill_list list = entry->used ? entry->list : empty;
-    entry->list = empty;
+    struct host_spill_list list = entry->used ? entry->list : empty_list(brick);
+    entry->list = empty_list(brick);
     return list;
 }
 
@@ -255,6 +276,14 @@ int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
                     struct host_error *error)
 {
     *count = 0;
+    for (; list->marks != 0 && *count < max; list->marks &= list->marks - 1) {
+        uint32_t slot = (uint32_t)__builtin_ctzll(list->marks);
+        faces[(*count)++] =
+            (struct incode_face){{list->brick * INCODE_BRICK_POINTS + slot,
+                                  INCODE_NONE, INCODE_NONE}};
+        list->faces--;
+        spill->faces--;
+    }
     while (list->faces > 0 && *count < max) {
         struct host_spill_block block;
         uint32_t at = list->head;
@@ -272,6 +301,49 @@ int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
             spill->free = at;
         }
         if (store(spill, at, &block, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+/* The faces of a list's blocks, behind those that are there. */
+static int copy_list(const struct host_spill *s,
+                     const struct host_spill_list *list,
+                     struct incode_face *faces, uint64_t *count,
+                     struct host_error *error)
+{
+    struct host_spill_block block;
+    uint64_t left = in_blocks(list);
+    for (uint32_t at = list->head; left > 0; at = block.next) {
+        if (load(s, at, &block, error) != 0) {
+            return error->code;
+        }
+        for (unsigned i = block.first; i < block.end; i++, left--) {
+            faces[(*count)++] = block.faces[i];
+        }
+    }
+    return 0;
+}
+
+int host_spill_copy(const struct host_spill *spill, uint32_t node,
+                    struct incode_face **faces, uint64_t *count,
+                    struct host_error *error)
+{
+    uint64_t all = 1;
+    *count = 0;
+    for (uint32_t i = 0; i < spill->table_size; i++) {
+        const struct host_spill_entry *entry = &spill->table[i];
+        all += entry->used && entry->node == node ? in_blocks(&entry->list) : 0;
+    }
+    *faces = malloc((size_t)all * sizeof **faces);
+    if (*faces == NULL) {
+        return host_fail_memory(error, "a look at spilled faces");
+    }
+    for (uint32_t i = 0; i < spill->table_size; i++) {
+        const struct host_spill_entry *entry = &spill->table[i];
+        if (entry->used && entry->node == node &&
+            copy_list(spill, &entry->list, *faces, count, error) != 0) {
             return error->code;
         }
     }

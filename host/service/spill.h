@@ -2,7 +2,10 @@
  * of faces by node and brick, in memory first, then in a temporary file that
  * has no name and is gone when the program is.
  *
- * Memory: blocks of 512 bytes up to blocks_memory, and 24 bytes a list; beyond
+ * Marks of vertices that were reached come many times over and say the same: a
+ * list keeps one a vertex, a bit each.
+ *
+ * Memory: blocks of 512 bytes up to blocks_memory, and 48 bytes a list; beyond
  * it, disk.  Work: constant a block.
  *
  *     if (host_spill_put(&spill, node, faces, count, &error) != 0)
@@ -22,10 +25,12 @@ enum { HOST_SPILL_BLOCK_FACES = 42 };
 
 #define HOST_SPILL_END UINT32_MAX
 
-/* A list taken out of the store: its first block. */
+/* A list taken out of the store: its first block, and the marks. */
 struct host_spill_list {
     uint32_t head, tail;
-    uint64_t faces;
+    uint64_t faces; /* marks included */
+    uint64_t marks; /* bit i: vertex 64 * brick + i was reached */
+    uint32_t brick;
 };
 
 struct host_spill {
@@ -46,7 +51,8 @@ int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
 void host_spill_clear(struct host_spill *spill);
 void host_spill_free(struct host_spill *spill);
 
-/* Appends faces to the lists of their bricks, v[0] / 64. */
+/* Appends faces to the lists of their bricks, v[0] / 64; those whose v[1] and
+ * v[2] are INCODE_NONE are marks. */
 int host_spill_put(struct host_spill *spill, uint32_t node,
                    const struct incode_face *faces, uint32_t count,
                    struct host_error *error);
@@ -54,6 +60,12 @@ int host_spill_put(struct host_spill *spill, uint32_t node,
 /* Takes a list out; what is put later starts a new one.  Empty if none. */
 struct host_spill_list host_spill_detach(struct host_spill *spill,
                                          uint32_t node, uint32_t brick);
+
+/* All faces of a node that are in the store, marks apart, in a new list that
+ * the caller frees. */
+int host_spill_copy(const struct host_spill *spill, uint32_t node,
+                    struct incode_face **faces, uint64_t *count,
+                    struct host_error *error);
 
 /* Moves up to max faces from the list's front, oldest first, to `faces`, sets
  * *count; the list is used up when list->faces is 0. */

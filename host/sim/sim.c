@@ -164,6 +164,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
     s->setup.setup.face_rule = (uint8_t)p->face_rule;
     s->setup.setup.build = (uint8_t)p->build;
     s->setup.setup.shuffle_seed = p->shuffle_seed;
+    s->setup.page_key = sim_seed(p->seed, 90);
     host_sim_faults_prepare(r);
     int status = host_service_start(s, error);
     if (status == 0) {
@@ -186,7 +187,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
 
 static int compare(struct host_sim_run *r, struct host_error *error)
 {
-    static struct host_verify_report report;
+    static struct host_check_report report;
     struct host_tetrahedra right = {0};
     struct host_digest digest = {{0}};
     int status = host_reference(&r->points, &right, error);

@@ -60,7 +60,7 @@ static void machine_told(void *context, const char *line)
 
 struct host_machine host_world_machine(struct host_world *world)
 {
-    struct host_machine machine = {0};
+    struct host_machine machine = {.virtual_time = true};
     machine.context = world;
     unsigned host = world->nodes;
     const struct host_sim_cube_options *o = &world->options.cube;

@@ -130,6 +130,7 @@ static void reserve(struct incode_pager *pager, uint32_t page)
     INCODE_ASSERT(i != INCODE_NO_FRAME);
     struct incode_slot *slot = &pager->slots[i];
     slot->number = pager->frames[i].number = page;
+    pager->frames[i].label = 0;
     pager->used[i] = ++pager->time;
     set_state(pager, i, INCODE_FRAME_LOADING);
     uint16_t *head = head_of(pager, page);
@@ -249,6 +250,12 @@ size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
     memcpy((uint8_t *)data + axis, f->page.brick.y, axis);
     memcpy((uint8_t *)data + 2 * axis, f->page.brick.z, axis);
     return 3 * axis;
+}
+
+uint64_t *incode_pager_label(const struct incode_pager *pager, uint32_t page)
+{
+    uint16_t i = find(pager, page);
+    return i == INCODE_NO_FRAME ? NULL : &pager->frames[i].label;
 }
 
 bool incode_pager_release(struct incode_pager *pager, bool now)

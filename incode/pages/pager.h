@@ -37,6 +37,7 @@ struct incode_frame {
     alignas(64) union incode_page page;
     uint32_t number; /* the page */
     uint8_t count;   /* points of a brick */
+    uint64_t label;  /* its user's, who may send it on with the page */
 };
 
 static_assert(sizeof(struct incode_frame) == 1600,
@@ -132,6 +133,9 @@ static inline bool incode_pager_has_free(const struct incode_pager *pager)
 bool incode_pager_has(const struct incode_pager *pager, uint32_t page);
 size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
                          void *data);
+
+/* The label of a page that has a frame, 0 at first; NULL: it has none. */
+uint64_t *incode_pager_label(const struct incode_pager *pager, uint32_t page);
 
 /* Makes one page that the shuffle keeps back ready, by chance one call in four
  * or, if `now`, at once; false: none was. */

@@ -16,12 +16,6 @@
  * most: fixed.h and pair.h, then exact.h, which counts in_sphere itself. */
 enum { ORIENT3D_UNITS = 10, IN_SPHERE_UNITS = 32, EXACT_ORIENT3D_UNITS = 64 };
 
-/* Static filters of Devillers and Pion: the sign of the rounded determinant is
- * right where it exceeds these times the largest differences, as long as no
- * product leaves the range of doubles. */
-static const double orient3d_bound = 5.1107127829973299e-15;
-static const double in_sphere_bound = 1.2466136531027298e-13;
-
 static double magnitude(double a)
 {
     return __builtin_fabs(a);
@@ -49,8 +43,8 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
                  (bz * cx - bx * cz) * dy;
     double least = mx < my ? mx : my, most = larger(mx, larger(my, mz));
     least = least < mz ? least : mz;
-    if (least > 1e-97 && most < 1e102) {
-        double bound = orient3d_bound * mx * my * mz;
+    if (least > INCODE_ORIENT3D_LEAST && most < INCODE_ORIENT3D_MOST) {
+        double bound = INCODE_ORIENT3D_BOUND * mx * my * mz;
         if (det > bound)
             return 1;
         if (det < -bound)
@@ -138,9 +132,10 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
     double det = aw * bcd - bw * acd + (cw * abd - dw * abc);
     double least = mx < my ? mx : my, most = larger(mx, larger(my, mz));
     least = least < mz ? least : mz;
-    bool in_range = least > 1e-58 && most < 1e61;
+    bool in_range =
+        least > INCODE_IN_SPHERE_LEAST && most < INCODE_IN_SPHERE_MOST;
     if (in_range) {
-        double bound = in_sphere_bound * mx * my * mz * (most * most);
+        double bound = INCODE_IN_SPHERE_BOUND * mx * my * mz * (most * most);
         if (det > bound)
             return 1;
         if (det < -bound)

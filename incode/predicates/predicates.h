@@ -26,6 +26,17 @@ struct incode_tally {
     struct incode_pause pause;
 };
 
+/* Static filters of Devillers and Pion: the sign of the rounded determinant, as
+ * predicates.c computes it, is right where it exceeds BOUND times the largest
+ * differences of each coordinate (in_sphere: and the square of the largest of
+ * these), if the least of these exceeds LEAST and the largest is below MOST. */
+#define INCODE_ORIENT3D_BOUND 5.1107127829973299e-15
+#define INCODE_ORIENT3D_LEAST 1e-97
+#define INCODE_ORIENT3D_MOST 1e102
+#define INCODE_IN_SPHERE_BOUND 1.2466136531027298e-13
+#define INCODE_IN_SPHERE_LEAST 1e-58
+#define INCODE_IN_SPHERE_MOST 1e61
+
 /* Sign of the determinant with rows b-a, c-a, d-a: +1, 0 or -1, exact. */
 int incode_orient3d(struct incode_tally *tally, const double a[3],
                     const double b[3], const double c[3], const double d[3]);

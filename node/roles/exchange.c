@@ -116,6 +116,18 @@ static void take_regions(struct exchange *e, const struct cube_message *message)
     node_lending_to_all(&e->lending, regions.to_all);
 }
 
+static void take_to_all(struct exchange *e, const struct cube_message *message)
+{
+    struct node_triangulation *t = &e->triangulation;
+    uint32_t page = node_lending_take_to_all(&e->lending, &t->requests.check,
+                                             t->triangulator, message);
+    if (page != INCODE_NONE &&
+        incode_triangulator_awaits(t->triangulator, page)) {
+        node_requests_again(&t->requests, page, false);
+    }
+    t->bytes_in += message->size;
+}
+
 /* What node 0 asks all nodes for. */
 static void follow(struct exchange *e, uint8_t command)
 {
@@ -163,9 +175,7 @@ static void exchange_message(void *self, const struct cube_message *message,
         node_lending_take(&e->lending, message);
         break;
     case NODE_PAGE_TO_ALL:
-        node_lending_take_to_all(&e->lending, e->triangulation.triangulator,
-                                 message->data, message->size);
-        e->triangulation.bytes_in += message->size;
+        take_to_all(e, message);
         break;
     default:
         if (!node_triangulation_message(&e->triangulation, message, now_us)) {
@@ -177,6 +187,16 @@ static void exchange_message(void *self, const struct cube_message *message,
 
 /* ---- work ---- */
 
+/* What others have found at stars that they borrowed. */
+static bool use_found(struct exchange *e, uint32_t units)
+{
+    struct node_outlet *outlet = &e->triangulation.outlet;
+    node_outlet_found_by(outlet, node_loans_finder(&e->loans));
+    bool used = node_loans_use(&e->loans, e->triangulation.triangulator, units);
+    node_outlet_found_by(outlet, e->self);
+    return used;
+}
+
 /* What came back first, as it may let others go on; what is borrowed last. */
 static bool work_on(void *context, uint32_t units, uint32_t *spent)
 {
@@ -186,7 +206,7 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent)
     if (node_fault_is_set(e->fault)) {
         return false;
     }
-    bool worked = node_loans_use(&e->loans, t, units) ||
+    bool worked = use_found(e, units) ||
                   node_triangulation_step(&e->triangulation, units, spent) ||
                   node_loans_help(&e->loans, t, units);
     *spent = (uint32_t)(incode_triangulator_spent(t) - before);

@@ -53,6 +53,7 @@ bool node_face_manager_start(struct node_face_manager *f, void *memory,
     f->fault = fault;
     f->carrier = *carrier;
     f->faces_per_job = setup->faces_per_job;
+    f->nodes = setup->nodes;
     f->outlet_bytes = boxes;
     node_jobs_init(&f->jobs, setup->setup.bricks, fault);
     node_outlet_init(&f->outlet, memory, bytes, setup, counted, fault);
@@ -126,6 +127,13 @@ static bool take_answers(struct node_face_manager *f)
                        (uint32_t)size);
         return false;
     }
+    if (answers.builder >= f->nodes) {
+        node_fault_set(f->fault, "answers of builder #, of # nodes",
+                       answers.builder, f->nodes);
+        return false;
+    }
+    /* All that the front emits follows from the answers that it has. */
+    node_outlet_found_by(&f->outlet, answers.builder);
     incode_manager_take(&f->manager, &answers);
     return true;
 }

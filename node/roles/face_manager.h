@@ -28,6 +28,7 @@ struct node_face_manager {
     bool drained; /* the front is done, results still leave */
     struct node_outlet outlet;
     uint32_t faces_per_job;
+    uint16_t nodes; /* of the cube */
     size_t outlet_bytes;
     uint64_t bytes_in;
     struct incode_manager manager;

@@ -5,20 +5,19 @@
 #include "incode/pages/sound.h"
 #include "incode/predicates/check.h"
 #include "node/keepers.h"
-
-enum { PAGE_MESSAGE_MAX = sizeof(uint32_t) + INCODE_PAGE_BYTES };
+#include "node/page_check.h"
 
 struct frame {
-    uint32_t page; /* then the page itself: the body of a NODE_PAGE */
-    uint8_t data[INCODE_PAGE_BYTES];
-    uint16_t size; /* of data; 0: nothing here */
-    bool loading;  /* the host has been asked */
-    bool fresh;    /* there, but not yet passed on to who it was got for */
+    struct node_page_message message; /* with the page's number */
+    uint16_t size;                    /* of its data; 0: nothing here */
+    bool loading;                     /* the host has been asked */
+    bool fresh; /* there, but not yet passed on to who it was got for */
 };
 
 struct holder {
     struct node_counted *counted;
     struct node_fault *fault;
+    struct node_page_check check;
     uint32_t holders;
     struct incode_tree tree; /* of the points, */
     double lo[3], hi[3];     /* and their box */
@@ -64,6 +63,7 @@ static bool holder_start(void *self, size_t bytes,
     memset(h, 0, sizeof *h);
     h->counted = counted;
     h->fault = fault;
+    node_page_check_init(&h->check, setup, counted, fault);
     h->holders = setup->holders;
     incode_tree_init(&h->tree, points->bricks,
                      points->cells[0] * points->cells[1] * points->cells[2]);
@@ -108,31 +108,34 @@ static void take_request(struct holder *h, const struct cube_message *message)
     }
 }
 
-static void take_page(struct holder *h, const uint8_t *data, size_t size)
+/* One that came altered is asked for again, as those who want it still wait. */
+static void take_page(struct holder *h, const struct cube_message *message)
 {
-    uint32_t page;
-    if (size <= sizeof page || size > PAGE_MESSAGE_MAX) {
-        node_fault_set(h->fault, "page in # bytes, expected # at most",
-                       (uint32_t)size, PAGE_MESSAGE_MAX);
+    struct node_page page;
+    bool right = node_page_check_take(&h->check, message, &page);
+    if (page.number == INCODE_NONE) {
         return;
     }
-    memcpy(&page, data, sizeof page);
-    struct frame *frame = frame_of(h, page);
-    if (!frame->loading || frame->page != page) {
-        node_fault_set(h->fault, "page # was not requested", page, 0);
-        return;
-    }
-    if (!incode_page_is_sound(&h->tree, h->lo, h->hi, page, data + sizeof page,
-                              size - sizeof page)) {
+    struct frame *frame = frame_of(h, page.number);
+    bool due = page.source == CUBE_HOST && frame->loading &&
+               frame->message.head.page == page.number;
+    if (right && page.source != CUBE_HOST) {
+        node_page_check_report(&h->check, page.source, page.number);
+    } else if (right && !due) {
+        node_fault_set(h->fault, "page # was not requested", page.number, 0);
+    } else if (due && !right) {
+        frame->loading = false;
+    } else if (due && !incode_page_is_sound(&h->tree, h->lo, h->hi, page.number,
+                                            page.bytes, page.size)) {
         node_fault_set(h->fault,
                        "content of page # in # bytes is out of its limits",
-                       page, (uint32_t)(size - sizeof page));
-        return;
+                       page.number, (uint32_t)page.size);
+    } else if (due) {
+        memcpy(&frame->message, message->data, message->size);
+        frame->size = (uint16_t)page.size;
+        frame->loading = false;
+        frame->fresh = true;
     }
-    memcpy(frame->data, data + sizeof page, size - sizeof page);
-    frame->size = (uint16_t)(size - sizeof page);
-    frame->loading = false;
-    frame->fresh = true;
 }
 
 static void holder_message(void *self, const struct cube_message *message,
@@ -144,7 +147,7 @@ static void holder_message(void *self, const struct cube_message *message,
     if (message->type == NODE_PAGE_REQUEST) {
         take_request(h, message);
     } else if (message->type == NODE_PAGE) {
-        take_page(h, message->data, message->size);
+        take_page(h, message);
     } else if (message->type == NODE_JOB) {
         node_fault_set(h->fault, "a job for a node that holds pages", 0, 0);
     } else if (message->type != NODE_CREDIT) { /* it has no results */
@@ -156,7 +159,7 @@ static void holder_message(void *self, const struct cube_message *message,
 
 static bool holds(const struct frame *frame, uint32_t page)
 {
-    return frame->page == page && frame->size > 0;
+    return frame->message.head.page == page && frame->size > 0;
 }
 
 /* To each who waits for a page that is there, as links have room. */
@@ -165,10 +168,10 @@ static unsigned send_pages(struct holder *h)
     unsigned sent = 0;
     for (uint32_t i = 0; i < h->queued;) {
         struct frame *frame = frame_of(h, h->page[i]);
-        size_t size = sizeof frame->page + frame->size;
+        size_t size = sizeof frame->message.head + frame->size;
         if (!holds(frame, h->page[i]) ||
-            node_counted_write(h->counted, h->source[i], NODE_PAGE, frame,
-                               size) != 0) {
+            node_counted_write(h->counted, h->source[i], NODE_PAGE,
+                               &frame->message, size) != 0) {
             i++;
             continue;
         }
@@ -192,7 +195,7 @@ static bool claim(struct holder *h, struct frame *frame, uint32_t page)
         return false;
     }
     h->frames_used += frame->size == 0;
-    frame->page = page;
+    frame->message.head.page = page;
     frame->size = 0;
     frame->loading = true;
     h->misses++;
@@ -224,8 +227,9 @@ static unsigned ask_host(struct holder *h)
 
 static unsigned holder_send(void *self)
 {
-    unsigned sent = send_pages(self);
-    return sent + ask_host(self);
+    struct holder *h = self;
+    unsigned sent = send_pages(h) + ask_host(h);
+    return sent + node_page_check_send(&h->check);
 }
 
 static unsigned holder_work(void *self, struct node_pace *pace)
@@ -255,7 +259,7 @@ static uint32_t holder_awaited(const void *self)
 static uint32_t holder_held(const void *self)
 {
     const struct holder *h = self;
-    return h->queued;
+    return h->queued + h->check.owed;
 }
 
 static void holder_totals(const void *self,

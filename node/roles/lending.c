@@ -129,30 +129,38 @@ void node_lending_take(struct node_lending *lending,
     }
 }
 
-void node_lending_take_to_all(struct node_lending *lending,
-                              struct incode_triangulator *triangulator,
-                              const uint8_t *data, size_t size)
+/* As they come in order, it is known which one was altered. */
+uint32_t node_lending_take_to_all(struct node_lending *lending,
+                                  struct node_page_check *check,
+                                  struct incode_triangulator *triangulator,
+                                  const struct cube_message *message)
 {
-    uint32_t page;
-    if (size < sizeof page) {
-        node_fault_set(lending->fault, "page in # bytes, expected # at least",
-                       (uint32_t)size, sizeof page);
-        return;
+    struct node_lending *l = lending;
+    struct node_page page;
+    bool right = node_page_check_take(check, message, &page);
+    if (right && (page.number < l->to_all || page.number + 1 != l->next)) {
+        node_fault_set(l->fault, "page # to all, expected the one below #",
+                       page.number, l->next);
     }
-    memcpy(&page, data, sizeof page);
-    if (page < lending->to_all || page + 1 != lending->next) {
-        node_fault_set(lending->fault,
-                       "page # to all, expected the one below #", page,
-                       lending->next);
-        return;
+    if (node_fault_is_set(l->fault) || l->next == l->to_all) {
+        return INCODE_NONE;
     }
-    lending->next = page;
-    if (incode_triangulator_put(triangulator, page, data + sizeof page,
-                                size - sizeof page) != 0) {
-        node_fault_set(lending->fault,
+    l->next--;
+    if (!right) {
+        return l->next;
+    }
+    if (incode_triangulator_put(triangulator, page.number, page.bytes,
+                                page.size) != 0) {
+        node_fault_set(l->fault,
                        "content of page # in # bytes is out of its limits",
-                       page, (uint32_t)(size - sizeof page));
+                       page.number, (uint32_t)page.size);
+        return INCODE_NONE;
     }
+    uint64_t *label = incode_triangulator_label(triangulator, page.number);
+    if (label != NULL) {
+        *label = page.tag;
+    }
+    return INCODE_NONE;
 }
 
 /* ---- and how they get it ---- */
@@ -165,16 +173,16 @@ static void take_off(struct node_lending *l, uint32_t i)
 static bool lend(struct node_lending *l, struct incode_triangulator *t,
                  const struct node_lent *lent)
 {
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } body = {.page = lent->page};
+    struct node_page_message body;
     uint16_t to = (uint16_t)lent->node;
     if (cube_room(l->counted->cube, to) == 0) {
         return false;
     }
+    body.head.page = lent->page;
     size_t size =
-        sizeof body.page + incode_triangulator_copy(t, lent->page, body.data);
+        sizeof body.head + incode_triangulator_copy(t, lent->page, body.data);
+    memcpy(body.head.tag, incode_triangulator_label(t, lent->page),
+           sizeof body.head.tag);
     node_counted_put(l->counted, to, NODE_PAGE, &body, size);
     l->bytes_out += size;
     l->sent++;

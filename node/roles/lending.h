@@ -22,6 +22,7 @@
 #include "node/counted.h"
 #include "node/fault.h"
 #include "node/message.h"
+#include "node/page_check.h"
 #include "shares.h"
 
 enum { NODE_LENDING_COMES = CUBE_ALL }; /* in a keeper's place */
@@ -69,10 +70,12 @@ void node_lending_came(struct node_lending *lending, uint32_t page);
 void node_lending_take(struct node_lending *lending,
                        const struct cube_message *message);
 
-/* NODE_PAGE_TO_ALL, for a triangulator. */
-void node_lending_take_to_all(struct node_lending *lending,
-                              struct incode_triangulator *triangulator,
-                              const uint8_t *data, size_t size);
+/* NODE_PAGE_TO_ALL, for a triangulator.  The page, where it came altered, or
+ * INCODE_NONE: the triangulator does not have it, and may wait for it. */
+uint32_t node_lending_take_to_all(struct node_lending *lending,
+                                  struct node_page_check *check,
+                                  struct incode_triangulator *triangulator,
+                                  const struct cube_message *message);
 
 /* Sends what others wait for and the links take; the number of messages. */
 unsigned node_lending_send(struct node_lending *lending,

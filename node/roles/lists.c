@@ -151,7 +151,12 @@ void node_lists_take(struct node_lists *lists,
         l->owed[i]--;
         l->out--;
     }
-    memcpy(node_outbox_open(&l->inbox), message->data, message->size);
+    uint8_t *data = node_outbox_open(&l->inbox);
+    memcpy(data, message->data, message->size);
+    if (l->sends == NODE_LIST) { /* whatever the message says */
+        memcpy(data + offsetof(struct incode_answers, builder),
+               &message->source, sizeof message->source);
+    }
     node_outbox_close(&l->inbox, message->type, message->size);
 }
 

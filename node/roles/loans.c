@@ -233,6 +233,16 @@ static bool judge(struct node_loans *l, const struct incode_triangulator *t,
     return step == INCODE_WORKED || step == INCODE_FINISHED;
 }
 
+uint16_t node_loans_finder(const struct node_loans *loans)
+{
+    for (unsigned i = 0; i < NODE_LOANS_OUT; i++) {
+        if (loans->out[i].state == NODE_LOAN_IS_BACK) {
+            return loans->out[i].to;
+        }
+    }
+    return loans->counted->self;
+}
+
 bool node_loans_use(struct node_loans *loans, struct incode_triangulator *t,
                     uint32_t units)
 {

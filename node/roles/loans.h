@@ -81,6 +81,9 @@ void node_loans_init(struct node_loans *loans, void *memory,
 void node_loans_take(struct node_loans *loans,
                      const struct cube_message *message);
 
+/* Whose loan `use` goes on with: what that emits, this node has found. */
+uint16_t node_loans_finder(const struct node_loans *loans);
+
 /* A step with what came back, or with what is borrowed, of about so many units;
  * false: there is nothing to do. */
 bool node_loans_use(struct node_loans *loans, struct incode_triangulator *t,

@@ -8,9 +8,11 @@
 enum {
     HEADER_BYTES = sizeof(struct node_result_header),
     BATCH_BYTES = CUBE_PAYLOAD_MAX - HEADER_BYTES,
-    /* Tetrahedra that a batch takes however they come, a star each. */
+    /* Tetrahedra that a batch takes however they come: a star and a finder
+     * each. */
     BATCH_TETRAHEDRA =
-        BATCH_BYTES / (NODE_RESULT_STAR_MAX + NODE_RESULT_TETRAHEDRON_MAX),
+        BATCH_BYTES / (NODE_RESULT_FINDER_MAX + NODE_RESULT_STAR_MAX +
+                       NODE_RESULT_TETRAHEDRON_MAX),
     /* Batches kept back for commits, and for stars cut by a batch's end. */
     BATCHES_RESERVED = 2,
     /* Messages on their way out: one for each 64 KiB of memory, within. */
@@ -55,6 +57,7 @@ void node_outlet_init(struct node_outlet *outlet, void *memory, size_t bytes,
     outlet->counted = counted;
     outlet->fault = fault;
     outlet->credit = setup->credits;
+    outlet->finder = counted->self;
     node_outbox_init(&outlet->results, memory, results);
     node_outbox_init(&outlet->spills,
                      (uint8_t *)memory + NODE_OUTBOX_BYTES(results),
@@ -64,6 +67,11 @@ void node_outlet_init(struct node_outlet *outlet, void *memory, size_t bytes,
 void node_outlet_begin(struct node_outlet *outlet, uint32_t epoch)
 {
     outlet->epoch = epoch;
+}
+
+void node_outlet_found_by(struct node_outlet *outlet, uint16_t node)
+{
+    outlet->finder = node;
 }
 
 /* ---- what a front gives ---- */
@@ -82,7 +90,8 @@ static void open_batch(struct node_outlet *o)
     uint8_t *data = node_outbox_open(&o->results);
     struct node_result_header header = {o->epoch, 0};
     memcpy(data, &header, sizeof header);
-    node_result_begin(&o->writer, data + HEADER_BYTES, BATCH_BYTES);
+    node_result_begin(&o->writer, data + HEADER_BYTES, BATCH_BYTES,
+                      o->counted->self);
     o->open = true;
 }
 
@@ -113,7 +122,10 @@ static void outside_emit(void *context, uint32_t vertex,
         if (!o->open) {
             open_batch(o);
         }
-        size_t written = node_result_star(&o->writer, vertex, apexes, count);
+        size_t written = 0;
+        if (node_result_finder(&o->writer, o->finder)) {
+            written = node_result_star(&o->writer, vertex, apexes, count);
+        }
         if (written < count) {
             close_batch(o);
         }

@@ -6,21 +6,28 @@
 #include "incode/predicates/check.h"
 #include "node/keepers.h"
 
-void node_requests_init(struct node_requests *requests, uint32_t holders,
+/* In a wanted page's number: it is to come from the host, whoever keeps it.  No
+ * page has so high a number. */
+#define OF_HOST (UINT32_C(1) << 31)
+
+void node_requests_init(struct node_requests *requests,
+                        const struct node_setup_message *setup,
                         struct node_lending *lending,
                         struct node_counted *counted, struct node_fault *fault)
 {
     memset(requests, 0, sizeof *requests);
     requests->counted = counted;
     requests->fault = fault;
-    requests->holders = holders;
+    requests->holders = setup->holders;
     requests->lending = lending;
+    node_page_check_init(&requests->check, setup, counted, fault);
 }
 
-static uint16_t keeper_of(const struct node_requests *r, uint32_t page)
+static uint16_t keeper_of(const struct node_requests *r, uint32_t wanted)
 {
-    return r->lending != NULL ? node_lending_keeper(r->lending, page)
-                              : node_keeper(page, r->holders);
+    return (wanted & OF_HOST) != 0 ? CUBE_HOST
+           : r->lending != NULL    ? node_lending_keeper(r->lending, wanted)
+                                   : node_keeper(wanted, r->holders);
 }
 
 /* How many pages may be asked of that keeper now. */
@@ -45,7 +52,7 @@ static bool send_batch(struct node_requests *r, uint32_t i)
     most = most < NODE_PAGES_A_REQUEST ? most : NODE_PAGES_A_REQUEST;
     for (; i < r->wanted_count; i++) {
         if (count < most && keeper_of(r, r->wanted[i]) == to) {
-            batch[count++] = r->wanted[i];
+            batch[count++] = r->wanted[i] & ~OF_HOST;
         } else {
             r->wanted[left++] = r->wanted[i];
         }
@@ -77,10 +84,10 @@ static bool outside_request(void *context, uint32_t page)
         node_lending_keeper(r->lending, page) == NODE_LENDING_COMES) {
         return true;
     }
-    if (r->wanted_count == NODE_WANTED_MAX) {
+    if (r->wanted_count >= NODE_WANTED_MAX) {
         send_wanted(r);
     }
-    if (r->wanted_count == NODE_WANTED_MAX ||
+    if (r->wanted_count >= NODE_WANTED_MAX ||
         r->wanted_count + r->in_flight >= NODE_PAGES_IN_FLIGHT_MAX) {
         return false;
     }
@@ -93,49 +100,77 @@ struct incode_page_source node_requests_source(struct node_requests *requests)
     return (struct incode_page_source){requests, outside_request};
 }
 
-bool node_requests_take(struct node_requests *requests, const uint8_t *data,
-                        size_t size, uint32_t *page, const uint8_t **bytes,
-                        size_t *count)
+/* A page that nobody here waits for.  The host sends one twice at most where
+ * another node's was altered twice. */
+static void refuse(struct node_requests *r, const struct node_page *page,
+                   const char *words)
 {
-    if (size < sizeof *page) {
-        node_fault_set(requests->fault, "page in # bytes, expected # at least",
-                       (uint32_t)size, sizeof *page);
-        return false;
+    if (page->source != CUBE_HOST) {
+        node_page_check_report(&r->check, page->source, page->number);
+    } else if (!r->altered) {
+        node_fault_set(r->fault, words, page->number, (uint32_t)page->size);
     }
-    memcpy(page, data, sizeof *page);
-    if (requests->in_flight == 0) {
-        node_fault_set(requests->fault, "page # was not requested", *page, 0);
-        return false;
+}
+
+bool node_requests_take(struct node_requests *requests,
+                        const struct cube_message *message,
+                        struct node_page *page)
+{
+    struct node_requests *r = requests;
+    bool right = node_page_check_take(&r->check, message, page);
+    bool due = page->number != INCODE_NONE && r->in_flight > 0 &&
+               (page->source == CUBE_HOST ||
+                keeper_of(r, page->number & ~OF_HOST) == page->source);
+    if (right && !due) {
+        refuse(r, page, "page # was not requested");
     }
-    requests->in_flight--;
-    if (requests->lending != NULL) {
-        node_lending_came(requests->lending, *page);
-    }
-    *bytes = data + sizeof *page;
-    *count = size - sizeof *page;
-    return true;
+    r->altered = r->altered || !right;
+    page->number = due ? page->number : INCODE_NONE;
+    return right && due;
 }
 
 void node_requests_judge(struct node_requests *requests, int status,
-                         uint32_t page, size_t count)
+                         const struct node_page *page)
 {
-    if (status != 0) {
-        node_fault_set(requests->fault,
-                       status == INCODE_PAGE_UNSOUND
-                           ? "content of page # in # bytes is out of its limits"
-                           : "page # of # bytes was not requested",
-                       page, (uint32_t)count);
+    struct node_requests *r = requests;
+    if (status == INCODE_PAGE_UNASKED) {
+        refuse(r, page, "page # of # bytes was not requested");
+        return;
     }
+    r->in_flight--;
+    if (r->lending != NULL) {
+        node_lending_came(r->lending, page->number);
+    }
+    if (status != 0) {
+        node_fault_set(r->fault,
+                       "content of page # in # bytes is out of its limits",
+                       page->number, (uint32_t)page->size);
+    }
+}
+
+void node_requests_again(struct node_requests *requests, uint32_t page,
+                         bool asked)
+{
+    struct node_requests *r = requests;
+    if (r->wanted_count == NODE_PAGES_IN_FLIGHT_MAX) {
+        node_fault_set(r->fault, "page # came altered, and # wait already",
+                       page, r->wanted_count);
+        return;
+    }
+    INCODE_ASSERT(!asked || r->in_flight > 0);
+    r->in_flight -= asked;
+    r->wanted[r->wanted_count++] = page | OF_HOST;
 }
 
 unsigned node_requests_send(struct node_requests *requests)
 {
     unsigned wanted = requests->wanted_count;
     send_wanted(requests);
-    return wanted - requests->wanted_count;
+    return wanted - requests->wanted_count +
+           node_page_check_send(&requests->check);
 }
 
 uint32_t node_requests_held(const struct node_requests *requests)
 {
-    return requests->wanted_count + requests->in_flight;
+    return requests->wanted_count + requests->in_flight + requests->check.owed;
 }

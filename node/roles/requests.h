@@ -2,9 +2,13 @@
  * keep them: holders, or those of an exchange.  It is the maker's source of
  * pages (incode/pages/pager.h).
  *
- * Memory: the struct.  Work: a pass over the pages that are wanted, a call.
+ * A page that was altered (node/page_check.h) is reported, and asked for again,
+ * of the host.
  *
- *     node_requests_init(&requests, setup.holders, NULL, &counted, &fault);
+ * Memory: the struct, about 1 KB.  Work: a pass over the pages that are wanted,
+ * a call.
+ *
+ *     node_requests_init(&requests, &setup, NULL, &counted, &fault);
  *     struct incode_page_source source = node_requests_source(&requests);
  *     sent = node_requests_send(&requests);   // and so in every step
  */
@@ -16,6 +20,7 @@
 #include "node/counted.h"
 #include "node/fault.h"
 #include "node/message.h"
+#include "node/page_check.h"
 
 enum {
     NODE_WANTED_MAX = NODE_PAGES_A_REQUEST, /* pages not yet asked for */
@@ -27,42 +32,52 @@ struct node_requests {
     struct node_fault *fault;
     uint32_t holders;             /* as in the setup */
     struct node_lending *lending; /* of an exchange, or NULL */
-    uint32_t wanted[NODE_WANTED_MAX];
+    struct node_page_check check;
+    bool altered; /* a page has come so */
+    /* NODE_WANTED_MAX pages at most, and those that came altered. */
+    uint32_t wanted[NODE_PAGES_IN_FLIGHT_MAX];
     uint32_t wanted_count, in_flight;
     uint64_t bytes_out;
 };
 
 /* lending: of an exchange, or NULL. */
-void node_requests_init(struct node_requests *requests, uint32_t holders,
+void node_requests_init(struct node_requests *requests,
+                        const struct node_setup_message *setup,
                         struct node_lending *lending,
                         struct node_counted *counted, struct node_fault *fault);
 
 /* As a maker sees them. */
 struct incode_page_source node_requests_source(struct node_requests *requests);
 
-/* NODE_PAGE: true with its number and its bytes, for whoever wanted it, who
- * tells what he says of it; false: it is not sound, or was not asked for, which
- * is a fault. */
-bool node_requests_take(struct node_requests *requests, const uint8_t *data,
-                        size_t size, uint32_t *page, const uint8_t **bytes,
-                        size_t *count);
+/* NODE_PAGE: true with *page, for whoever wanted it, and then `judge`.  False
+ * with its number: it was altered, and if it is still on its way, it is to be
+ * asked for `again`.  False with INCODE_NONE: it was not asked for, or is not
+ * sound; a fault where it is the host's, and else it is reported. */
+bool node_requests_take(struct node_requests *requests,
+                        const struct cube_message *message,
+                        struct node_page *page);
 
-/* status: 0, or why the page of so many bytes is not taken, as in
- * incode/triangulator.h: a fault. */
+/* status: 0, or why the page is not taken, as in incode/triangulator.h. */
 void node_requests_judge(struct node_requests *requests, int status,
-                         uint32_t page, size_t count);
+                         const struct node_page *page);
 
-/* Whether few pages are wanted: where there is other work, more may join. */
+/* The page is to come from the host; `asked`: it was asked for here before, or
+ * else was to come unasked. */
+void node_requests_again(struct node_requests *requests, uint32_t page,
+                         bool asked);
+
+/* Whether few pages are wanted: where there is other work, more may join.  A
+ * report does not wait. */
 static inline bool node_requests_few(const struct node_requests *requests)
 {
-    return requests->wanted_count < NODE_REQUESTS_FEW;
+    return requests->wanted_count < NODE_REQUESTS_FEW && !requests->check.owed;
 }
 
-/* Sends for wanted pages, one message for each node that has some; the number
- * of pages. */
+/* Sends for wanted pages, one message for each node that has some, and a report
+ * that waits; the number of pages and reports. */
 unsigned node_requests_send(struct node_requests *requests);
 
-/* Pages that are wanted, or on their way. */
+/* Pages that are wanted, or on their way, and a report that waits. */
 uint32_t node_requests_held(const struct node_requests *requests);
 
 #endif

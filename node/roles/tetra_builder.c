@@ -49,27 +49,30 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
     memset(t, 0, sizeof *t);
     t->fault = fault;
     t->carrier = *carrier;
-    node_requests_init(&t->requests, setup->holders, NULL, counted, fault);
+    node_requests_init(&t->requests, setup, NULL, counted, fault);
     const struct incode_page_source source = node_requests_source(&t->requests);
     incode_builder_init(&t->builder, memory, bytes, &setup->setup,
                         setup->jobs_per_worker, &source, &counted->pause);
+    t->builder.number = counted->self;
     return true;
 }
 
 bool node_tetra_builder_message(struct node_tetra_builder *t,
                                 const struct cube_message *message)
 {
-    uint32_t page;
-    const uint8_t *bytes;
-    size_t count;
+    struct incode_maker *maker = &t->builder.maker;
+    struct node_page page;
     if (message->type != NODE_PAGE) {
         return message->type == NODE_CREDIT;
     }
     t->bytes_in += message->size;
-    if (node_requests_take(&t->requests, message->data, message->size, &page,
-                           &bytes, &count)) {
-        int status = incode_maker_page(&t->builder.maker, page, bytes, count);
-        node_requests_judge(&t->requests, status, page, count);
+    if (node_requests_take(&t->requests, message, &page)) {
+        int status =
+            incode_maker_page(maker, page.number, page.bytes, page.size);
+        node_requests_judge(&t->requests, status, &page);
+    } else if (page.number != INCODE_NONE &&
+               incode_pager_loading(&maker->pager, page.number)) {
+        node_requests_again(&t->requests, page.number, true);
     }
     return true;
 }

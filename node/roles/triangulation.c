@@ -38,7 +38,7 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
     t->before = before;
     t->exchanges = peers->share != NULL;
     node_jobs_init(&t->jobs, setup->setup.bricks, fault);
-    node_requests_init(&t->requests, setup->holders, lending, counted, fault);
+    node_requests_init(&t->requests, setup, lending, counted, fault);
     node_outlet_init(&t->outlet, memory + own, bytes, setup, counted, fault);
     const struct incode_outside outside = {
         .pages = node_requests_source(&t->requests),
@@ -68,16 +68,20 @@ static void take_job(struct node_triangulation *t,
     }
 }
 
-static void take_page(struct node_triangulation *t, const uint8_t *data,
-                      size_t size)
+static void take_page(struct node_triangulation *t,
+                      const struct cube_message *message)
 {
-    uint32_t page;
-    const uint8_t *bytes;
-    size_t count;
-    if (node_requests_take(&t->requests, data, size, &page, &bytes, &count)) {
-        int status =
-            incode_triangulator_page(t->triangulator, page, bytes, count);
-        node_requests_judge(&t->requests, status, page, count);
+    struct node_page page;
+    if (node_requests_take(&t->requests, message, &page)) {
+        int status = incode_triangulator_page(t->triangulator, page.number,
+                                              page.bytes, page.size);
+        if (status == 0) {
+            *incode_triangulator_label(t->triangulator, page.number) = page.tag;
+        }
+        node_requests_judge(&t->requests, status, &page);
+    } else if (page.number != INCODE_NONE &&
+               incode_triangulator_awaits(t->triangulator, page.number)) {
+        node_requests_again(&t->requests, page.number, true);
     }
 }
 
@@ -102,7 +106,7 @@ bool node_triangulation_message(struct node_triangulation *t,
         take_job(t, message, now_us);
         return true;
     case NODE_PAGE:
-        take_page(t, message->data, message->size);
+        take_page(t, message);
         break;
     case NODE_UNSPILL:
         take_unspill(t, message->data, message->size);

@@ -5,7 +5,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* The first byte sets how many vertices there are. */
+/* The first byte sets how many vertices there are, and nodes. */
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     if (size == 0) {
@@ -16,10 +16,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct node_result_reader reader;
     enum node_result_event event;
     size_t count, events = 0;
-    node_result_open(&reader, data + 1, size - 1, vertices);
+    uint32_t nodes = 1 + data[0] % 7;
+    node_result_open(&reader, data + 1, size - 1, vertices, 0, nodes);
     do {
         event = node_result_read(&reader, rows, 16, &count);
-        if (++events > size + 1) {
+        if (++events > size + 1 ||
+            (event != NODE_RESULT_GARBAGE && reader.finder >= nodes)) {
             abort();
         }
         for (size_t i = 0; event != NODE_RESULT_GARBAGE && i < 4 * count; i++) {

@@ -3,6 +3,7 @@
  * workers that hear nothing of each other. */
 #include <string.h>
 
+#include "node/page_check.h"
 #include "regions.h"
 #include "strategies.h"
 
@@ -111,13 +112,11 @@ static bool send_regions(struct host_work *work, struct exchange *state)
 /* From the last page down: boxes before what is in them. */
 static bool send_page(struct host_work *work, struct exchange *state)
 {
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } body = {.page = state->next - 1};
-    size_t size = host_page(work->order, body.page, body.data);
+    struct node_page_message body;
+    body.head.page = state->next - 1;
+    size_t size = host_page(work->order, body.head.page, body.data);
     if (!work->write_to_all(work->context, NODE_PAGE_TO_ALL, &body,
-                            sizeof body.page + size)) {
+                            node_page_seal(&body, work->page_key, size))) {
         return false;
     }
     state->next--;

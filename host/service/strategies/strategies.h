@@ -27,6 +27,8 @@
 #define HOST_STRATEGY_DECLARE(name)                                            \
     extern const struct host_strategy host_##name;
 HOST_STRATEGIES(HOST_STRATEGY_DECLARE)
+/* Of none of the rows: what the service goes on with after a wrong result. */
+HOST_STRATEGY_DECLARE(redo)
 
 /* Row i of the table; NULL past the last. */
 const struct host_strategy *host_strategy_row(unsigned i);

@@ -52,8 +52,9 @@ struct host_work {
     const struct host_order *order;
     struct host_ledger *ledger;
     struct host_tetrahedra *tets; /* that have come, of vertex numbers */
-    uint32_t frames; /* pages that each node has room for, from `first` on */
-    void *state;     /* the strategy's own, state_bytes */
+    uint32_t frames;   /* pages that each node has room for, from `first` on */
+    uint64_t page_key; /* of the setup */
+    void *state;       /* the strategy's own, state_bytes */
     /* Sends a counted message, of at most CUBE_PAYLOAD_MAX bytes; false: there
      * is no room now.  For the strategy's `send`. */
     bool (*write)(void *context, unsigned node, uint8_t type, const void *data,

@@ -161,16 +161,16 @@ static void unsound(void **unused)
     (void)unused;
     double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     static const struct incode_answers wrong[] = {
-        {0, 1, {{0, 1, 2, 3}}},
-        {4, 1, {{0, 1, 2, 3}}},
-        {INCODE_LIST_FACES, INCODE_LIST_MAX + 1, {{0, 1, 2, 3}}},
-        {INCODE_LIST_FACES, 1, {{0, 1, 1, 3}}},
-        {INCODE_LIST_FACES, 1, {{0, 1, 2, 2}}},
-        {INCODE_LIST_FACES, 1, {{0, 1, 64, 3}}},
-        {INCODE_LIST_FACES, 1, {{0, 1, 2, 64}}},
-        {INCODE_LIST_FIRST, 1, {{0, 1, 2, INCODE_NONE}}},
-        {INCODE_LIST_COUNT, 1, {{0, 0, 0, 0}}},
-        {INCODE_LIST_COUNT, 1, {{0, 65, 0, 0}}}};
+        {0, 0, 1, {{0, 1, 2, 3}}},
+        {4, 0, 1, {{0, 1, 2, 3}}},
+        {INCODE_LIST_FACES, 0, INCODE_LIST_MAX + 1, {{0, 1, 2, 3}}},
+        {INCODE_LIST_FACES, 0, 1, {{0, 1, 1, 3}}},
+        {INCODE_LIST_FACES, 0, 1, {{0, 1, 2, 2}}},
+        {INCODE_LIST_FACES, 0, 1, {{0, 1, 64, 3}}},
+        {INCODE_LIST_FACES, 0, 1, {{0, 1, 2, 64}}},
+        {INCODE_LIST_FIRST, 0, 1, {{0, 1, 2, INCODE_NONE}}},
+        {INCODE_LIST_COUNT, 0, 1, {{0, 0, 0, 0}}},
+        {INCODE_LIST_COUNT, 0, 1, {{0, 65, 0, 0}}}};
     static const struct incode_list lists[] = {
         {0, 1, {{0, 1, 2}}},
         {INCODE_LIST_FACES, 0, {{0, 1, 2}}},
@@ -197,7 +197,7 @@ static void unsound(void **unused)
     incode_manager_start(&lend.manager, &(struct incode_job){.last = 1});
     incode_manager_take(
         &lend.manager, /* nobody has asked */
-        &(struct incode_answers){INCODE_LIST_COUNT, 1, {{0, 4, 0, 0}}});
+        &(struct incode_answers){INCODE_LIST_COUNT, 0, 1, {{0, 4, 0, 0}}});
     assert_non_null(incode_manager_fault(&lend.manager));
     struct incode_builder *b = &lend.builder[0].builder;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {

@@ -414,7 +414,7 @@ static void rough_at_both_ends(void **unused)
                          .build = (uint8_t)build,
                          .regions = 1,
                          .memory = 4 << 20};
-        struct host_verify_report report;
+        struct host_check_report report;
         solo_run(&s, both.xyz, both.count);
         if (host_verify(&both, &s.tets, &report, &error) != 0)
             fail_msg("%s", report.text);

@@ -15,6 +15,7 @@
 
 #include "host/sim/sim_cube.h"
 #include "node/node.h"
+#include "node/page_check.h"
 #include "node/result.h"
 
 enum {
@@ -26,7 +27,8 @@ enum {
     TALK_FIXED = 1 << 16,
     TALK_STEPS = 30,    /* after a message */
     TALK_MESSAGES = 64, /* a talk */
-    TALK_LONG = 200000  /* steps, for the right result */
+    TALK_LONG = 200000, /* steps, for the right result */
+    TALK_KEY = 0x5eed
 };
 
 struct talk_end {
@@ -192,7 +194,7 @@ static inline void talk_take_result(const struct cube_message *m)
     talk_demand(m->size >= sizeof(struct node_result_header));
     node_result_open(&reader, m->data + sizeof(struct node_result_header),
                      m->size - sizeof(struct node_result_header),
-                     TALK_BRICKS * INCODE_BRICK_POINTS);
+                     TALK_BRICKS * INCODE_BRICK_POINTS, TALK_SELF, 2);
     do {
         event = node_result_read(&reader, rows, 64, &count);
         for (size_t i = 0; i < count; i++) {
@@ -274,6 +276,7 @@ static inline struct node_setup_message talk_setup(uint8_t role)
     setup.holders = role == NODE_HOLDER;
     setup.credits = 1000;
     setup.role = role;
+    setup.page_key = TALK_KEY;
     setup.setup.bricks = TALK_BRICKS;
     setup.setup.index = INCODE_KD;
     talk_box(setup.setup.lo, setup.setup.hi, 0, TALK_POINTS);
@@ -288,6 +291,24 @@ static inline struct node_job_message talk_job(void)
     job.job.last = TALK_BRICKS;
     talk_box(job.job.lo, job.job.hi, 0, TALK_POINTS);
     return job;
+}
+
+/* The tag of a page of so many bytes, as the host makes it. */
+static inline void talk_seal(uint8_t *data, size_t size)
+{
+    struct node_page_message page;
+    memcpy(&page, data, size);
+    (void)node_page_seal(&page, TALK_KEY, size - sizeof page.head);
+    memcpy(data, &page.head, sizeof page.head);
+}
+
+static inline size_t talk_compose_page(uint32_t page, uint8_t *data)
+{
+    const struct node_page_head head = {.page = page};
+    memcpy(data, &head, sizeof head);
+    size_t size = sizeof head + talk_page(page, data + sizeof head);
+    talk_seal(data, size);
+    return size;
 }
 
 /* A message of that type as it may rightly be; its bytes. */
@@ -329,8 +350,7 @@ static inline size_t talk_compose(uint8_t type, uint8_t *data)
         memcpy(data, &job, sizeof job);
         return sizeof job;
     case NODE_PAGE:
-        memcpy(data, &page, sizeof page);
-        return sizeof page + talk_page(page, data + sizeof page);
+        return talk_compose_page(page, data);
     case NODE_UNSPILL:
         memcpy(data, &header, sizeof header);
         memcpy(data + sizeof header, faces, sizeof faces);
@@ -401,8 +421,7 @@ static inline void talk_expect_right(void)
         talk_demand(i < TALK_LONG && !talk.faulted && talk_step());
         while (talk.wanted_count > 0) {
             uint32_t page = talk.wanted[--talk.wanted_count];
-            memcpy(data, &page, sizeof page);
-            size_t size = sizeof page + talk_page(page, data + sizeof page);
+            size_t size = talk_compose_page(page, data);
             talk_demand(talk_say(1, NODE_PAGE, data, size));
         }
     }
@@ -459,6 +478,11 @@ static inline void talk_run(const uint8_t *bytes, size_t size)
         size_t length = talk_compose(type, data);
         if (what >= 0xc0) {
             length = talk_mutate(data, length);
+        }
+        /* What a page says, and not only that it was altered. */
+        if (type == NODE_PAGE && length >= sizeof(struct node_page_head) &&
+            talk_byte() % 2 == 0) {
+            talk_seal(data, length);
         }
         /* The neighbour brings pages and asks for them, and tries the rest. */
         bool by_neighbour = type == NODE_PAGE || type == NODE_PAGE_REQUEST ||

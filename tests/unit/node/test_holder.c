@@ -8,9 +8,10 @@
 
 #include <cmocka.h>
 
+#include "node/page_check.h"
 #include "node/roles/holder.h"
 
-enum { SENT_MAX = 16, ARENA = 8192 };
+enum { SENT_MAX = 16, ARENA = 8192, PAGE_KEY = 0x5eed };
 
 /* --- links, in the place of transport/cube.c ------------------------------ */
 
@@ -20,6 +21,7 @@ struct cube {
         uint16_t dest;
         uint8_t type;
         uint32_t first, second; /* words of the message */
+        uint32_t data;          /* of a page */
     } sent[SENT_MAX];
 };
 
@@ -33,6 +35,9 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
     struct sent *sent = &cube->sent[cube->count];
     *sent = (struct sent){.dest = dest, .type = type};
     memcpy(&sent->first, data, size < 8 ? size : 8);
+    if (type == NODE_PAGE) {
+        memcpy(&sent->data, (const uint8_t *)data + 12, 4);
+    }
     cube->room--;
     cube->count++;
     return 0;
@@ -60,6 +65,7 @@ static void begin(size_t bytes)
     const struct node_setup_message setup = {
         .nodes = 2,
         .holders = 1,
+        .page_key = PAGE_KEY,
         .setup = {.bricks = 50, .index = INCODE_KD, .hi = {1, 1, 1}}};
     memset(&world, 0, sizeof world);
     world.counted.cube = &world.cube;
@@ -82,11 +88,20 @@ static void asks(uint16_t source, uint32_t page)
     say(source, NODE_PAGE_REQUEST, &page, sizeof page);
 }
 
+/* A point, whose first coordinate is about a half. */
+static void page_of(uint16_t source, uint32_t page, bool altered)
+{
+    const uint32_t data[6] = {~page, 0x3fe00000};
+    struct node_page_message body = {.head.page = page};
+    memcpy(body.data, data, sizeof data);
+    size_t size = node_page_seal(&body, PAGE_KEY, sizeof data);
+    body.data[1] ^= altered;
+    say(source, NODE_PAGE, &body, size);
+}
+
 static void page_comes(uint32_t page)
 {
-    /* A point, whose first coordinate is about a half. */
-    uint32_t body[7] = {page, ~page, 0x3fe00000};
-    say(CUBE_HOST, NODE_PAGE, body, sizeof body);
+    page_of(CUBE_HOST, page, false);
 }
 
 /* What leaves where there is room for so many messages: their number. */
@@ -106,7 +121,7 @@ static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t page)
     assert_int_equal(world.cube.sent[i].type, type);
     assert_int_equal(world.cube.sent[i].first, page);
     if (type == NODE_PAGE) {
-        assert_int_equal(world.cube.sent[i].second, ~page);
+        assert_int_equal(world.cube.sent[i].data, ~page);
     }
 }
 
@@ -184,11 +199,38 @@ static void no_room_for_a_request(void **unused)
     assert_int_equal(totals().memory_high_water, high);
 }
 
+/* One that came altered is asked for again, and reported; so is a node that
+ * sends one: only the host has any for a holder. */
+static void wrong_pages(void **unused)
+{
+    (void)unused;
+    begin(ARENA);
+    asks(0, 4);
+    assert_int_equal(sends(8), 1);
+    page_of(CUBE_HOST, 4, true);
+    assert_int_equal(role->held(world.arena), 2);
+    assert_int_equal(sends(8), 2);
+    expect(0, CUBE_HOST, NODE_PAGE_REQUEST, 4);
+    expect(1, CUBE_HOST, NODE_WRONG_PAGE, 4);
+    assert_int_equal(world.cube.sent[1].second, CUBE_HOST);
+    for (unsigned altered = 0; altered < 2; altered++) {
+        page_of(6, 4, altered);
+        assert_int_equal(sends(8), 1);
+        expect(0, CUBE_HOST, NODE_WRONG_PAGE, 4);
+        assert_int_equal(world.cube.sent[0].second, 6);
+    }
+    page_comes(4);
+    assert_int_equal(sends(8), 1);
+    expect(0, 0, NODE_PAGE, 4);
+    assert_int_equal(role->held(world.arena), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_sources),
         cmocka_unit_test(no_room_for_a_request),
+        cmocka_unit_test(wrong_pages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

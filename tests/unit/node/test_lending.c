@@ -10,7 +10,14 @@
 
 #include "node/roles/requests.h"
 
-enum { SENT_MAX = 64, NODES = 4, SELF = 1, BRICKS = 40, PAGES_MAX = 64 };
+enum {
+    SENT_MAX = 64,
+    NODES = 4,
+    SELF = 1,
+    BRICKS = 40,
+    PAGES_MAX = 64,
+    PAGE_KEY = 0x5eed
+};
 
 /* --- links, in the place of transport/cube.c ------------------------------ */
 
@@ -20,7 +27,7 @@ struct cube {
         uint16_t dest;
         uint8_t type;
         uint16_t size;
-        uint32_t word[3]; /* of the message */
+        uint32_t word[4]; /* of the message */
     } sent[SENT_MAX];
 };
 
@@ -33,7 +40,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
     assert_true(cube->count < SENT_MAX);
     struct sent *sent = &cube->sent[cube->count++];
     *sent = (struct sent){.dest = dest, .type = type, .size = (uint16_t)size};
-    memcpy(sent->word, data, size < 12 ? size : 12);
+    memcpy(sent->word, data, size < 16 ? size : 16);
     cube->room--;
     return 0;
 }
@@ -53,6 +60,7 @@ static struct {
     bool full;          /* pages would have to make room */
     uint32_t fetched;   /* that the node has asked for */
     uint32_t put, puts; /* the last that came unasked */
+    uint64_t label[PAGES_MAX];
     bool unsound;
 } had;
 
@@ -80,6 +88,13 @@ bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
         had.fetched++;
     }
     return had.place[page] == LOADING;
+}
+
+uint64_t *incode_triangulator_label(const struct incode_triangulator *t,
+                                    uint32_t page)
+{
+    (void)t;
+    return had.place[page] == ABSENT ? NULL : &had.label[page];
 }
 
 int incode_triangulator_put(struct incode_triangulator *t, uint32_t page,
@@ -110,6 +125,7 @@ static void begin(void)
 {
     const struct node_setup_message setup = {
         .nodes = NODES,
+        .page_key = PAGE_KEY,
         .setup = {.bricks = BRICKS, .index = INCODE_KD, .hi = {1, 1, 1}}};
     struct {
         struct node_regions_message head;
@@ -129,7 +145,7 @@ static void begin(void)
     for (size_t i = node_lending_bytes(NODES); i < sizeof world.memory; i++) {
         assert_int_equal(world.memory[i], 0xa5);
     }
-    node_requests_init(&world.requests, 0, &world.lending, &world.counted,
+    node_requests_init(&world.requests, &setup, &world.lending, &world.counted,
                        &world.fault);
     world.source = node_requests_source(&world.requests);
     assert_true(node_shares_regions(&world.shares, (const uint8_t *)&regions,
@@ -164,6 +180,15 @@ static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t first,
     assert_int_equal(world.cube.sent[i].word[1], second);
 }
 
+/* With the tag that it came with, and its bytes. */
+static void expect_page(unsigned i, uint16_t dest, uint32_t page)
+{
+    expect(i, dest, NODE_PAGE, page, (uint32_t)had.label[page]);
+    assert_int_equal(world.cube.sent[i].word[2],
+                     (uint32_t)(had.label[page] >> 32));
+    assert_int_equal(world.cube.sent[i].word[3], page * UINT32_C(0x01010101));
+}
+
 /* Bricks of who has them, boxes of who has the first brick below: of 40 bricks
  * there are two pages at 40, and the root at 42. */
 static void keepers(void **unused)
@@ -185,17 +210,19 @@ static void lent(void **unused)
     (void)unused;
     begin();
     had.place[12] = had.place[13] = READY;
+    had.label[12] = UINT64_C(0x0c0c0c0c0a0b0c0d);
+    had.label[13] = UINT64_C(0x0d0d0d0d0a0b0c0d);
     asks(3, 12);
     asks(0, 13);
     assert_int_equal(sends(0), 0);
     assert_int_equal(sends(1), 1);
-    expect(0, 3, NODE_PAGE, 12, 0x0c0c0c0c);
+    expect_page(0, 3, 12);
     assert_int_equal(sends(8), 1);
-    expect(0, 0, NODE_PAGE, 13, 0x0d0d0d0d);
-    assert_int_equal(world.cube.sent[0].size, 4 + 24);
+    expect_page(0, 0, 13);
+    assert_int_equal(world.cube.sent[0].size, 12 + 24);
     assert_int_equal(world.lending.queued, 0);
     assert_int_equal(world.lending.sent, 2);
-    assert_int_equal(world.lending.bytes_out, 2 * (4 + 24));
+    assert_int_equal(world.lending.bytes_out, 2 * (12 + 24));
     assert_false(node_fault_is_set(&world.fault));
 }
 
@@ -214,7 +241,7 @@ static void not_there_yet(void **unused)
     assert_int_equal(sends(8), 0);
     had.place[15] = READY;
     assert_int_equal(sends(8), 1);
-    expect(0, 3, NODE_PAGE, 15, 0x0f0f0f0f);
+    expect_page(0, 3, 15);
     had.place[14] = READY;
     assert_int_equal(sends(8), 1);
     assert_int_equal(world.lending.passed, 0);
@@ -270,15 +297,27 @@ static unsigned sends_requests(unsigned room)
     return world.cube.count;
 }
 
-static void comes(uint32_t page)
+/* A page comes of that node, `altered` or as the host made it; whether it is to
+ * be used, and if not, which is to be asked for again. */
+static bool sent_by(uint16_t source, uint32_t page, bool altered,
+                    struct node_page *p)
 {
-    uint32_t body[7] = {page};
-    const uint8_t *bytes;
-    size_t count;
-    uint32_t number;
-    assert_true(node_requests_take(&world.requests, (const uint8_t *)body,
-                                   sizeof body, &number, &bytes, &count));
-    assert_int_equal(number, page);
+    struct node_page_message body = {.head.page = page};
+    size_t size = node_page_seal(&body, PAGE_KEY, 24);
+    body.data[7] ^= altered;
+    const struct cube_message message = {.source = source,
+                                         .type = NODE_PAGE,
+                                         .data = (const uint8_t *)&body,
+                                         .size = (uint16_t)size};
+    return node_requests_take(&world.requests, &message, p);
+}
+
+static void comes(uint16_t source, uint32_t page)
+{
+    struct node_page p;
+    assert_true(sent_by(source, page, false, &p));
+    assert_int_equal(p.number, page);
+    node_requests_judge(&world.requests, 0, &p);
 }
 
 /* A node is asked for so many at a time, and others meanwhile; whoever sends a
@@ -299,30 +338,131 @@ static void asked_for(void **unused)
     expect(2, CUBE_HOST, NODE_PAGE_REQUEST, 11, 0);
     assert_int_equal(node_requests_held(&world.requests), 12);
     assert_int_equal(sends_requests(8), 0);
-    comes(25); /* of another */
+    comes(2, 25); /* of another */
     assert_int_equal(sends_requests(8), 0);
-    comes(3);
+    comes(0, 3);
     assert_int_equal(sends_requests(8), 1);
     expect(0, 0, NODE_PAGE_REQUEST, 8, 0);
     assert_int_equal(world.cube.sent[0].size, 4);
     for (uint32_t page = 0; page < 9; page++) {
         if (page != 3) {
-            comes(page);
+            comes(CUBE_HOST, page); /* that keeper has left them to it */
         }
     }
     assert_int_equal(sends_requests(8), 1);
     expect(0, 0, NODE_PAGE_REQUEST, 9, 0);
-    comes(9);
-    comes(11);
+    comes(0, 9);
+    comes(CUBE_HOST, 11);
     assert_int_equal(node_requests_held(&world.requests), 0);
     assert_false(node_fault_is_set(&world.fault));
 }
 
+static void expect_report(unsigned i, uint16_t sender, uint32_t page)
+{
+    expect(i, CUBE_HOST, NODE_WRONG_PAGE, page, sender);
+    assert_int_equal(world.cube.sent[i].size, 8);
+}
+
+/* A page that its keeper has altered is asked of the host; the keeper is named,
+ * and others go on as they were. */
+static void altered(void **unused)
+{
+    struct node_page p;
+    (void)unused;
+    begin();
+    for (uint32_t page = 0; page < 9; page++) {
+        assert_true(world.source.request(world.source.context, page));
+    }
+    assert_int_equal(sends_requests(8), 1); /* eight of them */
+    assert_false(sent_by(0, 5, true, &p));
+    assert_int_equal(p.number, 5);
+    node_requests_again(&world.requests, p.number, true);
+    assert_false(node_requests_few(&world.requests));
+    assert_int_equal(node_requests_held(&world.requests), 10);
+    assert_int_equal(sends_requests(8), 2);
+    expect(0, CUBE_HOST, NODE_PAGE_REQUEST, 5, 0);
+    assert_int_equal(world.cube.sent[0].size, 4);
+    expect_report(1, 0, 5);
+    /* Its keeper has eight to send yet, as far as is known. */
+    assert_int_equal(sends_requests(8), 0);
+    comes(CUBE_HOST, 5);
+    assert_int_equal(sends_requests(8), 1);
+    expect(0, 0, NODE_PAGE_REQUEST, 8, 0);
+    /* Of the host, too: it is altered on the way. */
+    assert_false(sent_by(CUBE_HOST, 6, true, &p));
+    node_requests_again(&world.requests, p.number, true);
+    assert_int_equal(sends_requests(8), 2);
+    expect(0, CUBE_HOST, NODE_PAGE_REQUEST, 6, 0);
+    expect_report(1, CUBE_HOST, 6);
+    assert_false(node_fault_is_set(&world.fault));
+}
+
+/* A node sends what nobody has asked it for: it is named, nothing is used, and
+ * nothing is asked for again. */
+static void not_its_to_send(void **unused)
+{
+    struct node_page p;
+    (void)unused;
+    begin();
+    assert_false(sent_by(0, 5, false, &p)); /* nothing is asked for */
+    assert_int_equal(p.number, INCODE_NONE);
+    assert_int_equal(sends_requests(8), 1);
+    expect_report(0, 0, 5);
+    assert_true(world.source.request(world.source.context, 5));
+    assert_int_equal(sends_requests(8), 1);
+    for (unsigned i = 0; i < 2; i++) { /* that is for node 0 to send */
+        assert_false(sent_by(3, 5, i == 0, &p));
+        assert_int_equal(p.number, INCODE_NONE);
+        assert_int_equal(sends_requests(8), 1);
+        expect_report(0, 3, 5);
+    }
+    assert_true(sent_by(0, 4, false, &p)); /* as the maker will say */
+    node_requests_judge(&world.requests, INCODE_PAGE_UNASKED, &p);
+    assert_int_equal(sends_requests(8), 1);
+    expect_report(0, 0, 4);
+    comes(0, 5);
+    assert_int_equal(node_requests_held(&world.requests), 0);
+    assert_false(node_fault_is_set(&world.fault));
+}
+
+static uint32_t all_get_altered(uint32_t page, bool altered)
+{
+    struct node_page_message body = {.head.page = page};
+    size_t size = node_page_seal(&body, PAGE_KEY, 24);
+    body.data[7] ^= altered;
+    const struct cube_message message = {.source = CUBE_HOST,
+                                         .type = NODE_PAGE_TO_ALL,
+                                         .data = (const uint8_t *)&body,
+                                         .size = (uint16_t)size};
+    return node_lending_take_to_all(&world.lending, &world.requests.check, NULL,
+                                    &message);
+}
+
 static void all_get(uint32_t page)
 {
-    uint32_t body[7] = {page};
-    node_lending_take_to_all(&world.lending, NULL, (const uint8_t *)body,
-                             sizeof body);
+    assert_int_equal(all_get_altered(page, false), INCODE_NONE);
+}
+
+/* One that comes to all, and came altered, is asked of the host by who waits
+ * for it. */
+static void to_all_altered(void **unused)
+{
+    (void)unused;
+    begin();
+    node_lending_to_all(&world.lending, 41);
+    assert_int_equal(all_get_altered(42, true), 42);
+    assert_int_equal(had.puts, 0);
+    node_requests_again(&world.requests, 42, false);
+    assert_int_equal(sends_requests(8), 2);
+    expect(0, CUBE_HOST, NODE_PAGE_REQUEST, 42, 0);
+    expect_report(1, CUBE_HOST, 42);
+    had.place[41] = LOADING;
+    all_get(41);
+    assert_int_equal(had.puts, 1);
+    assert_int_not_equal(had.label[41], 0);
+    comes(CUBE_HOST, 42);
+    assert_int_equal(all_get_altered(40, true), INCODE_NONE);
+    assert_false(node_fault_is_set(&world.fault));
 }
 
 /* What is to come to all is asked of nobody until it has passed. */
@@ -368,10 +508,11 @@ static void to_all(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(keepers),        cmocka_unit_test(lent),
-        cmocka_unit_test(not_there_yet),  cmocka_unit_test(given_up),
-        cmocka_unit_test(wrong_requests), cmocka_unit_test(asked_for),
-        cmocka_unit_test(to_all),
+        cmocka_unit_test(keepers),         cmocka_unit_test(lent),
+        cmocka_unit_test(not_there_yet),   cmocka_unit_test(given_up),
+        cmocka_unit_test(wrong_requests),  cmocka_unit_test(asked_for),
+        cmocka_unit_test(to_all),          cmocka_unit_test(altered),
+        cmocka_unit_test(not_its_to_send), cmocka_unit_test(to_all_altered),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

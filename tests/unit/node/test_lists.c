@@ -9,6 +9,7 @@
 
 #include <cmocka.h>
 
+#include "node/page_check.h"
 #include "node/roles/builder.h"
 #include "node/roles/manager.h"
 
@@ -161,7 +162,7 @@ static void lists_go_round(void **unused)
 /* Answers come of builders that owe some, once. */
 static void answers_that_are_not_due(void **unused)
 {
-    struct incode_answers answers = {INCODE_LIST_COUNT, 1, {{0, 64, 0, 0}}};
+    struct incode_answers answers = {INCODE_LIST_COUNT, 0, 1, {{0, 64, 0, 0}}};
     size_t size = incode_answers_bytes(1);
     (void)unused;
     begin(NODE_MANAGER);
@@ -281,10 +282,11 @@ static void invalid_setups(void **unused)
 
 static void messages_of_others(void **unused)
 {
-    const uint32_t page[2] = {1};
+    struct node_page_message page = {.head.page = 1};
+    const size_t size = node_page_seal(&page, 0, 24);
     (void)unused;
     begin(NODE_MANAGER);
-    say(CUBE_HOST, NODE_PAGE, page, sizeof page);
+    say(CUBE_HOST, NODE_PAGE, &page, size);
     expect_fault("message of type 3 for a face manager");
     begin(NODE_MANAGER);
     job(71);
@@ -293,10 +295,10 @@ static void messages_of_others(void **unused)
     job(70);
     expect_fault("a job for a node that builds");
     begin(NODE_BUILDER);
-    say(CUBE_HOST, NODE_PAGE, page, sizeof page);
+    say(CUBE_HOST, NODE_PAGE, &page, size);
     expect_fault("page 1 was not requested");
     begin(NODE_BUILDER);
-    say(CUBE_HOST, NODE_UNSPILL, page, sizeof page);
+    say(CUBE_HOST, NODE_UNSPILL, &page, size);
     expect_fault("message of type 5 for a builder");
 }
 

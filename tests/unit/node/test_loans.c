@@ -207,9 +207,12 @@ static void there_and_back(void **unused)
         h->cube.room = 1;
         send_all(h);
         assert_int_equal(last_of(h)->type, NODE_LOAN_FOUND);
+        assert_int_equal(node_loans_finder(&l->loans), LENDER);
         deliver(h, l);
+        assert_int_equal(node_loans_finder(&l->loans), HELPER);
         while (node_loans_use(&l->loans, l->t, 10))
             ;
+        assert_int_equal(node_loans_finder(&l->loans), LENDER);
         assert_int_equal(node_loans_owing(&l->loans), CUBE_HOST);
         loans++;
     }

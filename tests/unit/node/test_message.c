@@ -21,7 +21,13 @@ static void test_layouts(void **unused)
     assert_int_equal(offsetof(struct node_setup_message, setup.cells), 80);
     assert_int_equal(offsetof(struct node_setup_message, manager), 96);
     assert_int_equal(offsetof(struct node_setup_message, builders), 104);
-    assert_int_equal(sizeof(struct node_setup_message), 232);
+    assert_int_equal(offsetof(struct node_setup_message, page_key), 232);
+    assert_int_equal(sizeof(struct node_setup_message), 240);
+    assert_int_equal(offsetof(struct node_page_message, data), 12);
+    assert_int_equal(offsetof(struct node_page_head, tag), 4);
+    assert_int_equal(sizeof(struct node_wrong_page_message), 8);
+    assert_int_equal(offsetof(struct incode_answers, builder), 2);
+    assert_int_equal(offsetof(struct incode_answers, v), 8);
     assert_int_equal(offsetof(struct node_job_message, job.lo), 16);
     assert_int_equal(sizeof(struct node_job_message), 64);
     assert_int_equal(sizeof(struct node_spill_header), 20);

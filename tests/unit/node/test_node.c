@@ -20,6 +20,7 @@
 #include "host/service/spill.h"
 #include "host/sim/sim_world.h"
 #include "node/node.h"
+#include "node/page_check.h"
 #include "node/result.h"
 
 enum { NODES = 8, QUEUE = 256 };
@@ -100,7 +101,7 @@ static void take_result(const struct cube_message *m)
     assert_true(host_ledger_current(&world.ledger, m->source, epoch));
     world.waiting[m->source].results++;
     node_result_open(&reader, m->data + 8, m->size - 8u,
-                     64 * world.order.bricks);
+                     64 * world.order.bricks, m->source, world.nodes);
     do {
         uint32_t(*rows)[4] = host_tetrahedra_room(&world.tets, 500, &error);
         assert_non_null(rows);
@@ -180,19 +181,17 @@ static void serve(uint16_t to)
         struct node_spill_header header;
         struct incode_face faces[NODE_FACES_A_MESSAGE];
     } back;
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } body;
+    struct node_page_message body;
     uint32_t credit = w->results + world.setup.credits;
     if (credit != w->credit &&
         write_to(to, NODE_CREDIT, &credit, sizeof credit) == 0) {
         w->credit = credit;
     }
     while (w->count > 0) {
-        body.page = w->pages[w->first];
-        size_t size = host_page(&world.order, body.page, body.data);
-        if (write_to(to, NODE_PAGE, &body, 4 + size) != 0) {
+        body.head.page = w->pages[w->first];
+        size_t size = host_page(&world.order, body.head.page, body.data);
+        if (write_to(to, NODE_PAGE, &body,
+                     node_page_seal(&body, world.setup.page_key, size)) != 0) {
             break;
         }
         w->first = (w->first + 1) % QUEUE;
@@ -299,6 +298,7 @@ static void run(const struct host_points *points, struct shape shape,
     world.setup.nodes = (uint16_t)world.nodes;
     world.setup.holders = (uint16_t)(world.nodes - world.workers);
     world.setup.credits = 4;
+    world.setup.page_key = 0x123456789abcdef0;
     world.setup.setup.bricks = world.order.bricks;
     world.setup.setup.index = INCODE_KD;
     world.setup.setup.shuffle_seed = shape.shuffle_seed;
@@ -352,7 +352,7 @@ static void test_cubes(void **unused)
         struct host_points points = {0};
         struct host_error error = {0};
         struct host_digest first, digest;
-        static struct host_verify_report report;
+        static struct host_check_report report;
         assert_int_equal(host_gen(sets[s].kind, sets[s].n, 3, &points, &error),
                          0);
         for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {

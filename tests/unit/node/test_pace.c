@@ -14,6 +14,7 @@
 
 #include "host/mesh/gen.h"
 #include "host/order/order.h"
+#include "node/page_check.h"
 #include "node/roles/worker.h"
 #include "tests/unit/emulated.h"
 
@@ -129,17 +130,15 @@ static void close_worker(void)
 
 static void deliver(void)
 {
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } body;
+    struct node_page_message body;
     while (world.count > 0) {
-        body.page = world.wanted[--world.count];
-        size_t size = host_page(&world.order, body.page, body.data);
-        const struct cube_message message = {.source = CUBE_HOST,
-                                             .type = NODE_PAGE,
-                                             .data = (const uint8_t *)&body,
-                                             .size = (uint16_t)(4 + size)};
+        body.head.page = world.wanted[--world.count];
+        size_t size = host_page(&world.order, body.head.page, body.data);
+        const struct cube_message message = {
+            .source = CUBE_HOST,
+            .type = NODE_PAGE,
+            .data = (const uint8_t *)&body,
+            .size = (uint16_t)node_page_seal(&body, 0, size)};
         role->message(world.arena, &message, 0);
     }
     assert_false(node_fault_is_set(&world.fault));

@@ -11,7 +11,7 @@
 
 #include "node/result.h"
 
-enum { BATCH = 1592, STARS = 4000, APEXES = 40 };
+enum { BATCH = 1592, STARS = 4000, APEXES = 40, NODES = 1000, SENDER = 3 };
 
 static uint64_t state = 88172645463325252u;
 
@@ -33,6 +33,7 @@ static uint32_t draw_near(uint32_t v, uint32_t vertices)
 
 struct expected {
     uint32_t rows[STARS * APEXES][4];
+    uint16_t finder[STARS * APEXES];
     size_t rows_count;
     uint32_t bricks[STARS];
     size_t bricks_at[STARS], bricks_count;
@@ -55,12 +56,15 @@ static void compare(const struct expected *e, struct seen *seen,
     enum node_result_event event;
     assert_non_null(copy);
     memcpy(copy, data, size);
-    node_result_open(&reader, copy, size, vertices);
+    node_result_open(&reader, copy, size, vertices, SENDER, NODES);
     do {
         event = node_result_read(&reader, rows, rows_max, &count);
         assert_int_not_equal(event, NODE_RESULT_GARBAGE);
         assert_true(count <= rows_max);
         assert_memory_equal(rows, e->rows[seen->rows], count * sizeof rows[0]);
+        for (size_t i = 0; i < count; i++) {
+            assert_int_equal(reader.finder, e->finder[seen->rows + i]);
+        }
         seen->rows += count;
         if (event == NODE_RESULT_COMMIT) {
             assert_int_equal(reader.brick, e->bricks[seen->bricks]);
@@ -77,13 +81,16 @@ static void round_trip(uint32_t vertices, size_t rows_max)
     static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
     struct node_result_writer writer;
     struct seen seen = {0, 0};
+    uint16_t finder = SENDER;
     e.rows_count = e.bricks_count = 0;
-    node_result_begin(&writer, buffer, BATCH);
+    node_result_begin(&writer, buffer, BATCH, SENDER);
     for (size_t s = 0; s < STARS; s++) {
         uint32_t vertex = draw_near(0, vertices);
         uint32_t apexes[APEXES][3];
         size_t count = draw() % (APEXES + 1), done = 0;
+        finder = draw() % 4 == 0 ? (uint16_t)(draw() % NODES) : finder;
         for (size_t i = 0; i < count; i++) {
+            e.finder[e.rows_count] = finder;
             uint32_t *row = e.rows[e.rows_count++];
             row[0] = vertex;
             for (size_t k = 0; k < 3; k++) {
@@ -91,14 +98,16 @@ static void round_trip(uint32_t vertices, size_t rows_max)
             }
         }
         while (done < count) {
-            done += node_result_star(
-                &writer, vertex,
-                (const uint32_t(*)[3])(const void *)&apexes[done],
-                count - done);
+            if (node_result_finder(&writer, finder)) {
+                done += node_result_star(
+                    &writer, vertex,
+                    (const uint32_t(*)[3])(const void *)&apexes[done],
+                    count - done);
+            }
             if (done < count) {
                 assert_true(writer.size <= BATCH);
                 compare(&e, &seen, buffer, writer.size, vertices, rows_max);
-                node_result_begin(&writer, buffer, BATCH);
+                node_result_begin(&writer, buffer, BATCH, SENDER);
             }
         }
         e.bricks[e.bricks_count] = draw_near(vertex, vertices) / 64;
@@ -143,10 +152,11 @@ static void test_garbage(void **unused)
                 data[i] &= 0xd5; /* small numbers and valid kinds */
             }
         }
-        node_result_open(&reader, data, size, 5000);
+        node_result_open(&reader, data, size, 5000, 0, 9);
         do {
             event = node_result_read(&reader, rows, 16, &count);
             assert_true(++events <= size + 1);
+            assert_true(event == NODE_RESULT_GARBAGE || reader.finder < 9);
             for (size_t i = 0; event != NODE_RESULT_GARBAGE && i < count; i++) {
                 for (size_t k = 0; k < 4; k++) {
                     assert_true(rows[i][k] < 5000);
@@ -167,7 +177,7 @@ static void test_truncated(void **unused)
     uint8_t buffer[200 + NODE_RESULT_SLACK];
     struct node_result_writer writer;
     const uint32_t apexes[3][3] = {{1, 2, 3}, {70000, 4, 5}, {6, 900, 7}};
-    node_result_begin(&writer, buffer, 200);
+    node_result_begin(&writer, buffer, 200, 0);
     assert_int_equal(node_result_star(&writer, 500, apexes, 3), 3);
     assert_int_equal(node_result_commit(&writer, 7), 1);
     for (size_t size = 0; size < writer.size; size++) {
@@ -177,7 +187,7 @@ static void test_truncated(void **unused)
         uint8_t *copy = malloc(size + 1);
         assert_non_null(copy);
         memcpy(copy, buffer, size);
-        node_result_open(&reader, copy, size, 100000);
+        node_result_open(&reader, copy, size, 100000, 0, 1);
         enum node_result_event event =
             node_result_read(&reader, rows, 4, &count);
         assert_true(event == NODE_RESULT_END || event == NODE_RESULT_GARBAGE);
@@ -189,11 +199,60 @@ static void test_truncated(void **unused)
     }
 }
 
+/* Who found what, as it stands on the wire: a record where that changes, and
+ * none for the sender's own. */
+static void test_finders(void **unused)
+{
+    (void)unused;
+    static const uint8_t expected[] = {
+        1, 10,  0, 2, 4, 6,          /* of the sender: vertex 5 and 6, 7, 8 */
+        3, 18,  1, 0, 0, 2, 4, 6,    /* of node 9 */
+        1, 2,   0, 2, 4, 6,          /* and of the next vertex */
+        7, 208, 7, 1, 0, 0, 2, 4, 6, /* of node 1000 */
+    };
+    static const uint32_t apexes[1][3] = {{6, 7, 8}}, next[1][3] = {{7, 8, 9}};
+    uint8_t buffer[100 + NODE_RESULT_SLACK];
+    struct node_result_writer writer;
+    struct node_result_reader reader;
+    uint32_t rows[8][4];
+    size_t count;
+    node_result_begin(&writer, buffer, 100, SENDER);
+    assert_int_equal(node_result_finder(&writer, SENDER), 1);
+    assert_int_equal(node_result_star(&writer, 5, apexes, 1), 1);
+    assert_int_equal(node_result_finder(&writer, 9), 1);
+    assert_int_equal(node_result_star(&writer, 5, apexes, 1), 1);
+    assert_int_equal(node_result_finder(&writer, 9), 1);
+    assert_int_equal(node_result_star(&writer, 6, next, 1), 1);
+    assert_int_equal(node_result_finder(&writer, 1000), 1);
+    assert_int_equal(node_result_star(&writer, 6, next, 1), 1);
+    assert_int_equal(writer.size, sizeof expected);
+    assert_memory_equal(buffer, expected, sizeof expected);
+    node_result_open(&reader, buffer, writer.size, 100, SENDER, 1001);
+    static const uint32_t finders[] = {SENDER, 9, 1000};
+    for (unsigned i = 0; i < 3; i++) {
+        assert_int_equal(node_result_read(&reader, rows, 8, &count),
+                         i < 2 ? NODE_RESULT_ROWS : NODE_RESULT_END);
+        assert_int_equal(count, i == 1 ? 2 : 1);
+        assert_int_equal(reader.finder, finders[i]);
+    }
+    /* A node that there is not. */
+    node_result_open(&reader, buffer, writer.size, 100, SENDER, 1000);
+    (void)node_result_read(&reader, rows, 8, &count);
+    (void)node_result_read(&reader, rows, 8, &count);
+    assert_int_equal(node_result_read(&reader, rows, 8, &count),
+                     NODE_RESULT_GARBAGE);
+    /* None without a tetrahedron behind it. */
+    node_result_begin(&writer, buffer, 21, SENDER);
+    assert_int_equal(node_result_finder(&writer, 9), 0);
+    assert_int_equal(writer.size, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_garbage),
+        cmocka_unit_test(test_finders),
         cmocka_unit_test(test_truncated),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -15,6 +15,7 @@
 
 #include "host/sim/sim_cube.h"
 #include "node/node.h"
+#include "node/page_check.h"
 #include "node/roles/holder.h"
 #include "node/roles/worker.h"
 #include "echo_role.h"
@@ -358,16 +359,16 @@ static void setups_of_other_versions(void **unused)
         uint64_t more;
     } later = {setup, 0};
     (void)unused;
-    assert_int_equal(NODE_PROTOCOL, 11);
+    assert_int_equal(NODE_PROTOCOL, 12);
     setup.protocol = later.setup.protocol = 6;
     refuses(NODE_SETUP, &setup, sizeof setup,
-            "protocol version 6, expected 11");
+            "protocol version 6, expected 12");
     refuses(NODE_SETUP, &later, sizeof later,
-            "protocol version 6, expected 11");
-    refuses(NODE_SETUP, &later, 4, "protocol version 6, expected 11");
-    refuses(NODE_SETUP, &later, 3, "setup in 3 bytes, expected 232");
-    later.setup.protocol = 11;
-    refuses(NODE_SETUP, &later, 236, "setup in 236 bytes, expected 232");
+            "protocol version 6, expected 12");
+    refuses(NODE_SETUP, &later, 4, "protocol version 6, expected 12");
+    refuses(NODE_SETUP, &later, 3, "setup in 3 bytes, expected 240");
+    later.setup.protocol = 12;
+    refuses(NODE_SETUP, &later, 244, "setup in 244 bytes, expected 240");
 }
 
 static void invalid_setups(void **unused)
@@ -411,10 +412,8 @@ static void invalid_setups(void **unused)
 static void what_a_worker_refuses(void **unused)
 {
     struct node_job_message job = {.epoch = 1, .job = {.first = 5, .last = 3}};
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } page = {.page = 17};
+    struct node_page_message page = {.head.page = 17};
+    size_t whole = node_page_seal(&page, 0, INCODE_PAGE_BYTES);
     struct node_spill_header header = {.epoch = 0, .brick = 6, .sent = 1};
     (void)unused;
     (void)begin(NODE_WORKER);
@@ -435,14 +434,15 @@ static void what_a_worker_refuses(void **unused)
     job.epoch = 2;
     refuses(NODE_JOB, &job, sizeof job, "job 2 before job 1 is done");
     (void)begin(NODE_WORKER);
-    refuses(NODE_PAGE, &page, sizeof page, "page 17 was not requested");
+    refuses(NODE_PAGE, &page, whole, "page 17 was not requested");
     (void)begin(NODE_WORKER);
-    refuses(NODE_PAGE, &page, 2, "page in 2 bytes, expected 4 at least");
+    refuses(NODE_PAGE, &page, 2, "page in 2 bytes, expected 12 at least");
     (void)begin(NODE_WORKER);
     job.epoch = 1;
     say(NODE_JOB, &job, sizeof job);
     (void)hear(NODE_PAGE_REQUEST);
-    refuses(NODE_PAGE, &page, 4 + 24, "page 17 of 24 bytes was not requested");
+    refuses(NODE_PAGE, &page, node_page_seal(&page, 0, 24),
+            "page 17 of 24 bytes was not requested");
     (void)begin(NODE_WORKER);
     refuses(NODE_UNSPILL, &header, 8,
             "spilled faces in 8 bytes, header takes 20");
@@ -470,20 +470,17 @@ static void what_a_worker_refuses(void **unused)
 /* What it says to a page that it has asked for. */
 static void takes_no_page(const void *data, size_t bytes)
 {
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES];
-    } page;
+    struct node_page_message page;
     struct node_job_message job = {.epoch = 1, .job = {.last = 7}};
     char text[80];
     (void)begin(NODE_WORKER);
     say(NODE_JOB, &job, sizeof job);
-    memcpy(&page.page, hear(NODE_PAGE_REQUEST), sizeof page.page);
-    assert_int_equal(page.page, 0);
+    memcpy(&page.head.page, hear(NODE_PAGE_REQUEST), sizeof page.head.page);
+    assert_int_equal(page.head.page, 0);
     memcpy(page.data, data, bytes);
     snprintf(text, sizeof text,
              "content of page 0 in %zu bytes is out of its limits", bytes);
-    refuses(NODE_PAGE, &page, sizeof page.page + bytes, text);
+    refuses(NODE_PAGE, &page, node_page_seal(&page, 0, bytes), text);
 }
 
 static void pages_that_a_worker_refuses(void **unused)
@@ -506,18 +503,15 @@ static void what_a_holder_refuses(void **unused)
 {
     struct node_job_message job = {.epoch = 1};
     uint32_t pages[NODE_PAGES_IN_FLIGHT_MAX + 1];
-    struct {
-        uint32_t page;
-        uint8_t data[INCODE_PAGE_BYTES + 4];
-    } page = {.page = 17};
+    struct node_page_message page = {.head.page = 17};
+    size_t whole = node_page_seal(&page, 0, INCODE_PAGE_BYTES);
     (void)unused;
     (void)begin(NODE_HOLDER);
     refuses(NODE_JOB, &job, sizeof job, "a job for a node that holds pages");
     (void)begin(NODE_HOLDER);
-    refuses(NODE_PAGE, &page, sizeof page - 4, "page 17 was not requested");
+    refuses(NODE_PAGE, &page, whole, "page 17 was not requested");
     (void)begin(NODE_HOLDER);
-    refuses(NODE_PAGE, &page, sizeof page,
-            "page in 1576 bytes, expected 1572 at most");
+    refuses(NODE_PAGE, &page, 3, "page in 3 bytes, expected 12 at least");
     (void)begin(NODE_HOLDER);
     memset(pages, 0, sizeof pages);
     refuses(NODE_PAGE_REQUEST, pages, sizeof pages,
@@ -533,10 +527,11 @@ static void what_a_holder_refuses(void **unused)
     refuses(NODE_PAGE_REQUEST, pages, 4,
             "request for page 8, which node 1 has not");
     (void)begin(NODE_HOLDER);
-    page.page = pages[0] = 7;
+    page.head.page = pages[0] = 7;
+    whole = node_page_seal(&page, 0, INCODE_PAGE_BYTES);
     say(NODE_PAGE_REQUEST, pages, 4);
     (void)hear(NODE_PAGE_REQUEST);
-    refuses(NODE_PAGE, &page, sizeof page - 4,
+    refuses(NODE_PAGE, &page, whole,
             "content of page 7 in 1568 bytes is out of its limits");
 }
 

@@ -21,7 +21,7 @@ struct fixture {
     struct host_tetrahedra tets;
 };
 
-static int verify(struct fixture *f, struct host_verify_report *report)
+static int verify(struct fixture *f, struct host_check_report *report)
 {
     struct host_error error = {0};
     return host_verify(&f->points, &f->tets, report, &error);
@@ -46,7 +46,7 @@ static struct fixture made(const char *kind, uint32_t n, uint64_t seed)
 /* Expects a fault whose report holds `what`. */
 static void expect(struct fixture *f, const char *what)
 {
-    struct host_verify_report report;
+    struct host_check_report report;
     struct host_error error = {0};
     assert_int_equal(host_verify(&f->points, &f->tets, &report, &error),
                      HOST_UNVERIFIED);
@@ -107,7 +107,7 @@ static void data_agrees(void **unused)
         bool tiny = strstr(file, "denormal") != NULL;
         static const int powers[] = {0, 500, -1000};
         for (int k = 0; k < (tiny ? 2 : 3); k++) {
-            struct host_verify_report report;
+            struct host_check_report report;
             struct host_error error = {0};
             for (uint64_t c = 0; c < 3 * f.points.count; c++) {
                 f.points.xyz[c] = ldexp(f.points.xyz[c], powers[k]);
@@ -132,7 +132,7 @@ static void right_ones_pass(void **unused)
                 {"uniform", 1500}, {"grid", 100}};
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
         struct fixture f = made(sets[i].kind, sets[i].n, i + 1);
-        struct host_verify_report r;
+        struct host_check_report r;
         int code = verify(&f, &r);
         if (code != 0) {
             fail_msg("%s %u: %s", sets[i].kind, sets[i].n, r.text);
@@ -154,7 +154,7 @@ static void range_beyond_scaling(void **unused)
         f.points.xyz[i] = ldexp(f.points.xyz[i] - 0.5, power);
     }
     reference_delaunay(f.points.xyz, 60, &f.tets);
-    struct host_verify_report r;
+    struct host_check_report r;
     assert_int_equal(verify(&f, &r), 0);
     close_fixture(&f);
 }
@@ -172,7 +172,7 @@ static void ends_of_the_range(void **unused)
         assert_int_equal(host_points_append(&f.points, p, 1, &error), 0);
     }
     reference_delaunay(f.points.xyz, 8, &f.tets);
-    struct host_verify_report r;
+    struct host_check_report r;
     assert_int_equal(verify(&f, &r), 0);
     close_fixture(&f);
 }
@@ -342,7 +342,7 @@ static void wrong_ties_are_found(void **unused)
             memcpy(*room, t, sizeof t);
             host_tetrahedra_keep(&f.tets, 1);
         }
-        struct host_verify_report r;
+        struct host_check_report r;
         passed += verify(&f, &r) == 0;
         if (r.faults > 0) {
             assert_non_null(strstr(r.text, "not Delaunay"));
@@ -373,7 +373,7 @@ static void duplicates_stand_for_the_lowest(void **unused)
     (void)unused;
     struct fixture f = made("uniform", 40, 11);
     struct host_error error = {0};
-    struct host_verify_report r;
+    struct host_check_report r;
     double copy[3];
     memcpy(copy, f.points.xyz + 3 * 7, sizeof copy);
     assert_int_equal(host_points_append(&f.points, copy, 1, &error), 0);

@@ -47,7 +47,8 @@ static void test_defaults(void **unused)
     assert_int_equal(o.memory, 4194304);
     assert_int_equal(o.nodes, 0);
     assert_int_equal(o.outputs, 0);
-    assert_false(o.verify || o.quiet || o.table || o.map);
+    assert_int_equal(o.verifying, HOST_VERIFY_WHERE_DUE);
+    assert_false(o.quiet || o.table || o.map);
     assert_true(o.progress);
 }
 
@@ -80,7 +81,7 @@ static void test_options(void **unused)
     assert_int_equal(o.memory, 524288);
     assert_int_equal(o.window, 1);
     assert_int_equal(o.shuffle_seed, 9);
-    assert_true(o.verify);
+    assert_int_equal(o.verifying, HOST_VERIFY_ALWAYS);
     assert_int_equal(o.throttle.bytes_a_second, 1024);
     assert_int_equal(o.throttle.slow_us, 30000000);
     assert_int_equal(o.patience_s, 7);

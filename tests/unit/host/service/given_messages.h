@@ -152,7 +152,7 @@ static size_t batch_of(uint8_t *data, const uint32_t v[4], uint32_t brick)
     struct node_result_header header = {JOB_OF_NODE_1, 0};
     const uint32_t apexes[1][3] = {{v[1], v[2], v[3]}};
     memcpy(data, &header, sizeof header);
-    node_result_begin(&writer, data + sizeof header, 100);
+    node_result_begin(&writer, data + sizeof header, 100, 1);
     assert_int_equal(node_result_star(&writer, v[0], apexes, 1), 1);
     assert_int_equal(node_result_commit(&writer, brick), 1);
     return sizeof header + writer.size;

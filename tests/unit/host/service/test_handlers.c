@@ -54,7 +54,7 @@ static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick)
     const uint32_t apexes[1][3] = {{1, 2, 3}};
     struct node_result_header header = {epoch, 0};
     memcpy(data, &header, sizeof header);
-    node_result_begin(&writer, data + sizeof header, 100);
+    node_result_begin(&writer, data + sizeof header, 100, 0);
     assert_int_equal(node_result_star(&writer, 0, apexes, 1), 1);
     assert_int_equal(node_result_commit(&writer, brick), 1);
     return sizeof header + writer.size;
@@ -202,17 +202,22 @@ static int pong_of(unsigned i, uint32_t pinged, uint32_t start,
 }
 
 /* What a loss may explain counts once every node that has not left has answered
- * a ping that was sent after it; a node that has started again is the loss. */
+ * a ping that was sent after it; a node that has started again is the loss.
+ * What counts ends what nodes do together, then the node's part, then the
+ * run. */
 static void test_doubtful_fault(void **unused)
 {
     static const char text[] = "page 1 to all, expected the one below 8";
+    enum { A_LOSS, TOGETHER, ALONE, LAST, CASES };
     (void)unused;
-    for (unsigned k = 0; k < 2; k++) {
+    for (unsigned k = 0; k < CASES; k++) {
         struct host_error error = {0};
         begin();
+        service.ledger.alone = k >= ALONE;
         for (unsigned i = 0; i < NODES; i++) {
             service.report[i].up = true;
             service.node[i].start = 7;
+            service.node[i].aside = k == LAST && i != 1;
         }
         service.node[3].left = true;
         assert_int_equal(send(1, NODE_FAULT, text, sizeof text - 1, &error), 0);
@@ -225,12 +230,21 @@ static void test_doubtful_fault(void **unused)
         assert_int_equal(pong_of(0, 0, 7, &error), 0); /* not to that one */
         assert_int_equal(pong_of(0, 1, 7, &error), 0);
         assert_int_equal(pong_of(2, 1, 7, &error), 0);
-        int status = pong_of(1, 1, k == 0 ? 7 : 8, &error);
-        assert_int_equal(status, k == 0 ? HOST_CUBE : 0);
-        assert_int_equal(service.loss, k == 1);
-        if (k == 0) {
+        assert_false(service.loss);
+        int status = pong_of(1, 1, k == A_LOSS ? 8 : 7, &error);
+        assert_int_equal(status, k == LAST ? HOST_CUBE : 0);
+        assert_int_equal(service.loss, k != LAST);
+        assert_int_equal(service.excluded, k == ALONE);
+        assert_int_equal(service.node[1].aside, k == ALONE);
+        assert_ptr_equal(service.strategy,
+                         k == TOGETHER ? &host_redo : &host_spatial);
+        assert_int_equal(service.ledger.alone, k != A_LOSS);
+        if (k == LAST) {
             assert_non_null(strstr(error.text, "node 1: page 1 to all, "));
             assert_non_null(strstr(error.text, "; please report this"));
+        } else if (k != A_LOSS) {
+            assert_non_null(strstr(said, "node 1"));
+            assert_non_null(strstr(said, "reports: page 1 to all, "));
         }
         end();
     }
@@ -333,8 +347,8 @@ static void test_texts(void **unused)
         size_t size;
         const char *text;
     } wrong[] = {
-        {NODE_READY, &ready, sizeof ready, "protocol version 10, expected 11"},
-        {NODE_READY, &ready, 4, "protocol version 10, expected 11"},
+        {NODE_READY, &ready, sizeof ready, "protocol version 11, expected 12"},
+        {NODE_READY, &ready, 4, "protocol version 11, expected 12"},
         {NODE_READY, &ready, 3, "memory map in 3 bytes, expected "},
         {NODE_PONG, &ready, 16, "pong in 16 bytes, expected 40"},
         {NODE_FINISHED, &ready, 8, "statistics in 8 bytes, expected "},
@@ -362,7 +376,7 @@ static void test_texts(void **unused)
         {NODE_FAULT, "role 7 is not known", 19,
          "role 7 is not known; run the "
          "same version"}};
-    assert_int_equal(NODE_PROTOCOL, 11);
+    assert_int_equal(NODE_PROTOCOL, 12);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         begin();

@@ -93,6 +93,18 @@ static void test_abandon(void **unused)
     uint32_t stays = host_ledger_open(&ledger, 0, 0, 3);
     uint32_t lost = host_ledger_open(&ledger, 1, 3, 8);
     fill(&tets);
+    /* Found by turns: 100 by node 0, 100 by node 1, and so on. */
+    for (uint64_t i = 0; i < tets.count; i += 100) {
+        uint64_t left = tets.count - i;
+        assert_int_equal(host_ledger_found(&ledger, i / 100 % 2,
+                                           left < 100 ? left : 100, &error),
+                         0);
+        assert_int_equal(host_ledger_found(&ledger, 7, 0, &error), 0);
+    }
+    assert_int_equal(ledger.runs, 6);
+    for (uint64_t i = 0; i < tets.count; i++) {
+        assert_int_equal(host_ledger_finder(&ledger, i), i / 100 % 2);
+    }
     assert_int_equal(host_ledger_commit(&ledger, 0, 1), 0);
     assert_int_equal(host_ledger_commit(&ledger, 1, 6), 0);
     assert_int_equal(host_ledger_abandon(&ledger, 4, &order, &tets), 509 - 128);
@@ -105,7 +117,18 @@ static void test_abandon(void **unused)
     for (uint64_t i = 0; i < tets.count; i++) {
         uint32_t v = (uint32_t)(i < 64 ? 64 + i : 384 - 64 + i);
         assert_int_equal(tets.v[i][0], v + v % 4);
+        assert_int_equal(host_ledger_finder(&ledger, i), v / 100 % 2);
     }
+    /* What is to be done again goes with the next loss, alone. */
+    assert_int_equal(ledger.by[1], 0);
+    assert_int_equal(ledger.by[6], 1);
+    ledger.alone = true;
+    host_ledger_reopen(&ledger, 6);
+    assert_int_equal(host_ledger_abandon(&ledger, 1, &order, &tets), 64);
+    assert_int_equal(tets.count, 64);
+    assert_int_equal(host_ledger_open(&ledger, 1, 6, 7), lost + 1);
+    assert_int_equal(host_ledger_commit(&ledger, 1, 6), 0);
+    assert_int_equal(ledger.by[6], 1 | HOST_LEDGER_ALONE);
     host_tetrahedra_free(&tets);
     host_ledger_free(&ledger);
 }

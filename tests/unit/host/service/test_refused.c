@@ -12,24 +12,30 @@ static bool ends_node(void *context, unsigned node)
     return true;
 }
 
+/* 0: nobody ends it; 1: it is ended and started again; 2: it had that, and is
+ * excluded; 3: and no other node is left. */
 static void refuses_message(uint8_t type, const void *data, size_t size,
                             const char *text)
 {
-    for (int anew = 0; anew < 3; anew++) {
+    for (int anew = 0; anew < 4; anew++) {
         struct host_error error = {0};
         begin();
         machine.kill = anew > 0 ? ends_node : NULL;
-        service.node[1].started_anew = anew == 2;
+        service.node[1].started_anew = anew >= 2;
+        for (unsigned i = 0; anew == 3 && i < NODES; i++) {
+            service.node[i].aside = i != 1;
+        }
         assert_int_equal(send(1, type, data, size, &error),
-                         anew == 2 ? HOST_CUBE : 0);
-        if (strstr(anew == 2 ? error.text : said, text) == NULL) {
+                         anew == 3 ? HOST_UNVERIFIED : 0);
+        if (strstr(anew == 3 ? error.text : said, text) == NULL) {
             fail_msg("no '%s' in: %s %s", text, said, error.text);
         }
-        assert_int_equal(strstr(error.text, ", and had its new start before; "
-                                            "are host and ") != NULL,
-                         anew == 2);
-        assert_int_equal(service.node[1].aside, anew == 0);
-        assert_int_equal(service.loss, anew == 0);
+        assert_int_equal(strstr(error.text, "no other node is left") != NULL,
+                         anew == 3);
+        assert_int_equal(strstr(said, "it is excluded") != NULL, anew == 2);
+        assert_int_equal(service.excluded, anew == 2);
+        assert_int_equal(service.node[1].aside, anew == 0 || anew == 2);
+        assert_int_equal(service.loss, anew == 0 || anew == 2);
         assert_int_equal(service.ledger.committed, 0);
         assert_int_equal(service.spill.faces, 0);
         assert_false(service.node[1].reported);
@@ -142,12 +148,59 @@ static void test_spilled(void **unused)
     }
 }
 
+/* A node that repeats a tetrahedron, or spills a face, without end makes the
+ * host keep no more than a bound that its points give. */
+static void floods(uint8_t type, const void *data, size_t size,
+                   const char *text)
+{
+    struct host_error error = {0};
+    uint64_t bricks = order.region[1].last - order.region[1].first;
+    unsigned sent = 0;
+    begin();
+    while (!service.node[1].left && sent < 1000000) {
+        assert_int_equal(send(1, type, data, size, &error), 0);
+        sent++;
+    }
+    assert_true(sent < 1000000);
+    if (strstr(said, text) == NULL) {
+        fail_msg("no '%s' in: %s", text, said);
+    }
+    assert_true(service.node[1].aside);
+    assert_true(tets.count <= 4097 + 1024 * bricks);
+    assert_true(service.spill.faces <= 65538 + 1024 * bricks);
+    end();
+}
+
+static void test_floods(void **unused)
+{
+    (void)unused;
+    uint32_t v = order.region[1].first * INCODE_BRICK_POINTS;
+    const uint32_t row[4] = {v, v + 1, v + 2, v + 3};
+    uint8_t data[128];
+    struct {
+        struct node_spill_header header;
+        struct incode_face faces[2];
+    } spill = {.header = {.epoch = JOB_OF_NODE_1, .count = 2},
+               .faces = {{{v, v + 1, v + 2}}, {{v, v + 2, v + 1}}}};
+    size_t size = batch_of(data, row, order.region[1].first);
+    struct node_result_writer writer;
+    node_result_begin(&writer, data + 8, 100);
+    const uint32_t apexes[1][3] = {{v + 1, v + 2, v + 3}};
+    assert_int_equal(node_result_star(&writer, v, apexes, 1), 1);
+    assert_true(8 + writer.size < size); /* no commit */
+    floods(NODE_RESULT, data, 8 + writer.size,
+           "more results than its points allow");
+    floods(NODE_SPILL, &spill, sizeof spill,
+           "more spilled faces than its points allow");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_refused_results),
         cmocka_unit_test(test_unfinished),
         cmocka_unit_test(test_spilled),
+        cmocka_unit_test(test_floods),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -124,12 +125,52 @@ static void test_detached(void **unused)
     host_spill_free(&spill);
 }
 
+/* Marks of a vertex that come many times over are one; they come back before
+ * the faces, and the faces of one node can be seen without taking them. */
+static void test_marks(void **unused)
+{
+    (void)unused;
+    struct host_spill spill;
+    struct host_error error = {0};
+    struct incode_face got[8], *faces = NULL;
+    const struct incode_face face = {{64, 1, 2}},
+                             low = {{64, INCODE_NONE, INCODE_NONE}},
+                             high = {{127, INCODE_NONE, INCODE_NONE}};
+    uint32_t count;
+    uint64_t copied;
+    assert_int_equal(host_spill_init(&spill, 0, &error), 0);
+    for (int i = 0; i < 1000; i++) {
+        assert_int_equal(host_spill_put(&spill, 3, &high, 1, &error), 0);
+        assert_int_equal(host_spill_put(&spill, 3, &low, 1, &error), 0);
+    }
+    assert_int_equal(host_spill_put(&spill, 3, &face, 1, &error), 0);
+    assert_int_equal(host_spill_put(&spill, 4, &face, 1, &error), 0);
+    assert_int_equal(spill.faces, 4);
+    assert_int_equal(spill.blocks_used, 2);
+    assert_int_equal(host_spill_copy(&spill, 3, &faces, &copied, &error), 0);
+    assert_int_equal(copied, 1);
+    assert_memory_equal(faces, &face, sizeof face);
+    free(faces);
+    struct host_spill_list list = host_spill_detach(&spill, 3, 1);
+    assert_int_equal(list.faces, 3);
+    assert_int_equal(host_spill_take(&spill, &list, got, 1, &count, &error), 0);
+    assert_memory_equal(got, &low, sizeof low);
+    assert_int_equal(host_spill_take(&spill, &list, got, 8, &count, &error), 0);
+    assert_int_equal(count, 2);
+    assert_memory_equal(&got[0], &high, sizeof high);
+    assert_memory_equal(&got[1], &face, sizeof face);
+    assert_int_equal(list.faces, 0);
+    assert_int_equal(spill.faces, 1);
+    host_spill_free(&spill);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_in_memory),
         cmocka_unit_test(test_in_file),
         cmocka_unit_test(test_detached),
+        cmocka_unit_test(test_marks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -246,6 +246,12 @@ static void copy_one(const struct incode_pager *pager, const struct model *m,
     assert_int_equal(incode_pager_has(pager, page), ready);
     assert_int_equal(had, ready ? bytes : 0);
     assert_memory_equal(copy, data, had);
+    uint64_t *label = incode_pager_label(pager, page);
+    assert_int_equal(label != NULL, m->place[page] != ABSENT);
+    if (label != NULL) { /* the one that was set, or none yet */
+        assert_true(*label == 0 || *label == page + 1);
+        *label = page + 1;
+    }
 }
 
 /* Which page comes out is the pager's choice; one does at once if told so. */

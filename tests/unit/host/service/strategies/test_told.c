@@ -1,6 +1,9 @@
 /* What the strategy exchange tells all nodes, once they have their role: whose
  * bricks are whose, and the pages that each has room for. */
 #include "begun_strategy.h"
+#include "node/page_check.h"
+
+enum { PAGE_KEY = 0x5eed };
 
 /* What all nodes have been told: regions, then pages from the last one down. */
 static struct {
@@ -13,7 +16,7 @@ static bool write_to_all(void *context, uint8_t type, const void *data,
                          size_t size)
 {
     struct node_regions_message head;
-    uint8_t page[INCODE_PAGE_BYTES];
+    struct node_page_message page;
     (void)context;
     if (told.refuse) {
         return false;
@@ -21,10 +24,11 @@ static bool write_to_all(void *context, uint8_t type, const void *data,
     if (type == NODE_PAGE_TO_ALL) {
         assert_int_equal(told.known, NODES + 1);
         memcpy(&told.page, data, sizeof told.page);
-        assert_int_equal(size,
-                         sizeof told.page + host_page(&order, told.page, page));
-        assert_memory_equal((const uint8_t *)data + sizeof told.page, page,
-                            size - sizeof told.page);
+        page.head.page = told.page;
+        assert_int_equal(
+            size, node_page_seal(&page, PAGE_KEY,
+                                 host_page(&order, told.page, page.data)));
+        assert_memory_equal(data, &page, size);
         return true;
     }
     assert_int_equal(type, NODE_REGIONS);
@@ -83,6 +87,7 @@ static void test_exchange(void **unused)
     assert_int_equal(s->check(NODES, &work.sharing, INCODE_FACE_PAPER, &error),
                      HOST_USAGE);
     work.write_to_all = write_to_all;
+    work.page_key = PAGE_KEY;
     work.goes_round = true; /* dead links */
     assert_string_equal(roles(s), "wwww");
     work.goes_round = false;

@@ -1,0 +1,46 @@
+/* Facts about single tetrahedra and facets against all points, exact, for a few
+ * of them at a time.
+ *
+ * Memory: 48 bytes a brick (64 vertex numbers), made once.  Work: a box test
+ * for each 64 bricks, and for each of these that the sphere or half-space
+ * touches, a box test a brick; an exact test for each point of the bricks
+ * touched.
+ *
+ *     struct host_judge judge;
+ *     if (host_judge_make(&judge, &sites, &error) != 0)
+ *         return error.code;
+ *     if (!host_judge_tetrahedron(&judge, tets.v[i]))
+ *         puts("some point lies inside");
+ *     host_judge_free(&judge);
+ */
+#ifndef HOST_JUDGE_H
+#define HOST_JUDGE_H
+
+#include "check.h"
+
+/* Boxes lo[3], hi[3] of bricks, and of 64 bricks each, as arrays for each
+ * coordinate.  A judge may be asked from several threads at once. */
+struct host_judge {
+    struct host_sites sites;
+    double *side[6]; /* [bricks + groups] each: lo x y z, hi x y z */
+    uint64_t bricks, groups;
+};
+
+int host_judge_make(struct host_judge *judge, const struct host_sites *sites,
+                    struct host_error *error);
+void host_judge_free(struct host_judge *judge);
+
+/* Whether t is positive and no point lies inside its sphere (tie rule): it
+ * belongs to the Delaunay triangulation.  The numbers must be vertices. */
+bool host_judge_tetrahedron(const struct host_judge *judge,
+                            const uint32_t t[4]);
+
+/* The vertex whose tetrahedron with facet f is Delaunay if any is, on the
+ * positive side of f (orient3d(f0, f1, f2, apex) > 0), or INCODE_NONE: no point
+ * is there, and f lies on the hull. */
+uint32_t host_judge_apex(const struct host_judge *judge, const uint32_t f[3]);
+
+/* Whether any point lies on the positive side of f. */
+bool host_judge_beyond(const struct host_judge *judge, const uint32_t f[3]);
+
+#endif

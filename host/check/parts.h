@@ -1,0 +1,90 @@
+/* What the parts of the check share: the tetrahedra cut into ranges, one a
+ * thread, what is known of vertices, and the faults found. */
+#ifndef HOST_CHECK_PARTS_H
+#define HOST_CHECK_PARTS_H
+
+#include <pthread.h>
+
+#include "check.h"
+#include "hull.h"
+#include "incode/predicates/predicates.h"
+
+enum {
+    CHECK_PARTS_MAX = 16,
+    CHECK_THREADS_MAX = 4,   /* a thread's own arrays take memory */
+    CHECK_VERTICES = 1 << 12 /* a turn of a thread */
+};
+
+/* The tetrahedra [first, last), of which `listed` (if there is a list) are
+ * candidates: those with a facet that may belong to the hull. */
+struct check_part {
+    uint64_t first, last;
+    uint64_t *sum;  /* [count] of a vertex: of hashes, bit 0 set: it is used */
+    uint32_t *list; /* less `first` */
+    uint64_t listed;
+    uint32_t *end;   /* [count + 1] of the entries of a vertex, see twins.c */
+    uint32_t *entry; /* less `first` */
+};
+
+struct check_fault {
+    uint64_t tet[2];
+    uint32_t vertex[5];
+    uint8_t tets, vertices;
+    const char *subject, *what;
+};
+
+struct check {
+    const struct host_sites *sites;
+    const struct host_tetrahedra *tets;
+    enum host_check_depth depth;
+    struct host_check_report *report;
+    unsigned parts;
+    struct check_part part[CHECK_PARTS_MAX];
+    uint64_t key[2];
+    uint64_t *mark; /* [count] keyed value of a vertex; 0: it is none */
+    uint8_t *hot;   /* [count] 1: its facets do not cancel */
+    uint64_t *bad;  /* a bit a tetrahedron: it is left out */
+    bool any_bad, any_unused;
+    struct host_hull hull;
+    uint64_t next;        /* first vertex or facet that no thread has taken */
+    pthread_mutex_t lock; /* of what follows, and of the hull */
+    struct check_fault *fault;
+    uint64_t faults_kept, faults_room, faults_max;
+    struct host_error *error;
+};
+
+/* From any thread.  Tetrahedra and vertices are copied. */
+void check_fault(struct check *c, const char *subject, const char *what,
+                 const uint64_t *tets, int tet_count, const uint32_t *vertices,
+                 int count);
+
+/* The first error stands. */
+void check_fail(struct check *c, const struct host_error *error);
+
+static inline bool check_is_bad(const struct check *c, uint64_t tet)
+{
+    return c->any_bad && (c->bad[tet / 64] >> tet % 64 & 1) != 0;
+}
+
+/* The first of the next `turn` items of `total`; total where there are none. */
+static inline uint64_t check_take(struct check *c, uint64_t turn,
+                                  uint64_t total)
+{
+    uint64_t i = __atomic_fetch_add(&c->next, turn, __ATOMIC_RELAXED);
+    return i < total ? i : total;
+}
+
+static inline uint64_t check_end(uint64_t first, uint64_t turn, uint64_t total)
+{
+    return total - first < turn ? total : first + turn;
+}
+
+/* sums.c: leaves out tetrahedra that are not positive, finds unused vertices,
+ * and which vertices are hot. */
+int check_sums(struct check *c);
+
+/* twins.c: pairs the facets of all tetrahedra, or of those that are listed, and
+ * adds what is left to the hull. */
+int check_twins(struct check *c);
+
+#endif

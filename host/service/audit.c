@@ -1,0 +1,480 @@
+#include "audit.h"
+
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "host/check/judge.h"
+#include "host/service/strategies/strategies.h"
+#include "notices.h"
+#include "service.h"
+
+/* So many tetrahedra are checked at once: in some milliseconds. */
+enum { SMALL = 1 << 19 };
+
+/* --- the check, on a thread of its own ------------------------------------ */
+
+/* What one analysis needs. */
+struct inquiry {
+    struct host_service *s;
+    struct host_audit *audit;
+    struct host_judge judge;
+    unsigned named; /* nodes */
+};
+
+static void note_place(void *context, const uint64_t *tets, int tet_count,
+                       const uint32_t *vertices, int count, const char *what)
+{
+    struct host_audit *a = context;
+    (void)what;
+    if (a->places == HOST_AUDIT_PLACES) {
+        return;
+    }
+    struct host_audit_place *place = &a->place[a->places++];
+    memset(place, 0, sizeof *place);
+    for (int i = 0; i < tet_count && i < 2; i++) {
+        place->tet[place->tets++] = tets[i];
+    }
+    for (int i = 0; i < count && i < 5; i++) {
+        place->vertex[place->vertices++] = vertices[i];
+    }
+}
+
+static bool is_point(const struct host_order *order, uint32_t vertex)
+{
+    uint32_t brick = vertex / INCODE_BRICK_POINTS;
+    return brick < order->bricks &&
+           vertex % INCODE_BRICK_POINTS < order->fill[brick];
+}
+
+static void redo(struct inquiry *q, uint32_t vertex)
+{
+    if (is_point(q->s->order, vertex)) {
+        q->audit->redo[vertex / INCODE_BRICK_POINTS] = 1;
+    }
+}
+
+/* The node is at fault; what: about a tetrahedron of these vertices. */
+static void accuse(struct inquiry *q, uint32_t node, const char *what,
+                   const uint32_t v[4])
+{
+    struct host_audit *a = q->audit;
+    const uint32_t *row = q->s->order->row;
+    if (a->guilty[node] != 0) {
+        return;
+    }
+    a->guilty[node] = 1;
+    if (q->named++ == 0) {
+        a->first = node;
+        (void)snprintf(a->why, sizeof a->why,
+                       "%s the tetrahedron of rows %u, %u, %u and %u", what,
+                       row[v[0]], row[v[1]], row[v[2]], row[v[3]]);
+    }
+}
+
+static uint32_t owner(const struct inquiry *q, const uint32_t v[4])
+{
+    return host_ledger_owner(&q->s->ledger, q->s->order, v);
+}
+
+/* Something is wrong with the work on a brick: with that of the node that
+ * committed it, where it worked alone. */
+static void doubt_brick(struct inquiry *q, uint32_t brick, const char *what,
+                        const uint32_t v[4])
+{
+    uint16_t by = q->s->ledger.by[brick];
+    if ((by & HOST_LEDGER_ALONE) != 0) {
+        accuse(q, by & (HOST_LEDGER_ALONE - 1u), what, v);
+    }
+    q->audit->redo[brick] = 1;
+}
+
+static int compare_tets(const void *p, const void *q)
+{
+    uint64_t a = *(const uint64_t *)p, b = *(const uint64_t *)q;
+    return a < b ? -1 : a > b;
+}
+
+/* The tetrahedra of all places, each once, ascending; returns how many. */
+static unsigned collect(const struct host_audit *a,
+                        uint64_t tets[2 * HOST_AUDIT_PLACES])
+{
+    unsigned count = 0, kept = 0;
+    for (unsigned i = 0; i < a->places; i++) {
+        for (unsigned k = 0; k < a->place[i].tets; k++) {
+            tets[count++] = a->place[i].tet[k];
+        }
+    }
+    qsort(tets, count, sizeof tets[0], compare_tets);
+    for (unsigned i = 0; i < count; i++) {
+        if (kept == 0 || tets[kept - 1] != tets[i]) {
+            tets[kept++] = tets[i];
+        }
+    }
+    return kept;
+}
+
+static bool has_vertex(const uint32_t v[4], uint32_t vertex)
+{
+    return v[0] == vertex || v[1] == vertex || v[2] == vertex || v[3] == vertex;
+}
+
+static bool same_vertices(const uint32_t v[4], const uint32_t w[4])
+{
+    return has_vertex(v, w[0]) && has_vertex(v, w[1]) && has_vertex(v, w[2]) &&
+           has_vertex(v, w[3]);
+}
+
+/* --- what is missing ------------------------------------------------------ */
+
+/* Right tetrahedra beyond facets of right ones at faults, that may be missing:
+ * a table by hash, so that one pass over the result tells which are there. */
+enum { MISSING_MAX = 8 * HOST_AUDIT_PLACES, TABLE = 4 * MISSING_MAX };
+
+struct missing {
+    uint32_t v[MISSING_MAX][4];
+    bool there[MISSING_MAX];
+    unsigned count;
+    uint16_t next[MISSING_MAX], head[TABLE]; /* chains; MISSING_MAX: the end */
+};
+
+/* The same for every order of the vertices. */
+static uint32_t hash_of(const uint32_t v[4])
+{
+    uint32_t sum = 0;
+    for (int i = 0; i < 4; i++) {
+        uint32_t mixed = (v[i] + 1) * UINT32_C(2654435761);
+        sum += mixed ^ mixed >> 15;
+    }
+    return (sum ^ sum >> 15) % TABLE;
+}
+
+static void add_missing(struct missing *m, const uint32_t v[4])
+{
+    uint32_t at = hash_of(v);
+    for (uint16_t i = m->head[at]; i < MISSING_MAX; i = m->next[i]) {
+        if (same_vertices(m->v[i], v)) {
+            return;
+        }
+    }
+    if (m->count < MISSING_MAX) {
+        memcpy(m->v[m->count], v, sizeof m->v[0]);
+        m->there[m->count] = false;
+        m->next[m->count] = m->head[at];
+        m->head[at] = (uint16_t)m->count++;
+    }
+}
+
+static void look_beyond(const struct inquiry *q, struct missing *m,
+                        const uint32_t t[4])
+{
+    static const uint8_t outward[4][3] = {
+        {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    for (int i = 0; i < 4; i++) {
+        uint32_t beyond[4] = {t[outward[i][0]], t[outward[i][1]],
+                              t[outward[i][2]], 0};
+        beyond[3] = host_judge_apex(&q->judge, beyond);
+        if (beyond[3] != INCODE_NONE &&
+            host_judge_tetrahedron(&q->judge, beyond)) {
+            add_missing(m, beyond);
+        }
+    }
+}
+
+/* Those that are nowhere in the result were left out by the node that committed
+ * their brick. */
+static void judge_missing(struct inquiry *q, struct missing *m)
+{
+    const struct host_tetrahedra *all = q->s->tets;
+    for (uint64_t k = 0; m->count > 0 && k < all->count; k++) {
+        for (uint16_t i = m->head[hash_of(all->v[k])]; i < MISSING_MAX;
+             i = m->next[i]) {
+            m->there[i] |= same_vertices(m->v[i], all->v[k]);
+        }
+    }
+    for (unsigned i = 0; i < m->count; i++) {
+        if (!m->there[i]) {
+            doubt_brick(q, owner(q, m->v[i]), "it left out", m->v[i]);
+        }
+    }
+}
+
+/* --- what is there -------------------------------------------------------- */
+
+static bool is_judged(const struct inquiry *q, const uint32_t t[4])
+{
+    bool points = true;
+    for (int i = 0; i < 4; i++) {
+        points = points && is_point(q->s->order, t[i]);
+    }
+    return points && host_judge_tetrahedron(&q->judge, t);
+}
+
+/* Tetrahedron i of those at faults. */
+static void judge_tet(struct inquiry *q, struct missing *m,
+                      const uint64_t *tets, unsigned i)
+{
+    const uint32_t *t = q->s->tets->v[tets[i]];
+    if (!is_judged(q, t)) {
+        accuse(q, host_ledger_finder(&q->s->ledger, tets[i]),
+               "it sent, and that is not Delaunay,", t);
+        q->audit->redo[owner(q, t)] = 1;
+        return;
+    }
+    for (unsigned k = 0; k < i; k++) {
+        if (same_vertices(q->s->tets->v[tets[k]], t)) {
+            doubt_brick(q, owner(q, t), "it sent twice", t);
+        }
+    }
+    look_beyond(q, m, t);
+}
+
+static void judge_places(struct inquiry *q, struct missing *m)
+{
+    uint64_t tets[2 * HOST_AUDIT_PLACES];
+    unsigned count = collect(q->audit, tets);
+    for (unsigned i = 0; i < count; i++) {
+        judge_tet(q, m, tets, i);
+        for (int k = 0; k < 4; k++) {
+            redo(q, q->s->tets->v[tets[i]][k]);
+        }
+    }
+    for (unsigned p = 0; p < q->audit->places; p++) {
+        for (unsigned i = 0; i < q->audit->place[p].vertices; i++) {
+            redo(q, q->audit->place[p].vertex[i]);
+        }
+    }
+    judge_missing(q, m);
+}
+
+/* --- what is to be done again --------------------------------------------- */
+
+/* Of nodes at fault nothing is trusted. */
+static void redo_guilty(struct inquiry *q)
+{
+    const struct host_service *s = q->s;
+    const struct host_ledger *ledger = &s->ledger;
+    for (uint32_t b = 0; b < ledger->bricks; b++) {
+        q->audit->redo[b] |=
+            q->audit->guilty[ledger->by[b] & (HOST_LEDGER_ALONE - 1u)];
+    }
+    uint64_t i = 0;
+    for (size_t r = 0; r < ledger->runs; r++) {
+        bool guilty = q->audit->guilty[ledger->found[r].node] != 0;
+        for (; i < ledger->found[r].end; i++) {
+            if (guilty) {
+                q->audit->redo[owner(q, s->tets->v[i])] = 1;
+            }
+        }
+    }
+}
+
+/* The first time, what is near; then all that nodes did together; at last, or
+ * where nothing is near, everything. */
+static void redo_unclear(struct inquiry *q)
+{
+    const struct host_ledger *ledger = &q->s->ledger;
+    struct host_audit *a = q->audit;
+    uint32_t marked = 0;
+    if (a->unclear++ > 0) {
+        for (uint32_t b = 0; b < ledger->bricks; b++) {
+            a->redo[b] |= (ledger->by[b] & HOST_LEDGER_ALONE) == 0;
+        }
+    }
+    for (uint32_t b = 0; b < ledger->bricks; b++) {
+        marked += a->redo[b];
+    }
+    if (marked == 0 || a->unclear > 2) {
+        memset(a->redo, 1, ledger->bricks);
+    }
+}
+
+static void analyse(struct host_service *s, struct host_audit *a)
+{
+    struct inquiry q = {.s = s, .audit = a};
+    const struct host_sites sites = host_sites_of_order(s->order);
+    struct missing *missing = malloc(sizeof *missing);
+    a->redo = calloc(s->ledger.bricks, 1);
+    a->guilty = calloc(s->machine->nodes, 1);
+    if (a->redo == NULL || a->guilty == NULL || missing == NULL) {
+        host_fail_memory(&a->error, "the search for the faulty node");
+    } else if (host_judge_make(&q.judge, &sites, &a->error) == 0) {
+        missing->count = 0;
+        for (unsigned i = 0; i < TABLE; i++) {
+            missing->head[i] = MISSING_MAX;
+        }
+        judge_places(&q, missing);
+        host_judge_free(&q.judge);
+        if (q.named > 0) {
+            redo_guilty(&q);
+        } else {
+            redo_unclear(&q);
+        }
+    }
+    free(missing);
+}
+
+static void check(void *argument)
+{
+    struct host_service *s = argument;
+    struct host_audit *a = &s->audit;
+    const struct host_sites sites = host_sites_of_order(s->order);
+    const struct host_check_listener listener = {a, HOST_AUDIT_PLACES,
+                                                 note_place};
+    struct host_error failed = {0};
+    (void)host_check(&sites, s->tets,
+                     a->exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING,
+                     &listener, &a->report, &failed);
+    a->error = failed;
+    if (failed.code == HOST_UNVERIFIED) {
+        a->error.code = 0;
+        analyse(s, a);
+        a->error.code = a->error.code == 0 ? HOST_UNVERIFIED : a->error.code;
+    }
+    __atomic_store_n(&a->ended, true, __ATOMIC_RELEASE);
+}
+
+/* --- what follows --------------------------------------------------------- */
+
+static void begin(struct host_service *s)
+{
+    struct host_audit *a = &s->audit;
+    a->exact =
+        s->verifying == HOST_VERIFY_ALWAYS ||
+        (s->verifying == HOST_VERIFY_WHERE_DUE && (s->foreign || a->lost_work));
+    a->places = 0;
+    a->ended = false;
+    a->why[0] = '\0';
+    a->state = HOST_AUDIT_RUNS;
+    a->begun_us = s->machine->now_us(s->machine->context);
+    if (s->machine->virtual_time || (!a->exact && s->tets->count < SMALL)) {
+        check(s);
+    } else {
+        host_fork_start(&a->fork, check, s);
+    }
+}
+
+void host_audit_alone(struct host_service *service)
+{
+    service->strategy = &host_redo;
+    service->ledger.alone = true;
+}
+
+void host_audit_exclude(struct host_service *service, unsigned node,
+                        const char *what)
+{
+    struct host_service *s = service;
+    s->node[node].left = s->node[node].aside = true;
+    s->audit.lost_work = true;
+    s->blamed = node;
+    s->excluded++;
+    s->loss = true;
+    host_notice(s, node,
+                "%s; it is excluded, and other nodes do its work again; look "
+                "after that node",
+                what);
+}
+
+bool host_audit_is_other(const struct host_service *service, unsigned node)
+{
+    const struct host_service *s = service;
+    const uint8_t *guilty = s->audit.guilty;
+    bool other = false;
+    for (unsigned i = 0; i < s->machine->nodes && !other; i++) {
+        other = i != node && !s->work.lost[i] && !s->node[i].aside &&
+                (guilty == NULL || guilty[i] == 0);
+    }
+    return other;
+}
+
+static int give_up(struct host_service *s, struct host_error *error)
+{
+    const struct host_audit *a = &s->audit;
+    if (a->why[0] != '\0') {
+        return host_fail(error, HOST_UNVERIFIED,
+                         "node %u: its result is wrong: %s; no other node is "
+                         "left to do its bricks again; look after that node, "
+                         "and run again",
+                         a->first, a->why);
+    }
+    return host_fail(error, HOST_UNVERIFIED,
+                     "check: %s; doing it again did not help, and no node "
+                     "could be found at fault; please report this with the "
+                     "points",
+                     a->report.text);
+}
+
+static int begin_again(struct host_service *s, struct host_error *error)
+{
+    struct host_audit *a = &s->audit;
+    char what[HOST_AUDIT_WHY_BYTES + 40];
+    a->failed++;
+    if (!host_audit_is_other(s, UINT_MAX) ||
+        a->failed > s->machine->nodes + 4u) {
+        return give_up(s, error);
+    }
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        if (a->guilty[i] != 0) {
+            snprintf(what, sizeof what, "its result is wrong%s%s",
+                     i == a->first ? ": " : "", i == a->first ? a->why : "");
+            host_audit_exclude(s, i, what);
+        }
+    }
+    if (a->why[0] == '\0') {
+        host_notice_line(s, "the check of the result failed, and the bricks "
+                            "concerned are done again, each by one node");
+    }
+    for (uint32_t b = 0; b < s->ledger.bricks; b++) {
+        if (a->redo[b] != 0) {
+            host_ledger_reopen(&s->ledger, b);
+        }
+    }
+    host_audit_alone(s);
+    a->lost_work = true;
+    a->state = HOST_AUDIT_DUE;
+    s->loss = true;
+    return 0;
+}
+
+static void free_verdict(struct host_audit *a)
+{
+    free(a->redo);
+    free(a->guilty);
+    a->redo = a->guilty = NULL;
+}
+
+int host_audit_step(struct host_service *service, bool *passed,
+                    struct host_error *error)
+{
+    struct host_service *s = service;
+    struct host_audit *a = &s->audit;
+    int status = 0;
+    *passed = a->state == HOST_AUDIT_PASSED;
+    if (a->state == HOST_AUDIT_DUE) {
+        begin(s);
+    }
+    if (a->state != HOST_AUDIT_RUNS ||
+        !__atomic_load_n(&a->ended, __ATOMIC_ACQUIRE)) {
+        return 0;
+    }
+    host_fork_join(&a->fork);
+    a->spent_us += s->machine->now_us(s->machine->context) - a->begun_us;
+    if (a->error.code == 0) {
+        a->state = HOST_AUDIT_PASSED;
+        *passed = true;
+    } else if (a->error.code == HOST_UNVERIFIED) {
+        status = begin_again(s, error);
+    } else {
+        *error = a->error;
+        status = error->code;
+    }
+    free_verdict(a);
+    return status;
+}
+
+void host_audit_free(struct host_audit *audit)
+{
+    host_fork_join(&audit->fork);
+    free_verdict(audit);
+}

@@ -1,0 +1,80 @@
+/* Pages with their host's tag: a keyed checksum of a page's number, size and
+ * bytes.  The host draws the key for each run, and the setup carries it.  The
+ * tag travels with the page, is kept with it, and is sent on with it: no node
+ * makes one.  So a node notices a page that was altered at whoever keeps it, or
+ * on the way, and reports to the host which node sent it.
+ *
+ * This is a guard against faulty nodes.  Each node knows the key, so a node
+ * that is programmed to forge pages can.
+ *
+ * The checksum is HalfSipHash-2-4 with a result of 64 bits (Aumasson and
+ * Bernstein, SipHash: a fast short-input PRF, 2012, in its form of 32 bits):
+ * additions, rotations and exclusive ors alone.
+ *
+ * Memory: the struct.  Work: a pass over the page: about 4,700 cycles on a
+ * processor of a PC, 10,000 on a Cortex-M3.
+ *
+ *     size = node_page_seal(&message, setup.page_key, bytes);   // the host
+ *     node_page_check_init(&check, &setup, &counted, &fault);   // a node
+ *     if (node_page_check_take(&check, &message, &page))
+ *         use(page.number, page.bytes, page.size);
+ *     sent = node_page_check_send(&check);   // and so in every step
+ */
+#ifndef NODE_PAGE_CHECK_H
+#define NODE_PAGE_CHECK_H
+
+#include <stdbool.h>
+
+#include "counted.h"
+#include "fault.h"
+#include "message.h"
+
+/* HalfSipHash-2-4 of some words, then some bytes. */
+uint64_t node_half_siphash(uint64_t key, const uint32_t *words, size_t count,
+                           const uint8_t *bytes, size_t size);
+
+/* Of head.page and `bytes` bytes of data, which the caller has filled in: makes
+ * the tag.  The size of the message. */
+size_t node_page_seal(struct node_page_message *message, uint64_t key,
+                      size_t bytes);
+
+/* A page that has come; bytes: of its message. */
+struct node_page {
+    uint32_t number;
+    uint16_t source; /* of the message */
+    uint64_t tag;
+    const uint8_t *bytes;
+    size_t size;
+};
+
+struct node_page_check {
+    struct node_counted *counted;
+    struct node_fault *fault;
+    uint64_t key;
+    bool owed; /* the host is to learn of: */
+    struct node_wrong_page_message wrong;
+};
+
+/* counted and fault stay. */
+void node_page_check_init(struct node_page_check *check,
+                          const struct node_setup_message *setup,
+                          struct node_counted *counted,
+                          struct node_fault *fault);
+
+/* NODE_PAGE or NODE_PAGE_TO_ALL: true with *page, as the host has made it.
+ * False: it was altered, and will be reported, with page->number as it came; or
+ * it was too short to be read, which is a fault where the host has sent it, and
+ * page->number is INCODE_NONE. */
+bool node_page_check_take(struct node_page_check *check,
+                          const struct cube_message *message,
+                          struct node_page *page);
+
+/* The node has sent a page that it should not have sent: the host will be told.
+ * Of several reports that wait, the first one stays. */
+void node_page_check_report(struct node_page_check *check, uint16_t sender,
+                            uint32_t page);
+
+/* Sends the report that waits, if the link has room; how many messages. */
+unsigned node_page_check_send(struct node_page_check *check);
+
+#endif
