@@ -177,12 +177,15 @@ static bool read_results(struct host_liar *l, const uint8_t *data, size_t size)
     if (size < head) {
         return false;
     }
-    node_result_open(&reader, data + head, size - head, UINT32_MAX);
+    node_result_open(&reader, data + head, size - head, UINT32_MAX,
+                     HOST_LIAR_SELF, HOST_LIAR_SELF);
     while (event == NODE_RESULT_ROWS || event == NODE_RESULT_COMMIT) {
         size_t count;
         event = node_result_read(&reader, l->row + l->rows,
                                  HOST_LIAR_ROWS - l->rows, &count);
-        l->rows += (uint32_t)count;
+        for (; count > 0; count--) {
+            l->finder[l->rows++] = (uint16_t)reader.finder;
+        }
         if (event == NODE_RESULT_COMMIT) {
             l->commit[l->commits].after = l->rows;
             l->commit[l->commits++].brick = reader.brick;
@@ -206,11 +209,12 @@ static void end_star(struct stars *s)
     s->count = 0;
 }
 
-static void put_row(struct stars *s, const uint32_t v[4])
+static void put_row(struct stars *s, const uint32_t v[4], uint16_t finder)
 {
-    if (v[0] != s->vertex || s->count == STAR) {
+    if (v[0] != s->vertex || s->count == STAR || finder != s->writer.finder) {
         end_star(s);
     }
+    s->full = s->full || !node_result_finder(&s->writer, finder);
     s->vertex = v[0];
     memcpy(s->apex[s->count++], v + 1, sizeof s->apex[0]);
 }
@@ -228,7 +232,8 @@ static void begin_results(struct host_liar *l, struct stars *s,
     memcpy(l->out, data, head);
     s->vertex = s->count = 0;
     s->full = false;
-    node_result_begin(&s->writer, l->out + head, CUBE_PAYLOAD_MAX - head);
+    node_result_begin(&s->writer, l->out + head, CUBE_PAYLOAD_MAX - head,
+                      HOST_LIAR_SELF);
 }
 
 /* The size of what is written; 0: it did not fit. */
@@ -254,7 +259,7 @@ static size_t alter_results(struct host_liar *l, const uint8_t *data,
         }
         uint32_t count = i < l->rows ? say(l, &table, i, said) : 0;
         for (uint32_t k = 0; k < count; k++) {
-            put_row(&stars, said[k]);
+            put_row(&stars, said[k], l->finder[i]);
         }
     }
     memcpy(l->kept, l->row[draw(l, 0, l->rows - 1)], sizeof l->kept);
@@ -299,9 +304,10 @@ static void alter_answers(struct host_liar *l, const uint8_t *data, size_t size,
                           size_t at)
 {
     const size_t head = offsetof(struct incode_answers, v);
-    uint32_t kind, count;
+    uint16_t kind; /* in a list, the low half of it */
+    uint32_t count;
     memcpy(&kind, data, sizeof kind);
-    memcpy(&count, data + sizeof kind, sizeof count);
+    memcpy(&count, data + offsetof(struct incode_answers, count), sizeof count);
     if (lies_of_findings(l) && kind != INCODE_LIST_COUNT && count > 0 &&
         count <= INCODE_LIST_MAX && size == incode_answers_bytes(count)) {
         struct table t = table_of(l, data, head, count, 4);
@@ -382,14 +388,13 @@ static uint32_t points_of(const struct incode_brick *brick)
     return last + 1;
 }
 
-/* Moves a point of a brick: by a rounding, to another point's coordinate, or
- * far away. */
+/* Moves a point of a brick, whose tag stays as it is: by a rounding, to another
+ * point's coordinate, or far away. */
 static void alter_page(struct host_liar *l, size_t size)
 {
     struct incode_brick brick;
-    const size_t head = size - sizeof brick;
-    if (size < sizeof brick || head >= INCODE_PAGE_BYTES - sizeof brick ||
-        !is_due(l)) {
+    const size_t head = offsetof(struct node_page_message, data);
+    if (size != head + sizeof brick || !is_due(l)) {
         return;
     }
     memcpy(&brick, l->out + head, sizeof brick);
@@ -472,7 +477,7 @@ static size_t flood(struct host_liar *l, const struct node_counted *counted,
     while (stars.writer.size + (STAR + 2) * NODE_RESULT_TETRAHEDRON_MAX <=
            stars.writer.size_max) {
         do {
-            put_row(&stars, l->kept);
+            put_row(&stars, l->kept, HOST_LIAR_SELF);
             l->pending++;
         } while (stars.count < STAR);
         end_star(&stars);

@@ -4,7 +4,7 @@
  * ways of enum host_lie.  The simulator's nodes lie by it, and the processes of
  * tests/system/liar.
  *
- * Memory: the struct, 24 KB.  Work: a pass over each message that may be
+ * Memory: the struct, 16 KB.  Work: a pass over each message that may be
  * altered.
  *
  *     struct host_liar liar = {.way = HOST_LIE_DROP, .one_in = 500};
@@ -37,7 +37,9 @@ extern const char *const host_lies[HOST_LIES];
 
 enum {
     HOST_LIAR_ROWS = CUBE_PAYLOAD_MAX / 4 + 1, /* of four bytes at least */
-    HOST_LIAR_COMMITS = CUBE_PAYLOAD_MAX / 2   /* of two */
+    HOST_LIAR_COMMITS = CUBE_PAYLOAD_MAX / 2,  /* of two */
+    HOST_LIAR_SELF = UINT16_MAX                /* the node that lies, where it
+                                                  need not know its number */
 };
 
 /* Zeros but for the first three, which the caller gives. */
@@ -54,6 +56,7 @@ struct host_liar {
     uint32_t kept[4];
     /* The message at hand, as it is read and as it leaves. */
     uint32_t row[HOST_LIAR_ROWS][4];
+    uint16_t finder[HOST_LIAR_ROWS]; /* of a result's; HOST_LIAR_SELF */
     struct {
         uint32_t after, brick; /* rows before it */
     } commit[HOST_LIAR_COMMITS];

@@ -126,7 +126,7 @@ static void draw_bare(struct host_sim_plan *p)
 /* What is left of the cube can do the work without it. */
 static void draw_liar(struct host_sim_plan *p)
 {
-    uint64_t state = sim_seed(p->seed, 90);
+    uint64_t state = sim_seed(p->seed, 91);
     unsigned others = 1u + p->wanted[HOST_SIM_DEAD_NODE] +
                       p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_IDLER];
     if (p->nodes <= others || p->nodes > 64 ||
@@ -135,7 +135,7 @@ static void draw_liar(struct host_sim_plan *p)
     }
     p->wanted[HOST_SIM_LIAR] = true;
     p->liar.node = (unsigned)host_sim_draw(&state, 0, p->nodes - 1);
-    p->liar.way = (enum host_lie)host_sim_draw(&state, 0, HOST_LIE_LOAN);
+    p->liar.way = (enum host_lie)host_sim_draw(&state, 0, HOST_LIES - 1);
     p->liar.one_in = (uint32_t)host_sim_draw_log(&state, 1, 1000);
 }
 

@@ -20,6 +20,7 @@ enum {
     MESSAGES = 200,
     ONE_IN = 5,
     LISTED = 20, /* rows of lists, answers and loans */
+    SELF = 1,
     PEER = 3
 };
 
@@ -69,6 +70,12 @@ static void row_of(uint32_t k, uint32_t i, uint32_t v[4])
     }
 }
 
+/* Every fourth star has been found by another node. */
+static uint16_t finder_of(uint32_t star)
+{
+    return star % 4 == 2 ? PEER : SELF;
+}
+
 /* Results with a commit behind each second star; their size. */
 static size_t results(uint32_t k, uint8_t data[CUBE_PAYLOAD_MAX + 4])
 {
@@ -76,13 +83,14 @@ static size_t results(uint32_t k, uint8_t data[CUBE_PAYLOAD_MAX + 4])
     struct node_result_writer writer;
     memcpy(data, &head, sizeof head);
     node_result_begin(&writer, data + sizeof head,
-                      CUBE_PAYLOAD_MAX - sizeof head);
+                      CUBE_PAYLOAD_MAX - sizeof head, SELF);
     for (uint32_t star = 0; star < STARS; star++) {
         uint32_t apexes[EACH][3], v[4] = {0};
         for (uint32_t i = 0; i < EACH; i++) {
             row_of(k, star * EACH + i, v);
             memcpy(apexes[i], v + 1, sizeof apexes[i]);
         }
+        assert_int_equal(node_result_finder(&writer, finder_of(star)), 1);
         assert_int_equal(node_result_star(&writer, v[0], apexes, EACH), EACH);
         if (star % 2 == 1) {
             assert_int_equal(node_result_commit(&writer, k), 1);
@@ -92,7 +100,7 @@ static size_t results(uint32_t k, uint8_t data[CUBE_PAYLOAD_MAX + 4])
 }
 
 struct seen {
-    uint32_t row[2 * ROWS][4];
+    uint32_t row[2 * ROWS][4], finder[2 * ROWS];
     size_t rows, commits;
 };
 
@@ -104,12 +112,15 @@ static void read_back(const uint8_t *data, size_t size, uint32_t k,
     size_t count;
     seen->rows = seen->commits = 0;
     node_result_open(&reader, data + sizeof(struct node_result_header),
-                     size - sizeof(struct node_result_header), UINT32_MAX);
+                     size - sizeof(struct node_result_header), UINT32_MAX, SELF,
+                     2 * PEER);
     do {
         event = node_result_read(&reader, seen->row + seen->rows,
                                  2 * ROWS - seen->rows, &count);
         assert_int_not_equal(event, NODE_RESULT_GARBAGE);
-        seen->rows += count;
+        for (; count > 0; count--) {
+            seen->finder[seen->rows++] = reader.finder;
+        }
         if (event == NODE_RESULT_COMMIT) {
             assert_int_equal(reader.brick, k);
             seen->commits++;
@@ -158,7 +169,10 @@ static void results_are_altered(void **unused)
             read_back(liar.out, size, k, &seen);
             int strange = 0, said = (int)liar.pending;
             for (size_t i = 0; i < seen.rows; i++) {
+                uint32_t star = seen.row[i][0] % 64;
                 strange += times(k, seen.row[i]) == 0;
+                assert_true(seen.finder[i] == finder_of(star) ||
+                            ways[w].way == HOST_LIE_REPEAT);
             }
             assert_int_equal(seen.commits, STARS / 2);
             assert_int_equal((int)seen.rows, ROWS + said * ways[w].more);
@@ -198,7 +212,7 @@ static void what_does_not_fit_is_not_told(void **unused)
     uint32_t v = 5;
     size_t head = sizeof(struct node_result_header);
     (void)unused;
-    node_result_begin(&writer, data + head, CUBE_PAYLOAD_MAX - head);
+    node_result_begin(&writer, data + head, CUBE_PAYLOAD_MAX - head, SELF);
     const uint32_t far[1][3] = {{1u << 30, 1u << 31, 3u << 30}};
     while (node_result_star(&writer, v, far, 1) == 1) {
         v += 1u << 29;
@@ -249,7 +263,7 @@ static unsigned differ(uint8_t type, const void *data, size_t size, size_t at,
 
 static struct incode_answers answers_of(void)
 {
-    struct incode_answers answers = {INCODE_LIST_FACES, LISTED, {{0}}};
+    struct incode_answers answers = {INCODE_LIST_FACES, PEER, LISTED, {{0}}};
     fill(answers.v[0], LISTED, 4);
     return answers;
 }
@@ -360,8 +374,9 @@ static void shared_ones_are_altered(void **unused)
     }
 }
 
-static size_t page_bytes(uint8_t *data, size_t head, size_t bytes)
+static size_t page_bytes(uint8_t *data, size_t bytes)
 {
+    const size_t head = sizeof(struct node_page_head);
     for (size_t i = 0; i < bytes / sizeof(double); i++) {
         double x = i % INCODE_BRICK_POINTS < 10 ? 1 + (double)i / 64 : 7;
         memcpy(data + head + i * sizeof x, &x, sizeof x);
@@ -375,11 +390,11 @@ static void pages_are_altered(void **unused)
 {
     uint8_t data[CUBE_PAYLOAD_MAX] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
     unsigned kinds[3] = {0}, lies = 0;
+    const size_t head = sizeof(struct node_page_head);
     (void)unused;
     begin(HOST_LIE_PAGE, 1);
     for (unsigned k = 0; k < MESSAGES; k++) {
-        size_t head = k % 2 == 0 ? 4 : 12;
-        size_t size = page_bytes(data, head, INCODE_BRICK_BYTES);
+        size_t size = page_bytes(data, INCODE_BRICK_BYTES);
         assert_int_equal(host_liar_alter(&liar, PEER, NODE_PAGE, data, size),
                          size);
         assert_memory_equal(liar.out, data, head);
@@ -397,10 +412,10 @@ static void pages_are_altered(void **unused)
     }
     assert_true(lies > MESSAGES / 2);
     assert_true(kinds[0] > 9 && kinds[1] > 9 && kinds[2] > 9);
-    size_t size = page_bytes(data, 4, INCODE_BRICK_BYTES);
+    size_t size = page_bytes(data, INCODE_BRICK_BYTES);
     (void)host_liar_alter(&liar, CUBE_HOST, NODE_PAGE, data, size);
     assert_memory_equal(liar.out, data, size);
-    size = page_bytes(data, 4, INCODE_PAGE_BYTES);
+    size = page_bytes(data, INCODE_PAGE_BYTES);
     (void)host_liar_alter(&liar, PEER, NODE_PAGE, data, size);
     assert_memory_equal(liar.out, data, size);
 }
