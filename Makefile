@@ -255,6 +255,15 @@ $(tools): $(BUILD)/tests/%: $(obj)/tests/system/%.o
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(tool_libs) -lm -o $@
+# A node program of Linux that lies: tests/system/liar/liar.c.
+liar := $(patsubst %.c,$(BUILD)/node/%.o,host/sim/liar.c \
+	tests/system/liar/liar.c $(wildcard boards/linux/*.c))
+points: $(BUILD)/tests/incode-node-liar
+$(BUILD)/tests/incode-node-liar: $(liar) $(node_objects) $(BUILD)/libcore.a
+	@mkdir -p $(@D)
+	$(say) LINK $@
+	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $(filter %.o,$^) \
+		-Wl,--wrap=node_start $(BUILD)/libcore.a $(NODE_LIBS) -o $@
 # A board's flash chip, as its loader has it.
 $(BUILD)/tests/chip: $(obj)/transport/drivers/sign_sodium.o $(BUILD)/libcore.a
 $(BUILD)/tests/chip: tool_libs = -lsodium

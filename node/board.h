@@ -67,7 +67,8 @@ enum node_reset {
     NODE_RESET_STAY        /* and a loader not to start an image */
 };
 
-struct node_who; /* questions.h */
+struct node_who;     /* questions.h */
+struct node_counted; /* counted.h */
 
 struct node_board {
     void *context;
@@ -99,6 +100,11 @@ struct node_board {
     size_t (*log)(void *context, char *text, size_t size);
     /* Bytes that link d had no room for since the start.  NULL: not known. */
     uint32_t (*lost)(void *context, unsigned d);
+    /* Takes the place of cube_write for all that the node's role sends, and
+     * returns what that does: a test's node that alters its own messages.
+     * NULL: nothing does. */
+    int (*write)(void *context, struct node_counted *counted, uint16_t dest,
+                 uint8_t type, const void *data, size_t size);
     /* The node's end, for the reason of enum node_reset: a fresh start, or
      * where there is a system, an exit with this status. */
     void (*reset)(void *context, int status);

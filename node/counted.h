@@ -19,6 +19,10 @@ struct node_counted {
     uint16_t self;             /* the node's number */
     uint32_t received, sent;   /* from and to the host, in this generation */
     struct incode_pause pause; /* what looks at the links in long work */
+    /* The board's `write` and its context, or NULL: see board.h. */
+    int (*write)(void *context, struct node_counted *counted, uint16_t dest,
+                 uint8_t type, const void *data, size_t size);
+    void *context;
 };
 
 /* As cube_write. */

@@ -104,6 +104,8 @@ struct node *node_start(const struct node_board *board, const char **why)
     node->counted.cube = node->cube;
     node->counted.self = board->identity.self;
     node->counted.pause = node_looks_pause(&node->looks);
+    node->counted.write = board->write;
+    node->counted.context = board->context;
     node_answers_init(&node->answers, board, &node->counted);
     node_pace_init(&node->pace, board->now_us, board->context);
     return node;

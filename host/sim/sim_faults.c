@@ -123,6 +123,22 @@ static void draw_bare(struct host_sim_plan *p)
     }
 }
 
+/* What is left of the cube can do the work without it. */
+static void draw_liar(struct host_sim_plan *p)
+{
+    uint64_t state = sim_seed(p->seed, 91);
+    unsigned others = 1u + p->wanted[HOST_SIM_DEAD_NODE] +
+                      p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_IDLER];
+    if (p->nodes <= others || p->nodes > 64 ||
+        host_sim_draw(&state, 1, 6) > 1) {
+        return;
+    }
+    p->wanted[HOST_SIM_LIAR] = true;
+    p->liar.node = (unsigned)host_sim_draw(&state, 0, p->nodes - 1);
+    p->liar.way = (enum host_lie)host_sim_draw(&state, 0, HOST_LIES - 1);
+    p->liar.one_in = (uint32_t)host_sim_draw_log(&state, 1, 1000);
+}
+
 /* --- what they do --------------------------------------------------------- */
 
 static bool one_way(struct host_sim_run *r, const struct host_sim_event *e)
@@ -269,6 +285,14 @@ static uint64_t count_bare(const struct host_sim_run *r,
     return r->world.learned;
 }
 
+/* Lies that have left the node. */
+static uint64_t count_lies(const struct host_sim_run *r,
+                           enum host_sim_fault kind)
+{
+    (void)kind;
+    return r->liar.told;
+}
+
 /* --- the table ------------------------------------------------------------ */
 
 const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
@@ -300,6 +324,7 @@ const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
     [HOST_SIM_SLOW_NODE] = {"slow-node", .draw = draw_slow_nodes,
                             .count = count_slow_node},
     [HOST_SIM_BARE] = {"bare", .draw = draw_bare, .count = count_bare},
+    [HOST_SIM_LIAR] = {"lie", .draw = draw_liar, .count = count_lies},
 };
 
 /* --- when ----------------------------------------------------------------- */

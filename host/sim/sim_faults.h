@@ -38,6 +38,7 @@ enum host_sim_fault {
     HOST_SIM_SLOW_NODE, /* nodes work long between two looks at their links */
     HOST_SIM_BARE,      /* serial wires, which never close, between boards
                            that ask who they are whenever they start */
+    HOST_SIM_LIAR,      /* a node alters messages of its own: liar.h */
     HOST_SIM_FAULTS
 };
 

@@ -234,4 +234,8 @@ void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)
             plan->nodes == 1 ? "" : "s", plan->strategy->name,
             host_partitions[plan->partition], host_indexes[plan->index],
             host_face_rules[plan->face_rule], host_builds[plan->build]);
+    if (plan->wanted[HOST_SIM_LIAR]) {
+        fprintf(file, " node %u lies (%s, 1 in %u);", plan->liar.node,
+                host_lies[plan->liar.way], plan->liar.one_in);
+    }
 }

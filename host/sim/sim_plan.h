@@ -14,6 +14,7 @@
 #include "host/order/order.h"
 #include "host/service/strategies/strategy.h"
 #include "incode/triangulator.h"
+#include "liar.h"
 #include "sim_faults.h"
 
 struct host_sim_plan {
@@ -62,6 +63,11 @@ struct host_sim_plan {
     bool idler_ready;   /* it answers its setup, too */
     uint32_t foreign;   /* generation of which the teller tells, */
     bool foreign_jumps; /* counted from the present one */
+    struct host_sim_liar {
+        unsigned node;
+        enum host_lie way;
+        uint32_t one_in;
+    } liar; /* as in struct host_liar */
     /* One fault alone, at frame `frame` of all that are sent: what becomes of
      * it, or a restart of the node that sends it.  0: none. */
     uint64_t frame;

@@ -25,6 +25,7 @@ struct host_sim_run {
     struct host_points points;
     struct host_order order;
     struct host_tetrahedra tets;
+    struct host_liar liar;
     uint64_t random;
     /* By the world's clock: no more faults; the next event; a second host. */
     uint64_t calm_us, event_us, second_us;

@@ -181,6 +181,16 @@ static void node_idle(void *context, uint64_t wait_us)
     (void)context, (void)wait_us;
 }
 
+/* Of the node that lies. */
+static int node_write(void *context, struct node_counted *counted,
+                      uint16_t dest, uint8_t type, const void *data,
+                      size_t size)
+{
+    const struct host_world_node *node = context;
+    return host_liar_write(node->world->options.liar, counted, dest, type, data,
+                           size);
+}
+
 static void node_reset(void *context, int status)
 {
     struct host_world_node *node = context;
@@ -492,6 +502,9 @@ static int open_node(struct host_world *w, unsigned i)
     n->board.busy_us = node_busy_us;
     n->board.idle = node_idle;
     n->board.reset = node_reset;
+    if (o->liar != NULL && o->liar_node == i) {
+        n->board.write = node_write;
+    }
     n->board.fixed_bytes = HOST_WORLD_STACK + HOST_WORLD_STATIC;
     n->board.arena_bytes = o->memory - n->board.fixed_bytes;
     n->board.arena =

@@ -16,6 +16,7 @@
 #define HOST_SIM_WORLD_H
 
 #include "host/service/machine.h"
+#include "liar.h"
 #include "node/identity.h"
 #include "node/node.h"
 #include "sim_cube.h"
@@ -46,7 +47,9 @@ struct host_world_options {
     /* As on bare boards: a node is not told who it is, asks its neighbours, and
      * has its epoch from what they knew of it. */
     bool bare;
-    uint32_t serial_baud; /* as in struct node_identity */
+    uint32_t serial_baud;   /* as in struct node_identity */
+    struct host_liar *liar; /* what alters the messages of that node; or NULL */
+    unsigned liar_node;
     bool routers; /* and links pass on messages while a processor is busy */
     uint64_t time_us_max, steps_max; /* then it counts as hanging */
     uint8_t absent_s;                /* as in struct host_machine */
