@@ -11,8 +11,8 @@
  * Bernstein, SipHash: a fast short-input PRF, 2012, in its form of 32 bits):
  * additions, rotations and exclusive ors alone.
  *
- * Memory: the struct.  Work: a pass over the page: about 4,700 cycles on a
- * processor of a PC, 10,000 on a Cortex-M3.
+ * Memory: the struct.  Work: a pass over the page: 13,300 instructions on
+ * x86-64, 2 us; some 10,000 on a Cortex-M3, 0.4 ms at 25 MHz.
  *
  *     size = node_page_seal(&message, setup.page_key, bytes);   // the host
  *     node_page_check_init(&check, &setup, &counted, &fault);   // a node

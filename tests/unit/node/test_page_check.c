@@ -134,6 +134,22 @@ static void test_right(void **unused)
     assert_int_equal(node_page_check_send(&world.check), 0);
 }
 
+/* The example of transport/PROTOCOL.md. */
+static void test_example(void **unused)
+{
+    (void)unused;
+    static const uint8_t expected[] = {
+        0x05, 0x00, 0x00, 0x00, 0x2b, 0x47, 0x2f, 0x1e, 0xa6, 0x63, 0x80, 0x03,
+        0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xe0, 0x3f, 0x00, 0x00, 0x00, 0x00,
+        0x00, 0x00, 0xd0, 0x3f, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xf0, 0xbf};
+    const double point[3] = {0.5, 0.25, -1};
+    struct node_page_message page = {.head.page = 5};
+    memcpy(page.data, point, sizeof point);
+    assert_int_equal(node_page_seal(&page, 0x0706050403020100, sizeof point),
+                     sizeof expected);
+    assert_memory_equal(&page, expected, sizeof expected);
+}
+
 /* Every bit, one more byte or less, another key. */
 static void test_altered(void **unused)
 {
@@ -181,9 +197,8 @@ static void test_reports(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_vectors),
-        cmocka_unit_test(test_right),
-        cmocka_unit_test(test_altered),
+        cmocka_unit_test(test_vectors), cmocka_unit_test(test_right),
+        cmocka_unit_test(test_example), cmocka_unit_test(test_altered),
         cmocka_unit_test(test_reports),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -328,6 +328,45 @@ static void test_passed(void **unused)
     end();
 }
 
+/* Who has sent a wrong page does no more work; where that is the host, the one
+ * that got it.  Who does none any more is not named again. */
+static void test_wrong_pages(void **unused)
+{
+    (void)unused;
+    static const struct {
+        struct node_wrong_page_message wrong;
+        unsigned left;
+        const char *text;
+    } reports[] = {
+        {{7, 1}, 1, "node 1 link 0: sent node 3 a wrong page 7; "},
+        {{INCODE_NONE, 1}, 1, "node 1 link 0: sent node 3 a page cut short; "},
+        {{7, CUBE_HOST},
+         3,
+         "node 3 link 1: got page 7 altered from the host, by itself or on the "
+         "way; "}};
+    for (size_t i = 0; i < sizeof reports / sizeof reports[0]; i++) {
+        struct host_error error = {0};
+        begin();
+        service.work.living = NODES;
+        for (unsigned k = 0; k < 2; k++) {
+            said[0] = '\0';
+            assert_int_equal(send(3, NODE_WRONG_PAGE, &reports[i].wrong,
+                                  sizeof reports[i].wrong, &error),
+                             0);
+            if (k == 0 &&
+                strncmp(said, reports[i].text, strlen(reports[i].text)) != 0) {
+                fail_msg("%s: not %s", said, reports[i].text);
+            }
+            assert_int_equal(said[0] == '\0', k);
+        }
+        for (unsigned k = 0; k < NODES; k++) {
+            assert_int_equal(service.node[k].aside, k == reports[i].left);
+        }
+        assert_true(service.loss);
+        end();
+    }
+}
+
 /* What no node of this version sends is told in figures. */
 static void test_texts(void **unused)
 {
@@ -340,7 +379,7 @@ static void test_texts(void **unused)
     } spill = {.header = {.count = NODE_FACES_A_MESSAGE + 1}};
     static struct node_spill_header beyond = {.brick = 1000000};
     uint32_t page = 1000000;
-    const uint32_t passed[2] = {2, page};
+    const uint32_t passed[2] = {2, page}, by_itself[2] = {7, 3};
     const struct {
         uint8_t type;
         const void *data;
@@ -361,6 +400,9 @@ static void test_texts(void **unused)
         {NODE_PAGE_PASSED, &page, 4, "requests of node 1000000, expected 0..3"},
         {NODE_PAGE_PASSED, passed, 8, "page 1000000 out of range 0.."},
         {NODE_PAGE_PASSED, many, 7, "page numbers in 7 bytes, expected 4"},
+        {NODE_WRONG_PAGE, many, 4, "report of a wrong page in 4 bytes, "},
+        {NODE_WRONG_PAGE, by_itself, 8, "a wrong page of node 3"},
+        {NODE_WRONG_PAGE, passed, 8, "a wrong page of node 1000000"},
         {NODE_SPILL, &spill, 19, "spilled faces in 19 bytes, expected 20"},
         {NODE_SPILL, &spill, 32,
          "129 spilled faces in 32 bytes, expected 1568"},
@@ -394,11 +436,17 @@ static void test_texts(void **unused)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_any_bytes),      cmocka_unit_test(test_epochs),
-        cmocka_unit_test(test_gaps),           cmocka_unit_test(test_answers),
-        cmocka_unit_test(test_starts),         cmocka_unit_test(test_fault),
-        cmocka_unit_test(test_doubtful_fault), cmocka_unit_test(test_strategy),
-        cmocka_unit_test(test_passed),         cmocka_unit_test(test_texts),
+        cmocka_unit_test(test_any_bytes),
+        cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_gaps),
+        cmocka_unit_test(test_answers),
+        cmocka_unit_test(test_starts),
+        cmocka_unit_test(test_fault),
+        cmocka_unit_test(test_doubtful_fault),
+        cmocka_unit_test(test_strategy),
+        cmocka_unit_test(test_passed),
+        cmocka_unit_test(test_wrong_pages),
+        cmocka_unit_test(test_texts),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
