@@ -1,7 +1,11 @@
 #include "rows.h"
 
 #include <ctype.h>
+#include <float.h>
 #include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "csv.h"
@@ -123,10 +127,131 @@ void host_put_line(struct host_output *out, const char *before, uint64_t number,
     host_output_text(out, after);
 }
 
+/* --- numbers -------------------------------------------------------------- */
+
+enum { DOUBLE_BYTES = 40, DIGITS = 17 };
+
+/* The doubles whose shortest decimals are found in 128 bits, integers apart. */
+static const double fast_least = 1e-5, fast_most = 1e15;
+
+/* What reads back as a double, times a power of ten: all whole numbers from
+ * least to most.  It is itself `at` and a fraction. */
+struct decimals {
+    uint64_t least, most, at;
+    enum { PART_NONE, PART_BELOW_HALF, PART_HALF, PART_ABOVE_HALF } part;
+    int places; /* the power of ten */
+};
+
+/* value = m 2^-s, of which what lies within half a unit of m reads back: from
+ * P - T / 2 to P + T / 2, for P = m T and T a power of ten, in units of 2^-s,
+ * and with both ends where m is even.  Below a power of two it is half of that.
+ * With `places` such that 10^16 <= P 2^-s < 10^18, T is at most 10^22 and at
+ * least 100, and P below 2^127. */
+static struct decimals decimals_of(double value)
+{
+    int exponent;
+    uint64_t m = (uint64_t)ldexp(frexp(value, &exponent), DBL_MANT_DIG);
+    int s = DBL_MANT_DIG - exponent;
+    struct decimals d = {.places = DIGITS - 1 -
+                                   (int)floor((exponent - 1) * 0.30102999566)};
+    unsigned __int128 power = 1;
+    for (int i = 0; i < d.places; i++) {
+        power *= 10;
+    }
+    unsigned __int128 whole = m * power, mask = ((unsigned __int128)1 << s) - 1;
+    unsigned __int128 high = whole + power / 2;
+    unsigned __int128 low =
+        whole - power / (m == UINT64_C(1) << (DBL_MANT_DIG - 1) ? 4 : 2);
+    unsigned __int128 half = (mask + 1) / 2;
+    bool closed = m % 2 == 0;
+    d.most = (uint64_t)(high >> s) - (!closed && (high & mask) == 0);
+    d.least = (uint64_t)((low + mask) >> s) + (!closed && (low & mask) == 0);
+    d.at = (uint64_t)(whole >> s);
+    unsigned __int128 part = whole & mask;
+    d.part = part == 0     ? PART_NONE
+             : part < half ? PART_BELOW_HALF
+             : part > half ? PART_ABOVE_HALF
+                           : PART_HALF;
+    return d;
+}
+
+/* The multiple of the largest power of ten that reads back, without its zeros:
+ * the nearest one, of two the even one. */
+static uint64_t shortest(struct decimals *d)
+{
+    uint64_t unit = 1;
+    while (d->most / (10 * unit) * (10 * unit) >= d->least) {
+        unit *= 10;
+        d->places--;
+    }
+    uint64_t n = d->at / unit, rest = d->at % unit;
+    bool odd = n % 2 != 0;
+    bool up = unit == 1 ? d->part > PART_HALF || (d->part == PART_HALF && odd)
+                        : rest > unit / 2 || (rest == unit / 2 &&
+                                              (d->part != PART_NONE || odd));
+    return (up || n * unit < d->least) && (n + 1) * unit <= d->most ? n + 1 : n;
+}
+
+/* n 10^-places, of more than 0 places. */
+static size_t print_fixed(char *text, bool negative, uint64_t n, int places)
+{
+    char digits[DOUBLE_BYTES];
+    size_t at = sizeof digits;
+    for (int i = 0; i < places || n > 0; i++, n /= 10) {
+        if (i == places) {
+            digits[--at] = '.';
+        }
+        digits[--at] = (char)('0' + n % 10);
+    }
+    if (sizeof digits - at == (size_t)places) {
+        digits[--at] = '.';
+        digits[--at] = '0';
+    }
+    if (negative) {
+        digits[--at] = '-';
+    }
+    memcpy(text, digits + at, sizeof digits - at);
+    return sizeof digits - at;
+}
+
+/* By trial, which needs no more than 17 digits; of normal numbers fewer than 15
+ * are 15 with zeros behind them.  Some powers of two have 17 where 16 that are
+ * not the nearest would do. */
+static size_t print_rare(char *text, double value)
+{
+    int n = 0, digits = fabs(value) < DBL_MIN ? 1 : DBL_DIG;
+    do {
+        n = snprintf(text, DOUBLE_BYTES, "%.*g", digits, value);
+    } while (digits++ < DIGITS && strtod(text, NULL) != value);
+    return (size_t)n;
+}
+
+static void put_double(struct host_output *out, double value)
+{
+    char text[DOUBLE_BYTES];
+    double size = fabs(value);
+    if (size < fast_most && size == floor(size)) {
+        if (signbit(value)) {
+            host_output_text(out, "-");
+        }
+        host_output_unsigned(out, (uint64_t)size);
+        return;
+    }
+    size_t n = 0;
+    if (size >= fast_least && size < fast_most) {
+        struct decimals d = decimals_of(size);
+        uint64_t digits = shortest(&d);
+        n = print_fixed(text, signbit(value) != 0, digits, d.places);
+    } else {
+        n = print_rare(text, value);
+    }
+    host_output_bytes(out, text, n);
+}
+
 void host_put_xyz(struct host_output *out, const double *xyz)
 {
     for (int d = 0; d < 3; d++) {
-        host_output_double(out, xyz[d] + 0.0);
+        put_double(out, xyz[d] + 0.0);
         if (d < 2) {
             host_output_text(out, " ");
         }
@@ -151,7 +276,7 @@ void host_put_points(struct host_output *out, const struct host_points *points,
             host_output_text(out, separator);
         }
         for (uint64_t d = 0; d < 3; d++) {
-            host_output_double(out, points->xyz[3 * i + d]);
+            put_double(out, points->xyz[3 * i + d]);
             host_output_text(out, d < 2 ? separator : "\n");
         }
     }

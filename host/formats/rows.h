@@ -33,14 +33,17 @@ int host_take_section_end(struct host_scan *s, struct host_error *error);
 void host_put_line(struct host_output *out, const char *before, uint64_t number,
                    const char *after);
 
-/* x, y and z, blanks between them; -0.0 as 0.0. */
+/* x, y and z, blanks between them; -0.0 as 0.0.  Of the numbers that read back
+ * as the same double it is the one with the fewest digits, and of these the
+ * nearest; 17 digits at most. */
 void host_put_xyz(struct host_output *out, const double *xyz);
 
 /* n numbers, each plus base and with a blank before it. */
 void host_put_row(struct host_output *out, const uint32_t *v, int n,
                   uint64_t base);
 
-/* A line a point, as it is, its number first where `numbered`. */
+/* A line a point, as it is, its number first where `numbered`; numbers as
+ * above. */
 void host_put_points(struct host_output *out, const struct host_points *points,
                      const char *separator, bool numbered);
 
