@@ -26,7 +26,8 @@ static enum next go_to_field(struct host_scan *s, unsigned most)
             }
         } else if (*c != ' ' && *c != '\t' && *c != '\r') {
             s->at = c;
-            return *c == '\n' || *c == '#' ? NEXT_NONE : NEXT_FIELD;
+            return *c == '\n' || host_scan_is_comment(c, s->end) ? NEXT_NONE
+                                                                 : NEXT_FIELD;
         }
     }
     s->at = c;
@@ -34,27 +35,99 @@ static enum next go_to_field(struct host_scan *s, unsigned most)
 }
 
 static int wrong_columns(struct host_scan *s, int columns, enum next next,
-                         struct host_error *error)
+                         bool first, struct host_error *error)
 {
     static const char *const few[] = {
         "", "1 column where x, y and z are due; complete the line",
         "2 columns where x, y and z are due; complete the line"};
-    return host_scan_fail(s, s->at, error,
-                          next == NEXT_EMPTY ? HOST_CSV_EMPTY : few[columns]);
+    return host_scan_fail(
+        s, s->at, error,
+        next == NEXT_EMPTY ? HOST_CSV_EMPTY
+        : first && columns == 1
+            ? "1 column where x, y and z are due; complete the line, or, where "
+              "it counts the points, remove it or say --format pts"
+            : few[columns]);
 }
 
-/* What stands between two numbers of a line, for the eye that looks for decimal
- * commas: those that are alone, before a digit. */
-enum { COMMA_NONE = 1, COMMA_DECIMAL = 2 };
+/* --- decimal commas ------------------------------------------------------- */
 
-static unsigned commas_between(const char *from, const char *to)
+/* What stands between two numbers of a line, for the eye that looks for decimal
+ * commas: those that are alone, before a digit; and before a 0 and a digit, as
+ * no coordinate begins that is a whole number. */
+enum { COMMA_NONE = 1, COMMA_DECIMAL = 2, COMMA_ZERO = 4 };
+
+static bool is_digit(char c)
 {
-    if (to - from == 1) {
-        return *from != ','               ? COMMA_NONE
-               : *to >= '0' && *to <= '9' ? COMMA_DECIMAL
-                                          : 0;
+    return c >= '0' && c <= '9';
+}
+
+/* `to` is before `end`. */
+static unsigned commas_between(const char *from, const char *to,
+                               const char *end, bool coordinate)
+{
+    if (to - from > 1 || *from != ',') {
+        return memchr(from, ',', (size_t)(to - from)) == NULL ? COMMA_NONE : 0;
     }
-    return memchr(from, ',', (size_t)(to - from)) == NULL ? COMMA_NONE : 0;
+    bool zero = coordinate && *to == '0' && end - to > 1 && is_digit(to[1]);
+    return zero            ? COMMA_DECIMAL | COMMA_ZERO
+           : is_digit(*to) ? COMMA_DECIMAL
+                           : 0;
+}
+
+/* Commas of a line of more than three numbers. */
+enum commas { COMMAS_PART, COMMAS_DOUBTFUL, COMMAS_DECIMAL };
+
+/* Of a line whose first is between two digits: `1,2,3,4` tells nothing, and
+ * `1,5, 2,5, 3` is three numbers.  Anything but whole numbers tells that commas
+ * part them. */
+static enum commas commas_of(const char *at, const char *end)
+{
+    unsigned alone = 0, other = 0;
+    while (at < end && *at != '\n' && !host_scan_is_comment(at, end)) {
+        const char *gap = at;
+        while (at < end && strchr(" \t\r,;", *at) != NULL) {
+            at++;
+        }
+        if (at == gap && !is_digit(*at) && *at != '-' && *at != '+') {
+            return COMMAS_PART;
+        }
+        if (at == gap) {
+            at++;
+        } else if (at < end && *at != '\n' && !host_scan_is_comment(at, end)) {
+            bool comma = at - gap == 1 && *gap == ',';
+            alone += comma && is_digit(*at);
+            other += !comma;
+        }
+    }
+    return other == 0                 ? COMMAS_DOUBTFUL
+           : other == 2 && alone >= 2 ? COMMAS_DECIMAL
+                                      : COMMAS_PART;
+}
+
+/* Of a line that begins with the number at `line`, more than three of them:
+ * what is between the first ones is `seen`. */
+static int check_commas(struct host_scan *s, const char *line, unsigned seen,
+                        struct host_points *points, struct host_error *error)
+{
+    enum commas commas =
+        (seen & COMMA_DECIMAL) == 0 ? COMMAS_PART : commas_of(line, s->end);
+    if ((seen & COMMA_NONE) != 0 && (seen & COMMA_DECIMAL) != 0) {
+        return host_scan_fail(s, s->at, error,
+                              "more than 3 columns, parted by commas here and "
+                              "by something else there; write decimal points, "
+                              "or part all columns alike");
+    }
+    if (commas == COMMAS_DECIMAL ||
+        (commas == COMMAS_DOUBTFUL && (seen & COMMA_ZERO) != 0)) {
+        return host_scan_fail(s, s->at, error,
+                              "more than 3 columns, all of whole numbers, by "
+                              "commas that look like decimal ones; write "
+                              "decimal points, or name the columns in a first "
+                              "line");
+    }
+    points->doubtful =
+        commas == COMMAS_DOUBTFUL && (points->count == 0 || points->doubtful);
+    return 0;
 }
 
 int host_take_point(struct host_scan *s, bool is_csv,
@@ -63,8 +136,9 @@ int host_take_point(struct host_scan *s, bool is_csv,
     double xyz[3];
     unsigned most = is_csv ? 1 : UINT_MAX, commas = 0;
     enum next next = NEXT_NONE;
+    const char *line = s->at;
     if (is_csv && host_csv_begins_empty(s)) {
-        return wrong_columns(s, 0, NEXT_EMPTY, error);
+        return wrong_columns(s, 0, NEXT_EMPTY, false, error);
     }
     for (int d = 0; d < 3; d++) {
         if (host_scan_double(s, &xyz[d], error) != 0) {
@@ -72,20 +146,21 @@ int host_take_point(struct host_scan *s, bool is_csv,
         }
         const char *end = s->at;
         next = go_to_field(s, most);
-        commas |= next == NEXT_FIELD ? commas_between(end, s->at) : 0;
+        if (next == NEXT_FIELD) {
+            commas |= commas_between(end, s->at, s->end, d < 2);
+        }
         if (d < 2 && next != NEXT_FIELD) {
-            return wrong_columns(s, d + 1, next, error);
+            return wrong_columns(s, d + 1, next, points->count == 0, error);
         }
     }
     if (next != NEXT_NONE) {
-        if (commas == (COMMA_NONE | COMMA_DECIMAL)) {
-            return host_scan_fail(s, s->at, error,
-                                  "more than 3 columns, parted by commas here "
-                                  "and by something else there; write decimal "
-                                  "points, or part all columns alike");
+        if (check_commas(s, line, commas, points, error) != 0) {
+            return error->code;
         }
         points->wide = true;
         host_scan_next_line(s);
+    } else {
+        points->doubtful = false;
     }
     return host_points_append(points, xyz, 1, error);
 }

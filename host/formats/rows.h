@@ -15,8 +15,8 @@
 
 /* Appends the point on the line at hand, and goes to the end of that: its first
  * three columns, whatever those behind them hold.  Fewer are HOST_INPUT; so are
- * columns parted by commas that look like decimal ones.  In a .csv none of the
- * three is empty. */
+ * columns parted by commas that look like decimal ones; where that cannot be
+ * told, points->doubtful is set.  In a .csv none of the three is empty. */
 int host_take_point(struct host_scan *s, bool is_csv,
                     struct host_points *points, struct host_error *error);
 
