@@ -33,6 +33,8 @@ enum {
     KEY_STATS,
     KEY_VERIFY,
     KEY_NO_PROGRESS,
+    KEY_PROGRESS,
+    KEY_EXPLAIN,
     KEY_TABLE,
     KEY_MAP,
     KEY_WINDOW,

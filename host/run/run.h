@@ -49,7 +49,9 @@ struct host_run_options {
     uint64_t patience_s; /* for a node that does not answer */
     const char *cube;    /* a file that describes real nodes, or NULL */
     const char *stats;   /* a file for the statistics, or NULL */
-    bool verify, quiet, progress, table, map;
+    bool verify, quiet, table, map;
+    bool explain;            /* why `auto` chose what it chose */
+    bool progress, anywhere; /* on a terminal; without one, too */
     /* For tests. */
     unsigned window;
     uint64_t shuffle_seed;
