@@ -169,6 +169,13 @@ static int command_gen(int argc, char **argv, struct host_error *error)
               2, &s, error) != 0) {
         return error->code;
     }
+    if (host_parse_number(s.argument[0], 0, UINT64_MAX, &n) == 0) {
+        return host_fail(error, HOST_USAGE,
+                         "gen %s %s: the kind comes before the number; write "
+                         "gen %s %s",
+                         s.argument[0], s.argument[1], s.argument[1],
+                         s.argument[0]);
+    }
     if (host_parse_number(s.argument[1], HOST_GEN_MIN, host_gen_max, &n) != 0) {
         return host_fail(error, HOST_USAGE,
                          "gen %s %s: not a whole number of points; give %d to "
@@ -424,7 +431,7 @@ static const struct argp top = {
     "COMMAND ARGUMENT...",
     "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
     "Commands:\n%s\n"
-    "incode COMMAND --help says more of each.",
+    "incode COMMAND --help says more of each, and README.md of all.",
     NULL,
     list_commands,
     NULL};
