@@ -176,12 +176,13 @@ static int command_gen(int argc, char **argv, struct host_error *error)
                          s.argument[0], s.argument[1], s.argument[1],
                          s.argument[0]);
     }
-    if (host_parse_number(s.argument[1], HOST_GEN_MIN, host_gen_max, &n) != 0) {
-        return host_fail(error, HOST_USAGE,
-                         "gen %s %s: not a whole number of points; give %d to "
-                         "%llu",
-                         s.argument[0], s.argument[1], HOST_GEN_MIN,
-                         (unsigned long long)host_gen_max);
+    bool number = host_parse_number(s.argument[1], 0, UINT64_MAX, &n) == 0;
+    if (!number || n < HOST_GEN_MIN || n > host_gen_max) {
+        return host_fail(error, HOST_USAGE, "gen %s %s: %s; give %d to %llu",
+                         s.argument[0], s.argument[1],
+                         number ? "too few points, or too many"
+                                : "not a whole number of points",
+                         HOST_GEN_MIN, (unsigned long long)host_gen_max);
     }
     if (s.output == NULL && isatty(STDOUT_FILENO)) {
         return host_fail(error, HOST_USAGE,

@@ -24,9 +24,13 @@ static const struct host_format *format_of(const char *path, enum host_use use,
     } else if (format == NULL) {
         host_format_list(use, list, sizeof list);
         host_fail(error, HOST_INPUT,
-                  "%s: no format of %s has this extension; use %s, or any of "
+                  "%s: no format of %s has this extension%s; use %s, or any of "
                   "them with .gz%s",
-                  path, what, list,
+                  path, what,
+                  named == NULL             ? ""
+                  : use == HOST_READ_POINTS ? ", which tetrahedra have"
+                                            : ", which points have",
+                  list,
                   use == HOST_READ_POINTS ? ", or say which with --format"
                                           : "");
     }

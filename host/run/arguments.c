@@ -332,9 +332,11 @@ static error_t parse_report(int key, const char *value,
         return 0;
     case ARGP_KEY_ARG:
         if (o->input != NULL) {
+            bool output = host_format_of(value, HOST_WRITE_TETRAHEDRA) != NULL;
             host_fail(p->error, HOST_USAGE,
-                      "%s: a second file of points after %s; give one", value,
-                      o->input);
+                      "%s: a second file of points after %s; give one%s%s",
+                      value, o->input, output ? ", and an output as -o " : "",
+                      output ? value : "");
         }
         o->input = value;
         return 0;

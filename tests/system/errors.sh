@@ -424,6 +424,15 @@ usage 'a folder for the output' 'left: it is a directory; name a file in it' run
     "$good" -o "$left"
 usage 'a folder for points' 'left/: it is a directory; name a file in it' gen grid 27 \
     -o "$left/"
+usage 'too many to generate' 'gen uniform 1e12: too few points, or too many; ' \
+    gen uniform 1e12 -o "$left/o.xyz"
+usage 'an output without -o' 'give one, and an output as -o o.vtu$' run "$good" o.vtu
+refuses 'usage/tetrahedra for points' 3 \
+    'a.ele: no format of points has this extension, which tetrahedra have; use ' \
+    incode verify "$in/a.ele" "$good"
+refuses 'usage/points for tetrahedra' 3 \
+    'good.xyz: no format of tetrahedra has this extension, which points have; use ' \
+    incode digest "$good"
 usage 'half a point' 'gen uniform 4.5: not a whole number' gen uniform 4.5
 usage 'help of nothing' 'runn: .*did you mean run\?' help runn
 for memory in 4MB '4 MiB' 4m 4096K; do

@@ -455,6 +455,26 @@ static void check_number(const char *number, double x)
     }
 }
 
+/* Of many sizes; some of few digits, some next to powers of two. */
+static void draw_numbers(double *x, int n, uint64_t *state)
+{
+    for (int i = 0; i < n; i++) {
+        *state = *state * 6364136223846793005u + 1442695040888963407u;
+        double part = 1 + (double)(*state >> 12) * 0x1p-52;
+        int exponent = (int)(*state % 71) - 18;
+        if (i % 4 == 1) {
+            double tens = i % 8 == 1 ? 1e3 : 1e7;
+            part = floor(part * tens) / tens;
+            exponent = 0;
+        } else if (i % 64 == 2) {
+            part = i % 128 == 2 ? 1 : 2 - 0x1p-52;
+        } else if (i % 64 == 3) {
+            exponent = (int)(*state >> 8 & 2047) - 1074;
+        }
+        x[i] = ldexp(part, exponent < 1023 ? exponent : 1023);
+    }
+}
+
 static void fewest_digits(void **unused)
 {
     (void)unused;
@@ -496,21 +516,7 @@ static void fewest_digits(void **unused)
     }
     uint64_t state = 1;
     for (int round = 0; round < 40; round++) {
-        for (int i = 0; i < MANY; i++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            double part = 1 + (double)(state >> 12) * 0x1p-52;
-            int exponent = (int)(state % 71) - 18;
-            if (i % 4 == 1) { /* of few digits */
-                double tens = i % 8 == 1 ? 1e3 : 1e7;
-                part = floor(part * tens) / tens;
-                exponent = 0;
-            } else if (i % 64 == 2) {
-                part = i % 128 == 2 ? 1 : 2 - 0x1p-52;
-            } else if (i % 64 == 3) {
-                exponent = (int)(state >> 8 & 2047) - 1074;
-            }
-            x[i] = ldexp(part, exponent < 1023 ? exponent : 1023);
-        }
+        draw_numbers(x, MANY, &state);
         line = (char *)printed(path, x, MANY, text, TEXT);
         for (int i = 0; i < MANY; i++) {
             char *end = strchr(line, ' ');
