@@ -82,9 +82,11 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
         return 0;
     case ARGP_KEY_END:
         if (s->count < s->least) {
+            const char *blank = strrchr(state->name, ' '); /* incode gen */
             host_fail(s->error, HOST_USAGE,
-                      "%s: too few arguments; give %s, see --help", state->name,
-                      s->wanted);
+                      "%s: too few arguments; give %s, see %s --help",
+                      blank == NULL ? state->name : blank + 1, s->wanted,
+                      state->name);
         }
         return 0;
     default:

@@ -184,11 +184,8 @@ static void answer_help(const struct argp *argp, char *command, unsigned flags,
 {
     static char help[] = "--help";
     char *words[] = {command, help, NULL};
-    struct argp named = *argp;
-    filter_of_table = argp->help_filter;
-    named.help_filter = name_readme;
     if ((flags & ARGP_NO_HELP) == 0) {
-        (void)argp_parse(&named, 2, words, 0, NULL, input);
+        (void)argp_parse(argp, 2, words, 0, NULL, input);
     }
 }
 
@@ -226,8 +223,12 @@ static int check(const struct argp *argp, int argc, char **argv, unsigned flags,
 int host_options_parse(const struct argp *argp, int argc, char **argv,
                        unsigned flags, void *input, struct host_error *error)
 {
-    int status = check(argp, argc, argv, flags, input, error);
-    if (status == 0 && argp_parse(argp, argc, argv, flags, NULL, input) != 0) {
+    struct argp named = *argp;
+    filter_of_table = argp->help_filter;
+    named.help_filter = name_readme;
+    int status = check(&named, argc, argv, flags, input, error);
+    if (status == 0 &&
+        argp_parse(&named, argc, argv, flags, NULL, input) != 0) {
         status = host_fail(error, HOST_USAGE, "%s: wrong usage; see %s --help",
                            argv[0], argv[0]);
     }

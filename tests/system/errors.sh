@@ -401,7 +401,8 @@ check 'as many as are triangulated' 'the limits differ' test \
     -n "$(grep 'At most 2^32 - 2^16 points' README.md)" -a \
     -n "$("$INCODE" gen --help | tr '\n' ' ' | grep -F '4 to 4294901760 (2^32 - 2^16)')"
 usage 'verify without tetrahedra' 'TETS' verify "$good"
-usage 'digest without a file' 'TETS' digest
+usage 'digest without a file' \
+    '^incode: digest: too few arguments; give TETS, see incode digest --help$' digest
 usage 'convert to nothing' 'OUT' convert "$good"
 
 # What a new user writes: done as it was meant, or what to write instead.
