@@ -2,7 +2,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -380,20 +379,6 @@ void host_output_unsigned(struct host_output *out, uint64_t value)
         value /= 10;
     } while (value != 0);
     host_output_bytes(out, digits + at, sizeof digits - at);
-}
-
-void host_output_double(struct host_output *out, double value)
-{
-    char text[40];
-    if (value == floor(value) && fabs(value) < 1e15) {
-        if (signbit(value)) {
-            host_output_text(out, "-");
-        }
-        host_output_unsigned(out, (uint64_t)fabs(value));
-        return;
-    }
-    int n = snprintf(text, sizeof text, "%.17g", value);
-    host_output_bytes(out, text, (size_t)n);
 }
 
 /* --- the end -------------------------------------------------------------- */

@@ -38,7 +38,8 @@ typedef void host_points_writer(struct host_output *out,
                                 const struct host_points *points);
 
 /* tets: sorted, vertices = rows of points.  beside: the outputs of the format's
- * `beside`, in that order; NULL: none of them is wanted.  0, or an error. */
+ * `beside`, in that order; NULL: none of them is wanted, nor
+ * is one whose file is below 0.  0, or an error. */
 typedef int host_tetrahedra_writer(struct host_output *out,
                                    struct host_output *beside,
                                    const struct host_points *points,

@@ -93,7 +93,7 @@ static int parse_header(const struct host_source *source, struct npy *npy,
     if (!parse_dictionary(header, npy)) {
         return host_source_fail(source, error,
                                 "the array has not two dimensions; save one "
-                                "of shape (n, 3)");
+                                "of shape (n, 3), as a.reshape(-1, 3)");
     }
     if (npy->type == HOST_NO_NUMBER) {
         return host_source_fail(source, error,
@@ -129,6 +129,13 @@ static int check_size(const struct host_source *source, const struct npy *npy,
 static int read_points(const struct host_source *source, const struct npy *npy,
                        struct host_points *points, struct host_error *error)
 {
+    if (npy->rows == 3 && npy->columns > 3) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: an array of shape (3, %llu), of which each row "
+                         "would be a point; save its transpose: "
+                         "numpy.save(FILE, a.T)",
+                         source->path, (unsigned long long)npy->columns);
+    }
     if (npy->columns < 3 || (npy->columns > 3 && !is_floating(npy))) {
         return host_fail(error, HOST_INPUT,
                          "%s: %llu columns%s where x, y and z are due; save an "

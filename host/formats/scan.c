@@ -1,6 +1,7 @@
 #include "scan.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -31,12 +32,18 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
+bool host_scan_is_comment(const char *at, const char *end)
+{
+    return *at == '#' || (*at == '/' && end - at > 1 && at[1] == '/');
+}
+
 bool host_scan_more(struct host_scan *s)
 {
     while (s->at < s->end && is_blank(*s->at)) {
         s->at++;
     }
-    return s->at < s->end && !is_end(*s->at);
+    return s->at < s->end && *s->at != '\n' &&
+           !host_scan_is_comment(s->at, s->end);
 }
 
 void host_scan_next_line(struct host_scan *s)
@@ -267,9 +274,10 @@ static int no_number(struct host_scan *s, struct host_error *error)
         return host_scan_fail(s, at, error,
                               "infinity is no coordinate; remove the point");
     }
-    strcpy(text, "'");
-    strcat(text, word);
-    strcat(text, "' is no number; correct it");
+    (void)snprintf(text, sizeof text,
+                   "'%s' is no number; correct it, or put # before a line "
+                   "that holds none",
+                   word);
     return host_scan_fail(s, at, error, text);
 }
 

@@ -29,8 +29,11 @@ struct host_scan host_scan_start(const char *path, const void *data,
                                  size_t bytes);
 
 /* Skips blanks, commas and semicolons within the line; true where something
- * follows before its end or a comment (#). */
+ * follows before its end or a comment (# or //). */
 bool host_scan_more(struct host_scan *s);
+
+/* Whether a comment begins at `at`, which is before `end`. */
+bool host_scan_is_comment(const char *at, const char *end);
 
 /* Goes to the start of the next line that holds something; false at the end. */
 bool host_scan_skip_blank_lines(struct host_scan *s);

@@ -258,7 +258,9 @@ static int write_ele(struct host_output *out, struct host_output *beside,
 {
     enum { NODE, NEIGH, FACE };
     if (beside != NULL) {
-        write_node_beside(&beside[NODE], points);
+        if (beside[NODE].file >= 0) {
+            write_node_beside(&beside[NODE], points);
+        }
         write_topology(&beside[NEIGH], &beside[FACE], points, tets, error);
     }
     host_put_line(out, "", tets->count, " 4 0\n");

@@ -94,7 +94,7 @@ refuses_run 'trouble without boards' 2 '^incode: --board-kill: ' \
     --board-kill 100
 refuses 'boards/no emulator' 4 "^incode: qemu-system-arm: not found .*; \
 install it with: apt-get install qemu-system-arm$" within env PATH="$scratch" \
-    "$(realpath "$INCODE")" run "$points" --board mps2-an500 --nodes 2
+    "$(realpath "$INCODE")" run "$points" -q --board mps2-an500 --nodes 2
 refuses 'boards/emulate: no emulator' 4 '^incode: qemu-system-arm: not found' \
     within env PATH="$scratch" "$(realpath "$INCODE")" emulate \
     --board mps2-an500 --nodes 2 -o "$scratch/none.cube"
@@ -107,7 +107,7 @@ mkdir "$scratch/bin"
 cp "$INCODE" "$scratch/bin"
 refuses 'boards/no firmware' 4 "mps2-an500.img: .*; make the board's firmware \
 with: make firmware$" within "$scratch/bin/incode" run "$points" \
-    --board mps2-an500 --nodes 2
+    -q --board mps2-an500 --nodes 2
 # An emulator that cannot: what it says is told, and the run ends.
 printf '#!/bin/sh\necho "qemu: no such board" >&2\nexit 1\n' \
     > "$scratch/bin/qemu-system-arm"
@@ -128,7 +128,7 @@ half() { # FILE: but for the other, which is whole
 half mps2-an500.img
 refuses 'boards/half an image' 4 "mps2-an500.img: not a board's image, or not \
 all of it; make it with: make firmware$" within "$scratch/bin/incode" run \
-    "$points" --no-progress --board mps2-an500 --nodes 2
+    "$points" -q --board mps2-an500 --nodes 2
 half loader/mps2-an500.img
 within "$scratch/bin/incode" run "$points" --no-progress --board mps2-an500 \
     --nodes 2 > /dev/null 2> "$errors"

@@ -142,6 +142,13 @@ says 'dry run: each board' 4 "^node [0-3] $to: would copy program \($machine, \
 says 'dry run: what starts each' 4 '^    exec .*/incode-node.* --node [0-3] '
 check 'deploy/dry run changes nothing' "$(ls "$scratch/boards")" \
     [ -z "$(ls "$scratch/boards")" ]
+# Without make nodes, what make has made for this machine's processor.
+mkdir "$scratch/alone"
+cp "$INCODE" "$BUILD/incode-node" "$scratch/alone"
+within "$scratch/alone/incode" deploy --cube "$scratch/four.cube" --ssh-config \
+    "$scratch/ssh.conf" --dry-run > "$scratch/said" 2> "$scratch/errors" < /dev/null
+says 'the program of make' 4 "would copy program \($machine, \
+$(stat -c %s "$BUILD/incode-node") bytes\)"
 does 'status of nothing' 4 --status
 says 'status of nothing: each' 4 'nothing is deployed$'
 says 'status of nothing: the next step' 1 \

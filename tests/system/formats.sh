@@ -69,6 +69,7 @@ gzip -c "$scratch/a.stl" > "$scratch/packed"
 mkfifo "$scratch/pipe"
 cat "$scratch/a.stl" > "$scratch/pipe" &
 same '--format, a named pipe' "$scratch/pipe" --format stl
+kill $! 2> /dev/null # it would wait for a reader for ever
 same '--format, a packed file' "$scratch/packed" --format .stl.gz
 gzip -cd "$scratch/a.obj.gz" |
     same '--format, standard input' - --format obj --nodes 4

@@ -176,6 +176,9 @@ wait $relay 2> /dev/null
 told 'cut off' 'node 1 link [01]: no answer'
 told 'cut off: given up' 'node 1 link [01]: given up'
 ends 'cut off' 0
+# A node that has begun anew is known by its program's name.
+check 'hand_started/name of the process' "$(cat /proc/$node0/comm)" \
+    [ "$(cat /proc/$node0/comm)" = incode-node ]
 for node in $node0 $node1 $node2 $node3; do
     end_node "$node"
 done
