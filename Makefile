@@ -211,6 +211,10 @@ $(BUILD)/counted/%.o: %.c $(BUILD)/flags
 		-fsanitize-coverage=trace-pc $(foreach \
 		f,memcpy memmove memset memcmp,-D$(f)=work_$(f)) -c $< -o $@
 
+# A clock of the test's own, of drivers that have the system's.
+$(foreach t,tcp tcp_wire unix_file,$(BUILD)/tests/test_$(t)): \
+	private HOSTED += -Wl,--wrap=clock_gettime
+
 # A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
 $(BUILD)/tests/test_ncube: $(BUILD)/libncube.a
