@@ -7,8 +7,8 @@
  * Memory: the counter.  Work: one addition a block.
  *
  *     uint64_t before = work_blocks;
- *     run();
- *     assert_true(work_blocks - before < 5000);
+ *     sign = incode_orient3d(&tally, a, b, c, d);
+ *     uint64_t blocks = work_blocks - before;
  */
 #ifndef TESTS_UNIT_WORK_CLOCK_H
 #define TESTS_UNIT_WORK_CLOCK_H
