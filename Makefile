@@ -201,6 +201,21 @@ $(BUILD)/tests/test_own_libc: $(own_libc)
 $(own_libc): private HOSTED += -fno-builtin -fno-tree-loop-distribute-patterns \
 	$(foreach f,memcpy memmove memset memcmp sqrt,-D$(f)=own_$(f))
 
+# incode/ once more, for tests that count the basic blocks it executes: the same
+# code on every machine, whatever vectors and sanitizers the others are made for.
+counted := $(patsubst %.c,$(BUILD)/counted/%.o,$(filter incode/%,$(freestanding)))
+$(BUILD)/tests/test_pause $(BUILD)/tests/test_pace: $(counted)
+$(BUILD)/counted/%.o: %.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(say) CC $<
+	$(Q)$(CC) -std=c11 -I. -O1 -g1 $(FLOATING) -fno-builtin -MMD -MP \
+		-fsanitize-coverage=trace-pc $(foreach \
+		f,memcpy memmove memset memcmp,-D$(f)=work_$(f)) -c $< -o $@
+
+# A clock of the test's own, of drivers that have the system's.
+$(foreach t,tcp tcp_wire unix_file,$(BUILD)/tests/test_$(t)): \
+	private HOSTED += -Wl,--wrap=clock_gettime
+
 # A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
 $(BUILD)/tests/test_ncube: $(BUILD)/libncube.a

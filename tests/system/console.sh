@@ -136,7 +136,8 @@ has_terminals console-terminal || exit 0
 session=incode-console-$$
 t() { tmux -L "$session" -f /dev/null "$@"; }
 trap 't kill-server 2> /dev/null; kill $(jobs -p) 2> /dev/null; rm -rf "$scratch"' EXIT
-t new-session -d -s keep 'sleep 600' # or the server would end with its last
+# clock: it stays for that long, or the server would end with its last
+t new-session -d -s keep 'sleep 1800' #
 screen() { t capture-pane -p -t desk 2> /dev/null; }
 shows() { screen | grep -qE -e "$1"; }
 type() { t send-keys -t desk "$@"; }
@@ -151,7 +152,7 @@ seen() {
 begin_console() {
     t kill-session -t desk 2> /dev/null
     t new-session -d -s desk -x 100 -y 30 \
-        "'$program' console $*; echo status \$?; sleep 600"
+        "'$program' console $*; echo status \$?; sleep 1800" # clock: as long
     await shows '^incode>$'
 }
 
@@ -170,7 +171,7 @@ check console-history-is-private "$(ls -l state/incode/history)" \
     test "$(stat -c %a state/incode/history)" = 600
 type clear C-u 'ping all 100000' Enter
 await shows 'ping all 100000'
-sleep 0.3 # Ctrl-C takes away what is typed and not read
+sleep 0.3 # clock: Ctrl-C takes away what is typed and not read by then
 type C-c
 seen console-abandons-command 'incode: ping: interrupted'
 type 'ping 3 1' Enter

@@ -29,6 +29,7 @@ clean_up() {
     for pid in "$scratch"/boards/*/node-*/pid; do
         [ ! -e "$pid" ] || kill -KILL "$(cat "$pid")" 2> /dev/null
     done
+    # clock: what is the user's has ended by then, or stays
     [ "$user" = "$(id -un)" ] || { sleep 0.2; userdel "$user" 2> /dev/null; }
     rm -rf "$scratch"
 }

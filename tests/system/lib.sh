@@ -98,15 +98,16 @@ list_sets() {
 # A failed run may say more than its last line; the stat of a run by its name.
 stat_of() { jq -r ".$2" "$1"; }
 
-# The program, or a command, ended where it would hang: after so long that no
-# machine is too slow for it.
+# The program, or a command, ended where it would hang.  clock: after so long that
+# no machine is too slow for it.
 hang=${SECONDS_MAX:-900}
 within() { timeout -k 5 "$hang" "$@"; }
 incode() { within "$INCODE" "$@"; }
 
-# await COMMAND...: waits until it succeeds; false after two minutes.
+# await COMMAND...: waits until it succeeds.  clock: false after ten minutes, when
+# no machine is too slow for it.
 await() {
-    local end=$((SECONDS + 120))
+    local end=$((SECONDS + 600))
     until "$@"; do
         [ $SECONDS -lt $end ] || return 1
         sleep 0.01
@@ -122,10 +123,26 @@ lets_look() {
         grep -qFx "$places"
 }
 
-# What needs no waiting is told long before a node's patience of 60 s is over,
-# however slow the machine is.
+# What needs no waiting is told long before a node's patience is over.  clock: with
+# this patience, however slow the machine is.
 # shellcheck disable=SC2034
-soon=45
+patient='--patience 900' soon=600
+
+# amid STEPS [OPTION...]: `slowed SECONDS OPTION...` of the script begins a run,
+# $host, whose host reads slowly for so long, and STEPS are taken, which are true
+# where it was at work still.  clock: on a machine that holds this script up, again
+# with a longer run.
+# shellcheck disable=SC2154
+amid() {
+    local steps=$1 seconds
+    shift
+    for seconds in ${at_first:-} 3 10 30 100 300; do
+        slowed "$seconds" "$@"
+        eval "$steps" && kill -0 "$host" 2> /dev/null && return
+        wait "$host"
+    done
+    return 1
+}
 
 # Whether there are pseudo-terminals here; if not, NAME is skipped.
 has_terminals() {

@@ -31,6 +31,7 @@ go_on() { kill -CONT "${started[@]}"; }
 # look; $brake.
 mkfifo never
 exec {never}<> never
+# clock: shares of time, whatever else runs.
 nap() { read -r -t "$1" -u "$never"; }
 brake() {
     while :; do

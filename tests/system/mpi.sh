@@ -141,11 +141,12 @@ start() {
     shift
     rm -f "$scratch"/out.*
     # A host that reads slowly: the run takes a minute, and no processor.
-    "$@" run "$points" -q --link mpi --nodes "$nodes" \
+    # shellcheck disable=SC2086
+    "$@" run "$points" -q $patient --link mpi --nodes "$nodes" \
         --strategy spatial --host-rate 6000 -o "$scratch/out.npy" > "$scratch/said" 2> "$scratch/errors" &
     run=$!
     await all_there
-    sleep 0.5
+    sleep 0.5 # clock: at work by then, or still beginning
 }
 all_there() {
     all=$(children $run)
@@ -159,6 +160,7 @@ ends() {
     check "$name: exit" "exit $status" test $status = "$expected"
     check "$name: is named" "$(last "$scratch/errors")" \
         grep -qE "$pattern" "$scratch/errors" /dev/stdin <<< ''
+    # clock: minutes
     check "$name: soon" "$((SECONDS - began)) s" \
         test $((SECONDS - began)) -le $soon
     check "$name: no output" "$(ls "$scratch"/out.* 2> /dev/null)" \
@@ -178,7 +180,7 @@ all_gone() {
 pid_of() { echo "$all" | grep " $1" | sed -n "$2p" | cut -d ' ' -f 1; }
 
 start 8 "$INCODE"
-began=$SECONDS
+began=$SECONDS # clock: minutes, as of all that follow
 kill -KILL "$(pid_of incode-node-mpi 4)"
 ends 'mpi/a node killed' 4 '^incode: node [0-7] \(rank [1-8]\): '
 

@@ -63,7 +63,7 @@ starts() { tr -d '\0\377' < /said$1 | grep -ac 'after reset from outside'; }
 heard() { # NODE COUNT WHAT
     for _ in $(seq 300); do
         [ $(starts $1) -gt $2 ] && echo "$3: node $1 starts" && return
-        sleep 0.1
+        sleep 0.1 # clock: looks again
     done
 }
 sleep 0.2

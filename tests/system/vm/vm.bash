@@ -91,6 +91,7 @@ make_init() {
 
 # start_vm ARGUMENT...: of the emulator; $machine.
 start_vm() {
+    # clock: half an hour
     timeout 1800 qemu-system-aarch64 -M virt -cpu cortex-a53 -m 256 -nodefaults \
         -nographic -serial "file:$scratch/console" \
         -kernel "$vm"/boot/vmlinuz-* -initrd "$scratch/initrd" \

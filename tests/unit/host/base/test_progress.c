@@ -86,7 +86,7 @@ static void obey(char what, unsigned number)
 }
 
 /* Takes what has come.  A terminal delivers in its own time: a bell of ours
- * rings when all before it is here. */
+ * rings when all before it is here.  clock: within a minute. */
 static void look(void)
 {
     static unsigned in, number;
@@ -112,7 +112,8 @@ static void look(void)
     }
 }
 
-/* Shows until a line is drawn, which takes a tenth of a second. */
+/* Shows until a line is drawn, which takes a tenth of a second.  clock: or no
+ * more than minutes. */
 static const char *shown(uint64_t done, uint64_t total, uint64_t amount)
 {
     look();
@@ -211,6 +212,7 @@ static void test_notes(void **unused)
     close_screen();
 }
 
+/* clock: likewise */
 static void draw_rows(double part)
 {
     look();

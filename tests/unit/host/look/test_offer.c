@@ -23,7 +23,7 @@
 enum {
     NODES = 4,
     SILENT = 2, /* the node that does not answer NODE_LINKS */
-    WAIT_US = 60000000,
+    WAIT_US = 600000000,
     SECOND = 1000000
 };
 
@@ -36,7 +36,8 @@ static struct host_node_set all;
 /* --- who has the cube ------------------------------------------------------
  */
 
-/* Its time passes faster than that of who looks. */
+/* Its time passes faster than that of who looks.  clock: both wait for minutes.
+ */
 static uint64_t holder_us(void *context)
 {
     (void)context;
@@ -85,7 +86,7 @@ static _Noreturn void hold(int begun, int ended)
             answer_for(&onlooking, &machine, i);
         }
         progress.tetrahedra++;
-        usleep(1000);
+        usleep(1000); /* clock: looks again */
     }
     host_offer_end(&offer);
     exit(0);
@@ -268,7 +269,8 @@ static void test_killed(void **unused)
     end_holder();
 }
 
-/* Who stands still is waited for no longer than one has patience. */
+/* Who stands still is waited for no longer than one has patience; clock: a
+ * fifth of a second, in which nobody could answer. */
 static void test_stopped(void **unused)
 {
     struct host_look look;
@@ -309,7 +311,7 @@ static void test_queue(void **unused)
     kill(holder, SIGCONT);
     assert_int_equal(host_look_ask(&look, &all, NODE_TOP, WAIT_US, &error), 0);
     while (!host_holder_find(&who, wire) || who.pid != holder) {
-        (void)usleep(SECOND / 100);
+        (void)usleep(SECOND / 100); /* clock: looks again */
     }
     host_look_close(&look);
     end_holder();
