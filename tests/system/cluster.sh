@@ -126,7 +126,8 @@ same() {
     rm -f "$scratch/out.npy"
     "$INCODE" run "$points" -q --strategy spatial -o "$scratch/out.npy" "$@" \
         2> "$scratch/errors"
-    check "cluster/$name" "exit $?: $(last "$scratch/errors")" \
+    status=$?
+    check "cluster/$name" "exit $status: $(last "$scratch/errors")" \
         cmp -s "$scratch/first.npy" "$scratch/out.npy"
 }
 same '32 nodes, one frame a link, a host that stalls' --nodes 32 --window 1 \
