@@ -48,7 +48,11 @@ static int take_points(struct host_source *source,
 {
     struct host_mesh mesh = {.points = points};
     host_progress_phase("reading", "Mpoint");
+    if (!format->pieces && host_source_hold(source, error) != 0) {
+        return error->code;
+    }
     format->read_points(source, &mesh, error);
+    host_source_fault(source, error);
     if (error->code == 0 && points->count == 0) {
         host_source_fail(source, error,
                          "the file holds no point; give one with points");
@@ -73,7 +77,7 @@ int host_points_read_as(const char *path, const char *format,
                        : host_format_told(format, HOST_READ_POINTS, error);
     bool packed =
         host_is_packed(path) || (format != NULL && host_is_packed(format));
-    if (f != NULL && host_source_open(&source, path, packed, error) == 0) {
+    if (f != NULL && host_source_begin(&source, path, packed, error) == 0) {
         take_points(&source, f, points, error);
     }
     return error->code;
@@ -126,7 +130,11 @@ static int take_tetrahedra(struct host_source *source,
                            struct host_points *points, struct host_error *error)
 {
     struct host_mesh mesh = {.points = points, .tets = tets};
-    if (format->read_tetrahedra(source, &mesh, error) != 0) {
+    if (!format->pieces && host_source_hold(source, error) != 0) {
+        return error->code;
+    }
+    format->read_tetrahedra(source, &mesh, error);
+    if (host_source_fault(source, error) != 0) {
         host_tetrahedra_free(tets);
         if (points != NULL) {
             host_points_free(points);
@@ -142,7 +150,7 @@ int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
     if (format != NULL &&
-        host_source_open(&source, path, host_is_packed(path), error) == 0) {
+        host_source_begin(&source, path, host_is_packed(path), error) == 0) {
         take_tetrahedra(&source, format, tets, points, error);
     }
     return error->code;

@@ -8,8 +8,7 @@
 static int read_xyz(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     while (host_scan_skip_blank_lines(&s)) {
         if (host_take_point(&s, false, mesh->points, error) != 0) {
             return error->code;
@@ -21,8 +20,7 @@ static int read_xyz(const struct host_source *source, struct host_mesh *mesh,
 static int read_csv(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     struct host_csv csv = {0};
     double xyz[3];
     if (host_csv_header(&csv, &s, error) != 0) {
@@ -55,6 +53,7 @@ const struct host_format host_format_xyz = {
     .name = "text",
     .extensions = {".xyz", ".txt"},
     .read_points = read_xyz,
+    .pieces = true,
     .write_points = write_xyz,
 };
 
@@ -62,5 +61,6 @@ const struct host_format host_format_csv = {
     .name = "comma-separated",
     .extensions = {".csv"},
     .read_points = read_csv,
+    .pieces = true,
     .write_points = write_csv,
 };
