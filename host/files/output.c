@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/base/create.h"
 #include "host/base/progress.h"
 #include "target.h"
 
@@ -194,12 +195,11 @@ static bool is_ours(const char *name)
 static int open_part(struct host_part *part)
 {
     sigset_t signals;
-    const int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
     hold(&signals);
-    int file = open(part->name, flags, 0666);
+    int file = host_create(part->name, 0666);
     if (file < 0 && errno == EEXIST && !is_ours(part->name) &&
         unlink(part->name) == 0) {
-        file = open(part->name, flags, 0666);
+        file = host_create(part->name, 0666);
     }
     int reason = errno;
     if (file >= 0) {

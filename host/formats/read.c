@@ -68,10 +68,17 @@ static bool ends_in_cr(const struct host_source *source)
 }
 
 /* Such ends become those that readers know, in the file's own bytes or, where
- * these are the caller's, in a copy. */
-static int mend_line_ends(struct host_source *source, struct host_error *error)
+ * these are the caller's, in a copy.  A packed file is held whole where it has
+ * such ends, or where its format needs that. */
+static int mend_line_ends(struct host_source *source,
+                          const struct host_format *format,
+                          struct host_error *error)
 {
-    if (!ends_in_cr(source)) {
+    bool mends = ends_in_cr(source);
+    if ((mends || !format->pieces) && host_source_hold(source, error) != 0) {
+        return error->code;
+    }
+    if (!mends) {
         return 0;
     }
     if (source->owned == NULL) {
@@ -98,8 +105,9 @@ static int take_points(struct host_source *source,
 {
     struct host_mesh mesh = {.points = points};
     host_progress_phase("reading", "Mpoint");
-    if (mend_line_ends(source, error) == 0) {
+    if (mend_line_ends(source, format, error) == 0) {
         format->read_points(source, &mesh, error);
+        host_source_fault(source, error);
     }
     if (error->code == 0 && points->count == 0) {
         host_source_fail(source, error,
@@ -125,7 +133,7 @@ int host_points_read_as(const char *path, const char *format,
                        : host_format_told(format, HOST_READ_POINTS, error);
     bool packed =
         host_is_packed(path) || (format != NULL && host_is_packed(format));
-    if (f != NULL && host_source_open(&source, path, packed, error) == 0) {
+    if (f != NULL && host_source_begin(&source, path, packed, error) == 0) {
         take_points(&source, f, points, error);
     }
     return error->code;
@@ -185,8 +193,11 @@ static int take_tetrahedra(struct host_source *source,
                            struct host_points *points, struct host_error *error)
 {
     struct host_mesh mesh = {.points = points, .tets = tets};
-    if (mend_line_ends(source, error) != 0 ||
-        format->read_tetrahedra(source, &mesh, error) != 0) {
+    if (mend_line_ends(source, format, error) == 0) {
+        format->read_tetrahedra(source, &mesh, error);
+        host_source_fault(source, error);
+    }
+    if (error->code != 0) {
         host_tetrahedra_free(tets);
         if (points != NULL) {
             host_points_free(points);
@@ -202,7 +213,7 @@ int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
     if (format != NULL &&
-        host_source_open(&source, path, host_is_packed(path), error) == 0) {
+        host_source_begin(&source, path, host_is_packed(path), error) == 0) {
         take_tetrahedra(&source, format, tets, points, error);
     }
     return error->code;

@@ -10,9 +10,43 @@ struct host_scan host_scan_start(const char *path, const void *data,
                                  size_t bytes)
 {
     const char *text = data;
-    struct host_scan s = {path, text, text, text + bytes, 0};
+    struct host_scan s = {path, text, text, text + bytes, 0, NULL, NULL};
     if (bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) {
         s.at += 3;
+    }
+    return s;
+}
+
+/* Until the line at hand is whole, or the file has ended. */
+static void fill(struct host_scan *s)
+{
+    const uint8_t *at = (const uint8_t *)s->at, *end = (const uint8_t *)s->end;
+    const char *last = NULL;
+    for (const char *c = s->start; c < s->at; c++) {
+        s->lines_before += *c == '\n';
+    }
+    while (last == NULL && host_source_more(s->source, &at, &end)) {
+        last = memrchr(at, '\n', (size_t)(end - at));
+    }
+    s->start = s->at = (const char *)at;
+    s->end = (const char *)end;
+    s->whole = last == NULL ? s->end : last + 1;
+    if (last == NULL) {
+        s->source = NULL; /* there is no more */
+    }
+}
+
+struct host_scan host_scan_source(const struct host_source *source)
+{
+    struct host_scan s =
+        host_scan_start(source->path, source->data, source->bytes);
+    if (source->feed != NULL) {
+        const char *last = memrchr(s.start, '\n', source->bytes);
+        s.source = source;
+        s.whole = last == NULL ? s.start : last + 1;
+        if (s.at >= s.whole) {
+            fill(&s);
+        }
     }
     return s;
 }
@@ -50,6 +84,9 @@ void host_scan_next_line(struct host_scan *s)
 {
     const char *line = memchr(s->at, '\n', (size_t)(s->end - s->at));
     s->at = line == NULL ? s->end : line + 1;
+    if (s->source != NULL && s->at >= s->whole) {
+        fill(s);
+    }
 }
 
 bool host_scan_skip_blank_lines(struct host_scan *s)

@@ -16,13 +16,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "host/base/error.h"
+#include "host/files/source.h"
 
 struct host_scan {
     const char *path;
     const char *start, *at, *end;
     uint64_t lines_before; /* of the file, where this is a part of it */
+    /* Of a file that is unpacked line by line; else NULL. */
+    const struct host_source *source;
+    const char *whole; /* then: where the last line begins, which may go on */
 };
+
+/* Over all of a file.  Where it is packed, what was behind `at` moves whenever
+ * a line is left. */
+struct host_scan host_scan_source(const struct host_source *source);
 
 /* A byte order mark at the start is skipped. */
 struct host_scan host_scan_start(const char *path, const void *data,

@@ -8,8 +8,7 @@
 static int read_text(const struct host_source *source, bool is_csv,
                      struct host_points *points, struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     struct host_csv csv = {0};
     double xyz[3];
     if (host_csv_header(&csv, &s, error) != 0) {
@@ -57,6 +56,7 @@ const struct host_format host_format_xyz = {
     .name = "text",
     .extensions = {".xyz", ".txt"},
     .read_points = read_xyz,
+    .pieces = true,
     .write_points = write_xyz,
 };
 
@@ -64,5 +64,6 @@ const struct host_format host_format_csv = {
     .name = "comma-separated",
     .extensions = {".csv"},
     .read_points = read_csv,
+    .pieces = true,
     .write_points = write_csv,
 };

@@ -118,7 +118,8 @@ take_ports
 node=$!
 by_tcp() { within "$program" console --tcp "127.0.0.1:$base" --insecure "$@"; }
 by_tcp -c 'ping 0 1' -c 'run points.npy -o tcp.ele' -c 'ping 0 1' > output 2>&1
-check console-tcp "exit $?: $(last output)" \
+status=$?
+check console-tcp "exit $status: $(last output)" \
     test "$(grep -c '1 of 1' output)" = 2 -a -s tcp.ele
 kill "$node"
 "$(dirname "$program")/incode-node" --node 0 --dimension 0 \
@@ -127,7 +128,8 @@ node=$!
 await test -S node.socket
 within "$program" console --unix node.socket -c 'ping 0 1' -c 'log 0' \
     -c 'run points.npy -o unix.ele' > output 2>&1
-check console-unix "exit $?: $(last output)" test -s unix.ele
+status=$?
+check console-unix "exit $status: $(last output)" test -s unix.ele
 kill "$node"
 
 # --- a person ------------------------------------------------------------------

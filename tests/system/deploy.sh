@@ -187,7 +187,9 @@ if has_terminals 'deploy/a terminal'; then
     script -qec "stty cols 80 rows 24; exec '$INCODE' deploy --status \
 --cube '$scratch/four.cube' --programs '$scratch/programs' \
 --ssh-config '$scratch/ssh.conf'" "$scratch/said" > /dev/null 2>&1 < /dev/null
-    check 'deploy/a terminal: exit 0' "exit $?: $(last "$scratch/said")" [ $? = 0 ]
+    status=$?
+    check 'deploy/a terminal: exit 0' "exit $status: $(last "$scratch/said")" \
+        [ $status = 0 ]
     check 'deploy/a terminal: a row a board' "$(head -c 600 "$scratch/said")" \
         grep -qE $'^\r?node 3 .*: [^\r]*\033\\[K' "$scratch/said"
     says 'a terminal: and at the end' 4 ': [a-z0-9_]*, running by itself.*, since '

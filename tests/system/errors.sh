@@ -195,9 +195,9 @@ check 'errors/a pipe with a reader' "exit $status" \
     eval 'wait $! && [ $status = 0 ] && cmp "$scratch/piped.npy" "$scratch/plain.npy"'
 # Whatever started it.
 has_terminals 'errors/a closed standard input' &&
-    check 'errors/a closed standard input' "exit $?" \
+    succeeds 'errors/a closed standard input' \
         incode run "$good" -q --nodes 2 --link serial <&-
-check 'errors/nothing is open' "exit $?" incode run "$good" -q \
+check 'errors/nothing is open' 'it fails' incode run "$good" -q \
     --nodes 2 -o "$scratch/closed.npy" <&- >&- 2>&-
 refuses 'errors/a closed standard output' 3 'standard output: Bad file' \
     bash -c '"$@" >&-' - "$INCODE" run "$good" --nodes 2 -o "$left/o.vtu"
@@ -475,7 +475,8 @@ check 'duplicates and -0.0 are told' "$(tr '\n' ' ' < "$scratch/output")" \
 sed 's/$/ 255 0 0 roof/' "$in/four.xyz" > "$in/scan.xyz"
 incode run "$in/scan.xyz" -o "$scratch/scan.npy" > "$scratch/output" \
     2> "$scratch/errors"
-check 'columns after the third' "exit $?, $(last "$scratch/errors")" \
+status=$?
+check 'columns after the third' "exit $status, $(last "$scratch/errors")" \
     cmp "$scratch/scan.npy" "$scratch/four.npy"
 check 'columns after the third are told once' "$(cat "$scratch/errors")" \
     test "$(grep -c '^incode: .*scan.xyz: .*passed over$' "$scratch/errors") \
@@ -555,7 +556,8 @@ for arguments in --help --version 'run --help' 'gen --help' 'verify --help' \
     'digest --help' 'convert --help'; do
     # shellcheck disable=SC2086
     "$INCODE" $arguments > "$scratch/help" 2>&1
-    check "$arguments" "exit $?" test $? = 0 -a -s "$scratch/help"
+    status=$?
+    check "$arguments" "exit $status" test $status = 0 -a -s "$scratch/help"
 done
 
 # --- cube files ---------------------------------------------------------------
@@ -575,7 +577,9 @@ check 'cube/a key that others can read' "$(last "$scratch/errors")" \
     "$scratch/errors"
 chmod 600 "$in/seen.key"
 cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"
-check 'cube/a key of its own, from a file' "exit $?" test ! -s "$scratch/errors"
+status=$?
+check 'cube/a key of its own, from a file' "exit $status" \
+    test $status = 0 -a ! -s "$scratch/errors"
 refuses 'cube/from a pipe' 3 ': a pipe or device; ' cube <(cat "$in/seen.cube")
 
 # --- a node's own arguments ---------------------------------------------------
@@ -635,4 +639,5 @@ ln -s /dev/null "$in/usb:1:1.0"
 node 'a port whose name has colons' '--wire .*1.0:9600:rtscts: does not open' \
     --node 0 --dimension 0 --wire "0=serial:$in/usb:1:1.0:9600:rtscts"
 "$BUILD/incode-node" --help > "$scratch/output" 2> "$scratch/errors"
-check 'node/help' "exit $?" grep -q -e '--wire LINK=WIRE' "$scratch/output"
+status=$?
+check 'node/help' "exit $status" grep -q -e '--wire LINK=WIRE' "$scratch/output"

@@ -137,11 +137,14 @@ refuses 'flash/two at once' 4 'in use by incode flash .*; ' \
 kill -TERM $flash
 kill -CONT $flash
 wait $flash
-check 'flash/interrupted' "exit $?" [ $? != 0 ]
+status=$?
+check 'flash/interrupted' "exit $status" [ $status != 0 ]
 if has_terminals 'flash/a terminal'; then
     script -qec "stty cols 80 rows 24; exec '$INCODE' flash --cube '$cube' \
 '$image'" "$said" > /dev/null 2>&1 < /dev/null
-    check 'flash/a terminal: exit 0' "exit $?: $(last "$said")" [ $? = 0 ]
+    status=$?
+    check 'flash/a terminal: exit 0' "exit $status: $(last "$said")" \
+        [ $status = 0 ]
     check 'flash/a terminal: a row a node' "$(head -c 300 "$said")" \
         grep -qE 'node 1 \[#+ +\] +[0-9]+ % takes blocks' "$said"
     check 'flash/a terminal: all of them' "$(last "$said")" \

@@ -15,9 +15,12 @@ scratch=$(mktemp -d "${TMPDIR:-/tmp}/incode-test.XXXXXX") || exit 1
 trap 'rm -rf "$scratch"' EXIT
 trap 'exit 130' INT TERM
 
-pass() { printf 'PASS %s\n' "$1"; }
-fail() { printf 'FAIL %s: %s\n' "$1" "$2"; }
-skip() { printf 'SKIP %s: %s\n' "$1" "$2"; }
+# Results go to the script's own output, also from within a redirection: in
+# `succeeds NAME COMMAND > FILE` the file gets what the command prints, alone.
+exec {results_to}>&1
+pass() { printf 'PASS %s\n' "$1" >&"$results_to"; }
+fail() { printf 'FAIL %s: %s\n' "$1" "$2" >&"$results_to"; }
+skip() { printf 'SKIP %s: %s\n' "$1" "$2" >&"$results_to"; }
 
 # check NAME WHY COMMAND...: passes where the command succeeds.
 check() {
@@ -26,16 +29,20 @@ check() {
     if "$@"; then pass "$name"; else fail "$name" "$why"; fi
 }
 
-# succeeds NAME COMMAND...: passes where the command ends with 0.  What it says
-# on standard error goes to $scratch/errors.  (A status cannot be asked of $?
-# behind a $(...) in one command: it is that one's.)
-succeeds() {
-    local name=$1 status
-    shift
+# exits NAME STATUS COMMAND...: passes where the command ends with this status.
+# What it prints on standard error goes to $scratch/errors.  A command whose
+# standard error is wanted elsewhere is followed by status=$?, which a check may
+# then judge.  No argument may hold $? itself (tests/lint refuses it): behind a
+# $(...) in the same command, it is the status of that.
+exits() {
+    local name=$1 wanted=$2 status
+    shift 2
     "$@" 2> "$scratch/errors"
     status=$?
-    check "$name" "exit $status: $(last "$scratch/errors")" [ $status = 0 ]
+    check "$name" "exit $status, not $wanted: $(last "$scratch/errors")" \
+        [ $status = "$wanted" ]
 }
+succeeds() { exits "$1" 0 "${@:2}"; } # NAME COMMAND...
 
 # The last line of a file, for a failure's reason.
 last() { tail -n 1 "$1" 2>/dev/null | tr -d '\r' | cut -c 1-300; }
@@ -107,7 +114,7 @@ incode() { within "$INCODE" "$@"; }
 # await COMMAND...: waits until it succeeds.  clock: false after ten minutes, when
 # no machine is too slow for it.
 await() {
-    local end=$((SECONDS + 600))
+    local end=$((SECONDS + ${AWAIT_SECONDS:-600}))
     until "$@"; do
         [ $SECONDS -lt $end ] || return 1
         sleep 0.01

@@ -17,7 +17,8 @@ same() {
     rm -f "$scratch/out.npy"
     incode run "$points" -q --strategy spatial \
         -o "$scratch/out.npy" "$@" 2> "$scratch/errors"
-    check "links/$name" "exit $?: $(last "$scratch/errors")" \
+    status=$?
+    check "links/$name" "exit $status: $(last "$scratch/errors")" \
         cmp -s "$first" "$scratch/out.npy"
 }
 same '8 nodes on sockets' --nodes 8 --link tcp
@@ -279,8 +280,9 @@ END
     for file in local mixed network serial; do
         "$INCODE" cube "$scratch/$file.cube" \
             > "$scratch/output" 2> "$scratch/errors"
+        status=$?
         check "links/the example $file.cube" "$(last "$scratch/errors")" \
-            test $? = 0 -a -s "$scratch/output"
+            test $status = 0 -a -s "$scratch/output"
     done
 }
 

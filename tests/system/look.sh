@@ -95,7 +95,8 @@ check 'look/figures grow' "from $first to $second" \
 # shows WORD COMMAND...: of both nodes.
 shows() {
     "${@:2}" > told 2> errors
-    check "look/$1" "exit $?: $(last errors)" [ $? = 0 ]
+    status=$?
+    check "look/$1" "exit $status: $(last errors)" [ $status = 0 ]
     check "look/$1: of both" "$(last told)" grep -qE '^ *(0|0-1)[ :]' told
 }
 for word in stat top links memory nodes log; do

@@ -14,7 +14,8 @@ done
 "${MAKE:-make}" --no-print-directory -j "$(nproc)" BUILD="$BUILD" \
     "$BUILD/firmware/mps2-an500.img" "$BUILD/firmware/loader/mps2-an500.img" \
     "$BUILD/tests/reset" > "$scratch/said" 2>&1
-check 'lines: the firmware' "$(last "$scratch/said")" [ $? = 0 ]
+status=$?
+check 'lines: the firmware' "$(last "$scratch/said")" [ $status = 0 ]
 need_vm lines incode tests/pulse
 
 # --- what the machine does ----------------------------------------------------
