@@ -358,6 +358,7 @@ static void test_lost_tetrahedra(void **unused)
             row[1][i] = v + INCODE_BRICK_POINTS + i;
         }
         host_tetrahedra_keep(&tets, 2);
+        assert_int_equal(host_ledger_found(work.ledger, 0, 2, &error), 0);
         assert_int_equal(s->commit(&work, node, job.first + 1), 0);
         s->lose(&work);
         assert_int_equal(tets.count, 1);
