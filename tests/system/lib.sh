@@ -102,8 +102,16 @@ list_sets() {
         }' "$INCODE_DATA/INDEX.md"
 }
 
-# A failed run may say more than its last line; the stat of a run by its name.
-stat_of() { jq -r ".$2" "$1"; }
+# The figure of a run's statistics.  One that is missing is like no other, missing
+# or not.
+stat_of() { # FILE FIGURE
+    local value
+    value=$(jq -r ".$2" "$1")
+    case $value in
+        '' | null) echo "no $2 ($BASHPID $RANDOM)" ;;
+        *) echo "$value" ;;
+    esac
+}
 
 # The program, or a command, ended where it would hang: after so long that no
 # machine is too slow for it.
@@ -113,9 +121,9 @@ incode() { within "$INCODE" "$@"; }
 
 # await COMMAND...: waits until it succeeds; false after two minutes.
 await() {
-    local end=$((SECONDS + ${AWAIT_SECONDS:-120}))
+    local end=$((SECONDS + 120)) tries=${AWAIT_TRIES:-1000000}
     until "$@"; do
-        [ $SECONDS -lt $end ] || return 1
+        [ $((tries--)) -gt 0 ] && [ $SECONDS -lt $end ] || return 1
         sleep 0.01
     done
 }
