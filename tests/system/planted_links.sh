@@ -34,6 +34,12 @@ for to in victim new; do
         incode cube --new 2 -o "$here/d.cube"
     refuses "planted_links/a table to $to" 3 'e.csv: .*symbolic links' \
         timeout 20 "$INCODE" bench scaling --quick --csv "$here/e.csv"
+    ln -sfn "$scratch/$to" "$here/f.socket"
+    exits "planted_links/a socket to $to" 2 timeout 20 "$BUILD/incode-node" \
+        --node 0 --dimension 0 --wire "0=unix-listen:$here/f.socket"
+    check "planted_links/a socket to $to: why" "$(last "$scratch/errors")" \
+        grep -q 'cannot listen there: .*; that file is no socket; ' \
+        "$scratch/errors"
     is_whole "files to $to"
 done
 
