@@ -13,6 +13,7 @@
 #ifndef HOST_CREATE_H
 #define HOST_CREATE_H
 
+#include <fcntl.h> /* the flags of open */
 #include <stdio.h>
 #include <sys/types.h>
 

@@ -2,10 +2,10 @@
  * it, and what reads and writes points and tetrahedra in it.  A new format is a
  * file of this room that defines one, host_format_NAME, and a row of formats.c.
  *
- * A reader takes bytes in memory; of a packed file, those that are there at first,
- * and then what host_source_more adds, if its format says that it takes pieces.
- * Whatever the bytes, it returns; sizes that a file claims are checked against its
- * length before anything is reserved.
+ * A reader takes bytes in memory; of a packed file, those that are there at
+ * first, and then what host_source_more adds, if its format says that it takes
+ * pieces. Whatever the bytes, it returns; sizes that a file claims are checked
+ * against its length before anything is reserved.
  *
  * Memory: a reader's, what it appends; a writer's, none.  Work: one pass.
  *

@@ -454,8 +454,10 @@ incode --help > "$scratch/help"
 incode run --help > "$scratch/help.run"
 for words in -h 'help' 'run -h' 'help run'; do
     # shellcheck disable=SC2086
-    check "usage/$words is --help" 'another text' eval \
-        'incode $words | cmp - "$scratch/help$([ "${words#*run}" = "$words" ] || echo .run)"'
+    check "usage/$words is --help" 'another text, or none' eval \
+        'incode $words | tee "$scratch/said" | cmp - \
+            "$scratch/help$([ "${words#*run}" = "$words" ] || echo .run)" &&
+        grep -q "^Usage: incode" "$scratch/said"'
 done
 
 # --- no error ----------------------------------------------------------------

@@ -39,7 +39,7 @@ end_nodes() {
     # shellcheck disable=SC2086
     kill -KILL $nodes 2> /dev/null
     # shellcheck disable=SC2086
-    wait $nodes 2> /dev/null
+    [ -z "$nodes" ] || wait $nodes 2> /dev/null
 }
 
 # Where the file lets others in, it is the kernel's word that keeps them out.

@@ -102,8 +102,16 @@ list_sets() {
         }' "$INCODE_DATA/INDEX.md"
 }
 
-# A failed run may say more than its last line; the stat of a run by its name.
-stat_of() { jq -r ".$2" "$1"; }
+# The figure of a run's statistics.  One that is missing is like no other, missing
+# or not.
+stat_of() { # FILE FIGURE
+    local value
+    value=$(jq -r ".$2" "$1")
+    case $value in
+        '' | null) echo "no $2 ($BASHPID $RANDOM)" ;;
+        *) echo "$value" ;;
+    esac
+}
 
 # The program, or a command, ended where it would hang.  clock: after so long that
 # no machine is too slow for it.
@@ -114,9 +122,9 @@ incode() { within "$INCODE" "$@"; }
 # await COMMAND...: waits until it succeeds.  clock: false after ten minutes, when
 # no machine is too slow for it.
 await() {
-    local end=$((SECONDS + ${AWAIT_SECONDS:-600}))
+    local end=$((SECONDS + 600)) tries=${AWAIT_TRIES:-1000000}
     until "$@"; do
-        [ $SECONDS -lt $end ] || return 1
+        [ $((tries--)) -gt 0 ] && [ $SECONDS -lt $end ] || return 1
         sleep 0.01
     done
 }

@@ -8,6 +8,7 @@
 node=$(dirname "$INCODE")/incode-node
 cd "$scratch" || exit 1
 started=() lookers=() lines=() host=
+trap '' PIPE # a looker that has ended is a failure, and no end of this script
 trap '{ kill -CONT "${started[@]}"; kill "${started[@]}" $host "${lookers[@]}"
     wait; } 2> /dev/null; rm -rf "$scratch"' EXIT
 

@@ -61,14 +61,14 @@ nobody() {
     printf x > port
     for name in port unix; do
         "$INCODE" nodes --json --$name $name > said 2> errors
-        jq -e '.command == "nodes" and .status == 4 and
+        jq -es '.[0] | .command == "nodes" and .status == 4 and
             (.error | contains("'$name'"))' said > /dev/null 2>&1
         status=$?
         check nodes-json-$name "$(tail -c 300 said)|$(last errors)" \
             [ $status = 0 ]
     done
     "$INCODE" console --json < /dev/null > said 2> errors
-    jq -e '.status == 2 and (.error | contains("--cube FILE"))' said \
+    jq -es '.[0] | .status == 2 and (.error | contains("--cube FILE"))' said \
         > /dev/null 2>&1
     status=$?
     check console-json-nowhere "$(tail -c 300 said)|$(last errors)" \

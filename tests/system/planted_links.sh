@@ -6,14 +6,14 @@
 . tests/system/lib.sh
 
 victim=$scratch/victim
-echo 'as it was' > "$victim"
+echo 'as it was' | tee "$victim" > "$scratch/before"
 here=$scratch/here
 mkdir "$here"
 # is_whole NAME: nothing was written where a link leads.
 is_whole() {
-    check "planted_links/$1: what a link leads to" \
-        "it has $(head -c 60 "$victim"), and beside it are: $(ls "$scratch")" \
-        [ "$(cat "$victim")" = 'as it was' -a ! -e "$scratch/new" ]
+    check "planted_links/$1: what a link leads to" "it has $(wc -c < "$victim") \
+bytes, and beside it are: $(find "$scratch" -maxdepth 1 -printf '%f ')" \
+        eval 'cmp -s "$victim" "$scratch/before" && [ ! -e "$scratch/new" ]'
 }
 
 # --- keys, cube files, tables ---------------------------------------------------
@@ -33,7 +33,13 @@ for to in victim new; do
     refuses "planted_links/cube --new to $to" 3 'd.cube: is there already' \
         incode cube --new 2 -o "$here/d.cube"
     refuses "planted_links/a table to $to" 3 'e.csv: .*symbolic links' \
-        incode bench scaling --quick --csv "$here/e.csv"
+        timeout 20 "$INCODE" bench scaling --quick --csv "$here/e.csv"
+    ln -sfn "$scratch/$to" "$here/f.socket"
+    exits "planted_links/a socket to $to" 2 timeout 20 "$BUILD/incode-node" \
+        --node 0 --dimension 0 --wire "0=unix-listen:$here/f.socket"
+    check "planted_links/a socket to $to: why" "$(last "$scratch/errors")" \
+        grep -q 'cannot listen there: .*; that file is no socket; ' \
+        "$scratch/errors"
     is_whole "files to $to"
 done
 
@@ -86,7 +92,8 @@ if has_terminals planted_links/history; then
     mkdir -p "$state/incode"
     chmod 777 "$state/incode"
     keeps_none 'a folder that others can enter' 'entered by other users; '
-    mkdir -p -m 700 "$state/incode"
+    mkdir -p "$state/incode"
+    chmod 700 "$state/incode"
     ln -s "$victim" "$state/incode/history"
     history
     is_whole 'history, a link for its file'
@@ -98,7 +105,7 @@ fi
 
 # emulates NAME PATTERN: boards are not started with what is at lab.cube.d.
 emulates() {
-    refuses "planted_links/$1" 3 "$2" within "$INCODE" emulate \
+    refuses "planted_links/$1" 3 "$2" timeout 20 "$INCODE" emulate \
         --board mps2-an500 --nodes 2 -o "$here/lab.cube"
     is_whole "$1"
     check "planted_links/$1: no cube file" "$(ls "$here")" \
@@ -126,7 +133,7 @@ for file in flash0 console1.log; do
 done
 ln -s "$victim" "$here/lab.cube"
 refuses 'planted_links/a link for the cube file' 3 'lab.cube: not a file that' \
-    within "$INCODE" emulate --board mps2-an500 --nodes 2 -o "$here/lab.cube"
+    timeout 20 "$INCODE" emulate --board mps2-an500 --nodes 2 -o "$here/lab.cube"
 is_whole 'a link for the cube file'
 rm -f "$here/lab.cube"
 
@@ -168,7 +175,8 @@ chown 0 "$boards"
 chown 65534 "$boards/flash0"
 emulates "another user's file" 'lab.cube.d/flash0: is no plain file of this'
 if has_terminals "planted_links/another user's history"; then
-    mkdir -p -m 700 "$state/incode"
+    mkdir -p "$state/incode"
+    chmod 700 "$state/incode"
     chown 65534 "$state/incode"
     keeps_none "another user's folder" 'belongs to another user; '
 fi

@@ -66,11 +66,11 @@ survives() {
         fail "survival/$1" "exit $status: $(last "$scratch/errors")"
         return
     fi
-    restarts=$((restarts + $(stat_of "$scratch/stats.json" node_restarts)))
     found=$(stat_of "$scratch/stats.json" digest)
     if [ "$found" != "$digest" ]; then
         fail "survival/$1" "digest $found, not $digest"
     else
+        restarts=$((restarts + $(stat_of "$scratch/stats.json" node_restarts)))
         check "survival/$1" 'the statistics cannot be' plausible
     fi
 }
