@@ -282,7 +282,7 @@ void incode_search_from(struct incode_make *n, struct incode_search *s)
     q->sphere = n->sphere;
     incode_maker_breathe(n->maker, INCODE_LESSEN_UNITS);
     incode_query_start(q, local->id[n->best], n->store[3]);
-    incode_search_last(s);
+    incode_search_last(n->maker, s);
     q->done = true;
     memcpy(q->done_lo, local->lo, sizeof local->lo);
     memcpy(q->done_hi, local->hi, sizeof local->hi);

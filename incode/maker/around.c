@@ -277,7 +277,7 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
             strictly = false;
             memset(look.done, 0, sizeof look.done);
             incode_maker_breathe(m, INCODE_LESSEN_UNITS);
-            incode_search_last(s);
+            incode_search_last(m, s);
         }
     }
 }

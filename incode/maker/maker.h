@@ -93,7 +93,7 @@ struct incode_search {
     };
 };
 
-/* A plane with every point on it or below, and a point below. */
+/* A plane with every point on it or below, and a place below. */
 struct incode_hull_plane {
     double p[3][3], below[3];
 };
@@ -111,6 +111,7 @@ struct incode_maker {
     uint32_t sweep;     /* index `naive`: the brick last looked at */
     uint32_t ahead;     /* bricks below have been asked for, or so many */
     uint32_t lookahead; /* so many before the one at work, at most */
+    bool walks_down;    /* the last walk of a search did */
     double lo[3], hi[3];
     uint32_t cells[3];
     struct incode_tree tree;

@@ -384,15 +384,20 @@ enum {
     LIFTED_UNITS = 2
 };
 
+/* Which child comes next in the walk's direction. */
+static inline unsigned next_child(const struct incode_query *q, uint32_t left)
+{
+    return (unsigned)(q->down ? 31 - __builtin_clz(left) : __builtin_ctz(left));
+}
+
 /* A page is missing: its next siblings will be, too, so ask for some now. */
 static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
-                                 uint32_t mask, unsigned child)
+                                 uint32_t left, unsigned child)
 {
     w->q->missing = base + first + child;
-    mask &= ~((UINT32_C(2) << child) - 1);
-    for (int i = 0; i < ASK_AHEAD && mask != 0; i++) {
-        unsigned next = (unsigned)__builtin_ctz(mask);
-        mask &= mask - 1;
+    for (int i = 0; i < ASK_AHEAD && left != 0; i++) {
+        unsigned next = next_child(w->q, left);
+        left &= ~(UINT32_C(1) << next);
         (void)incode_pager_get(w->walker->pager, base + first + next);
     }
     return INCODE_WALK_WAIT;
@@ -425,10 +430,15 @@ static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
     return INCODE_WALK_DONE;
 }
 
-/* Bricks below page `index` of `level`, exclusive end. */
-static uint64_t brick_end(uint32_t level, uint64_t index)
+/* Bricks up to and with those below page `index` of `level`, in the walk's
+ * direction. */
+static uint32_t bricks_to(const struct walk *w, uint32_t level, uint64_t index)
 {
-    return (index + 1) << (5 * level);
+    uint64_t bricks = w->walker->tree->bricks;
+    uint64_t begin = index << (5 * level), end = (index + 1) << (5 * level);
+    return (uint32_t)(w->q->down     ? bricks - begin
+                      : end < bricks ? end
+                                     : bricks);
 }
 
 /* ---- which lifted boxes a question concerns ---- */
@@ -495,14 +505,15 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
         count = INCODE_FANOUT;
     incode_walker_breathe(w->walker, PAGE_UNITS);
     uint32_t mask = passing_children(w->q, &frame->page.boxes, count);
-    for (uint32_t left = mask; left != 0; left &= left - 1) {
-        unsigned child = (unsigned)__builtin_ctz(left);
-        uint64_t end = brick_end(level - 1, (uint64_t)first + child);
-        if (end <= w->q->cursor)
+    for (uint32_t left = mask; left != 0;) {
+        unsigned child = next_child(w->q, left);
+        uint32_t to = bricks_to(w, level - 1, (uint64_t)first + child);
+        left &= ~(UINT32_C(1) << child);
+        if (to <= w->q->cursor)
             continue;
         incode_walker_breathe(w->walker, LIFTED_UNITS);
         if (!may_reach(w->q, &frame->page.boxes, child)) {
-            w->q->cursor = end > UINT32_MAX ? UINT32_MAX : (uint32_t)end;
+            w->q->cursor = to;
             continue;
         }
         uint32_t page = tree->base[level - 1] + first + child;
@@ -523,7 +534,7 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
                                  : descend(w, level - 1, first + child, f);
         if (r != INCODE_WALK_DONE)
             return r;
-        w->q->cursor = end > UINT32_MAX ? UINT32_MAX : (uint32_t)end;
+        w->q->cursor = to;
     }
     return INCODE_WALK_DONE;
 }

@@ -1,5 +1,6 @@
 /* Walks down the tree of boxes to the leaves that a question concerns, in page
- * order, and can be suspended at a missing page and resumed there.
+ * order or the other way round, and can be suspended at a missing page and
+ * resumed there.
  *
  * Memory: the struct; stack for INCODE_LEVELS_MAX levels.  Work: the boxes of
  * the pages whose own box passes the question.
@@ -69,8 +70,9 @@ struct incode_query {
     double best_p[3];
     uint32_t pages, pages_max; /* needed so far; a walk stops at more than that,
                                   unless it is 0 */
-    uint32_t cursor;           /* bricks below this one are done */
-    uint32_t missing;          /* the page a suspended walk waits for */
+    uint32_t cursor;           /* so many bricks are done */
+    bool down; /* from the last brick to the first, set before the first page */
+    uint32_t missing; /* the page a suspended walk waits for */
 };
 
 /* Coordinates relative to the query's vertex, scaled. */

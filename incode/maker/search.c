@@ -52,20 +52,40 @@ void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
         m->plane_count++;
 }
 
+/* The length of an edge off its first vertex, against the normal's largest
+ * component; where the normal is not known, along any axis. */
 void incode_hull_learn(struct incode_maker *m, const struct incode_query *q)
 {
-    const struct incode_local_points *local = &m->local;
-    for (uint32_t i = 0; i < local->count; i++) {
-        double p[3] = {local->p[0][i], local->p[1][i], local->p[2][i]};
+    const double *n = q->sphere.n;
+    double side = 1 / q->scale;
+    unsigned largest = 0;
+    for (unsigned d = 1; d < 3; d++)
+        if (__builtin_fabs(n[d]) > __builtin_fabs(n[largest]))
+            largest = d;
+    for (unsigned i = 0; i < 6; i++) {
+        unsigned d = (largest + i / 2) % 3;
+        double below[3] = {q->pv[0], q->pv[1], q->pv[2]};
+        below[d] += (n[d] > 0) == (i % 2 == 0) ? -side : side;
         incode_maker_breathe(m, 1);
-        if (incode_orient3d(&m->counts.tally, q->pv, q->pb, q->pc, p) < 0) {
-            incode_hull_remember(m, q, p);
+        if (__builtin_fabs(below[d]) <= DBL_MAX &&
+            incode_orient3d(&m->counts.tally, q->pv, q->pb, q->pc, below) < 0) {
+            incode_hull_remember(m, q, below);
             return;
         }
     }
 }
 
 /* ---- the search of the whole set ---- */
+
+/* Begins a walk.  Where pages are replaced, one walk goes up and the next down:
+ * it begins with the pages that the one before has left, of which the least
+ * recently used would be gone each time that it comes to them. */
+static void begin_walk(struct incode_maker *m, struct incode_query *q)
+{
+    m->walks_down = !m->walks_down && !incode_pager_has_free(&m->pager);
+    q->down = m->walks_down;
+    q->cursor = 0;
+}
 
 /* The box of the next look: only points that are clearly beyond the face count
  * there, so that those in its plane need not be told apart in vain. */
@@ -80,15 +100,15 @@ void incode_search_box(struct incode_maker *m, struct incode_search *s)
     }
     q->boxed = !all;
     q->strictly_beyond = !s->degenerate;
-    q->cursor = 0;
+    begin_walk(m, q);
 }
 
-void incode_search_last(struct incode_search *s)
+void incode_search_last(struct incode_maker *m, struct incode_search *s)
 {
     struct incode_query *q = &s->query;
     s->final = true;
     q->done = q->strictly_beyond = false;
-    q->cursor = 0;
+    begin_walk(m, q);
     incode_query_shrink(q);
 }
 
@@ -168,7 +188,7 @@ enum incode_outcome incode_search_run(struct incode_maker *m,
         }
         if (q->best != INCODE_NONE || !q->boxed) {
             incode_maker_breathe(m, INCODE_LESSEN_UNITS);
-            incode_search_last(s);
+            incode_search_last(m, s);
             continue;
         }
         q->done = true;

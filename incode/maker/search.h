@@ -34,7 +34,7 @@ void incode_search_box(struct incode_maker *m, struct incode_search *s);
 
 /* The last look: every point that the best so far does not clearly beat, or
  * every point if there is none. */
-void incode_search_last(struct incode_search *s);
+void incode_search_last(struct incode_maker *m, struct incode_search *s);
 
 /* Learns from the search of the apex of an open face that is over: where many
  * points were looked at, the sphere found helps the next ones. */
@@ -45,11 +45,11 @@ void incode_search_learn(struct incode_maker *m, const struct incode_query *q,
 bool incode_hull_known(struct incode_maker *m, const double pv[3],
                        const double pb[3], const double pc[3]);
 
-/* Remembers a hull facet; below: a point strictly on its known side. */
+/* Remembers a hull facet; below: a place strictly on its known side. */
 void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
                           const double below[3]);
 
-/* The same for a hull facet that was searched, if some local point is below. */
+/* The same for a hull facet that was searched. */
 void incode_hull_learn(struct incode_maker *m, const struct incode_query *q);
 
 /* The coordinates of a vertex; false: *page is missing. */

@@ -439,6 +439,50 @@ static void test_slots_begin_in_the_midst(void **state)
     assert_int_equal(in.phase, LOADER_THERE);
 }
 
+/* An image that is in the flash already: what does not bear the board's
+ * signature is neither started nor fallen back to, although its digest is
+ * right.
+ */
+static void starts_not(const struct made *made, enum loader_fault fault)
+{
+    uint32_t boot;
+    assert_true(loader_slots_install(&chip.flash, made->all, made->bytes));
+    assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot),
+                     LOADER_SLOTS);
+    assert_int_equal(slots.fault[0], fault);
+    assert_true(loader_slots_use(&slots, 1, false)); /* where nothing is */
+    assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot),
+                     LOADER_SLOTS);
+    assert_int_equal(slots.fault[0], fault);
+}
+
+static void test_slots_start_what_is_signed(void **state)
+{
+    static struct made bad;
+    uint32_t boot;
+    (void)state;
+    for (unsigned bit = 0; bit < 8 * SIGN_BYTES; bit += 37) {
+        bad = new;
+        bad.image.signature[bit / 8] ^= (uint8_t)(1u << bit % 8);
+        loader_image_pack(&bad.image, bad.all);
+        starts_not(&bad, LOADER_WRONG_SIGNATURE);
+    }
+    bad = new; /* sealed, with the signature of another number */
+    bad.image.number++;
+    made_seal(&bad);
+    memcpy(bad.image.signature, new.image.signature, SIGN_BYTES);
+    loader_image_pack(&bad.image, bad.all);
+    starts_not(&bad, LOADER_WRONG_SIGNATURE);
+    bad.image.key[0] ^= 1;
+    made_seal(&bad);
+    starts_not(&bad, LOADER_WRONG_KEY);
+    memset(bad.image.key, 0, sizeof bad.image.key);
+    made_seal(&bad);
+    starts_not(&bad, LOADER_UNSIGNED);
+    assert_true(loader_slots_install(&chip.flash, new.all, new.bytes));
+    assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot), 0);
+}
+
 /* What runs is what was signed, also where the flash gives something else by
  * then, of code or header. */
 static void test_slots_look_at_the_copy(void **state)
@@ -532,6 +576,7 @@ int main(void)
         cmocka_unit_test_setup(test_slots_refuse_another_code, blank_board),
         cmocka_unit_test_setup(test_slots_go_on, blank_board),
         cmocka_unit_test_setup(test_slots_begin_in_the_midst, blank_board),
+        cmocka_unit_test_setup(test_slots_start_what_is_signed, blank_board),
         cmocka_unit_test_setup(test_slots_look_at_the_copy, blank_board),
         cmocka_unit_test_setup(test_slots_tell_of_a_worn_flash, blank_board),
         cmocka_unit_test_setup(test_slots_wait_where_no_start_is_recorded,

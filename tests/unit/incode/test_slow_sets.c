@@ -1,0 +1,107 @@
+/* Work that sets of hard shapes take face by face, counted and not by the
+ * clock: a lattice of a plane and one point beside it, where most regions have
+ * no point off the plane at hand; coordinates of very different exponents,
+ * whose spheres reach most bricks, with pages for a part of them. */
+#include <math.h>
+
+#include "tests/unit/incode/solo.h"
+
+enum {
+    SIDE = 72,
+    PLANE = SIDE * SIDE + 1,
+    MIXED = 4000,
+    EXACT = 100,  /* orient3d that is exact, a tetrahedron */
+    REQUESTS = 20 /* of pages, a tetrahedron */
+};
+
+static uint64_t state = 1;
+
+static double draw(void)
+{
+    state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
+    return (double)(state >> 11) * 0x1p-53;
+}
+
+static uint64_t count_by_points(const double (*xyz)[3], uint64_t points)
+{
+    struct solo solo = {.index = INCODE_KD,
+                        .build = INCODE_BUILD_POINTS,
+                        .regions = 1,
+                        .memory = 16 << 20};
+    solo_run(&solo, xyz[0], points);
+    uint64_t count = solo.tets.count;
+    solo_close(&solo);
+    return count;
+}
+
+/* A region by a node of its own, that has learned nothing of others. */
+static struct incode_statistics run(const double (*xyz)[3], uint64_t points,
+                                    uint32_t regions, uint32_t region)
+{
+    struct incode_statistics s;
+    struct solo solo = {
+        .index = INCODE_KD, .build = INCODE_BUILD_FACES, .regions = regions};
+    solo_open(&solo, xyz[0], points);
+    solo_region(&solo, region);
+    incode_triangulator_statistics(solo.t, &s);
+    double built = (double)s.tetrahedra_built;
+    print_message("region %u of %u, %zu of %u pages: %.1f candidates, %.1f "
+                  "exact orient3d, %.2f pages a tetrahedron\n",
+                  region, regions, incode_triangulator_map(solo.t)->frame_count,
+                  solo.order.tree.pages, (double)s.candidates / built,
+                  (double)s.tally.exact_orient3d / built,
+                  (double)s.page_requests / built);
+    solo_close(&solo);
+    return s;
+}
+
+static void plane_and_a_point(void **unused)
+{
+    static double xyz[PLANE][3];
+    (void)unused;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        xyz[i][0] = i / SIDE;
+        xyz[i][1] = i % SIDE;
+        xyz[i][2] = -(xyz[i][0] + xyz[i][1]);
+    }
+    xyz[SIDE * SIDE][0] = xyz[SIDE * SIDE][1] = SIDE / 2.;
+    xyz[SIDE * SIDE][2] = 0;
+    uint64_t all = count_by_points((const double(*)[3])xyz, PLANE);
+    for (uint32_t regions = 1; regions <= 8; regions *= 2) {
+        uint64_t kept = 0;
+        for (uint32_t r = 0; r < regions; r++) {
+            struct incode_statistics s =
+                run((const double(*)[3])xyz, PLANE, regions, r);
+            kept += s.tetrahedra_kept;
+            assert_in_range(s.tally.exact_orient3d, 0,
+                            EXACT * s.tetrahedra_built);
+        }
+        assert_int_equal(kept, all);
+    }
+}
+
+/* 66 pages, and 48 frames: a walk over all of them that always went up would
+ * find none of them there. */
+static void mixed_exponents(void **unused)
+{
+    static double xyz[MIXED][3];
+    (void)unused;
+    for (int i = 0; i < MIXED; i++) {
+        double scale = ldexp(1, (int)(80 * draw()) - 40);
+        for (int d = 0; d < 3; d++)
+            xyz[i][d] = (2 * draw() - 1) * scale;
+    }
+    struct incode_statistics s = run((const double(*)[3])xyz, MIXED, 1, 0);
+    assert_int_equal(s.tetrahedra_kept,
+                     count_by_points((const double(*)[3])xyz, MIXED));
+    assert_in_range(s.page_requests, 0, REQUESTS * s.tetrahedra_built);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(plane_and_a_point),
+        cmocka_unit_test(mixed_exponents),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
