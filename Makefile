@@ -14,6 +14,7 @@ PREFIX ?= /usr/local
 POINTS ?=
 SETS   ?= $(wildcard ../shared/data ../shared/real)
 FUZZ_SECONDS ?= 60
+FOR    ?=
 ifeq ($(origin CC),default)
 CC := gcc
 endif
@@ -200,6 +201,21 @@ $(BUILD)/tests/test_own_libc: $(own_libc)
 $(own_libc): private HOSTED += -fno-builtin -fno-tree-loop-distribute-patterns \
 	$(foreach f,memcpy memmove memset memcmp sqrt,-D$(f)=own_$(f))
 
+# incode/ once more, for tests that count the basic blocks it executes: the same
+# code on every machine, whatever vectors and sanitizers the others are made for.
+counted := $(patsubst %.c,$(BUILD)/counted/%.o,$(filter incode/%,$(freestanding)))
+$(BUILD)/tests/test_pause $(BUILD)/tests/test_pace: $(counted)
+$(BUILD)/counted/%.o: %.c $(BUILD)/flags
+	@mkdir -p $(@D)
+	$(say) CC $<
+	$(Q)$(CC) -std=c11 -I. -O1 -g1 $(FLOATING) -fno-builtin -MMD -MP \
+		-fsanitize-coverage=trace-pc $(foreach \
+		f,memcpy memmove memset memcmp,-D$(f)=work_$(f)) -c $< -o $@
+
+# A clock of the test's own, of drivers that have the system's.
+$(foreach t,tcp tcp_wire unix_file,$(BUILD)/tests/test_$(t)): \
+	private HOSTED += -Wl,--wrap=clock_gettime
+
 # A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
 $(BUILD)/tests/test_ncube: $(BUILD)/libncube.a
@@ -379,6 +395,10 @@ made_images  = $(wildcard $(images))
 made_loaders = $(wildcard $(images:$(BUILD)/firmware/%=$(BUILD)/firmware/loader/%))
 # Likewise programs of nodes that make nodes has made.
 made_nodes   = $(wildcard $(node_programs))
+# Documents, what they show, and examples, in folders as here.
+doc       = $(DESTDIR)$(PREFIX)/share/doc/incode
+documents := $(wildcard *.md LICENSE boards/*.md transport/*.md \
+	host/service/strategies/*.md boards/linux/examples/* host/draw/*.svg)
 man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
 pages     := $(man_pages) $(BUILD)/pages/incode.bash
 $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
@@ -386,8 +406,20 @@ $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
 	$(say) PAGE $@
 	@bash host/pages $* $(BUILD) > $@
 
+# Folders that install has made, for uninstall.
+folders   = $(doc)/.folders
 install: all $(pages)
+	@for file in bin/- share/man/man1/- share/bash-completion/completions/- \
+		lib/incode/loader/- $(documents:%=share/doc/incode/%); do \
+		folder='$(DESTDIR)$(PREFIX)/'$${file%/*}; \
+		while [ ! -e "$$folder" ]; do \
+			echo "$$folder"; above=$${folder%/*}; \
+			[ "$$above" != "$$folder" ] || break; folder=$$above; done; \
+	done > '$(BUILD)/folders'
 	install -d '$(bin)' '$(man)' '$(completion)'
+	for file in $(documents); do \
+		install -D -m 644 $$file '$(doc)'/$$file || exit 1; done
+	cat '$(BUILD)/folders' >> '$(folders)'
 	install $(programs) '$(bin)'
 	install -m 644 $(man_pages) '$(man)'
 	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode'
@@ -404,7 +436,12 @@ uninstall:
 		$(patsubst %,'$(lib)/%',$(notdir $(node_programs)))
 	rm -f $(patsubst %,'$(bin)/%',$(notdir $(programs))) \
 		$(patsubst %,'$(man)/%',$(notdir $(man_pages))) \
-		'$(completion)/incode' '$(completion)/incode-node'
+		'$(completion)/incode' '$(completion)/incode-node' \
+		$(patsubst %,'$(doc)/%',$(documents))
+	@if [ -e '$(folders)' ]; then \
+		sort -ru '$(folders)' > '$(BUILD)/folders'; rm '$(folders)'; \
+		while read -r folder; do \
+			rmdir "$$folder" 2> /dev/null; done < '$(BUILD)/folders'; :; fi
 
 clean:
 	rm -rf '$(BUILD)'
@@ -425,16 +462,17 @@ help:
 	@echo 'make firmware [SIGN=FILE]  build/firmware/BOARD.img for each bare board,'
 	@echo '                         and its loader, signed with your own pair or one'
 	@echo '                         made once; memory maps and checks'
-	@echo 'make nodes               build/nodes/incode-node-ARCH, static, for boards'
-	@echo '                         with Linux: x86_64, aarch64, armhf, riscv64'
+	@echo 'make nodes [FOR=ARCH]    build/nodes/incode-node-ARCH, static, for boards'
+	@echo '                         with Linux: x86_64, aarch64, armhf, riscv64, or'
+	@echo '                         those of FOR alone'
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
 	@echo 'make lint                the order of rooms, format, examples, sizes,'
 	@echo '                         warnings as errors, analysers'
 	@echo 'make ncube               build/libncube.a: the calls of the nCUBE, for'
 	@echo '                         porting programs that were written for them'
-	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, their man pages'
-	@echo '                         and completion to DIR/share, firmware and node'
-	@echo '                         programs of boards to DIR/lib/incode, if made'
+	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, their man pages,'
+	@echo '                         documents and completion to DIR/share, firmware and'
+	@echo '                         node programs of boards to DIR/lib/incode, if made'
 	@echo 'make uninstall           remove them (with the same PREFIX)'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
@@ -445,9 +483,12 @@ run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev \
 	libpng-dev nettle-dev libjansson-dev libserialport-dev libsodium-dev \
 	libconfig-dev libgpiod-dev pkg-config libedit-dev \
 	libopenmpi-dev openmpi-bin
-node_packages  = $(run_packages) dpkg-dev gcc-aarch64-linux-gnu \
-	libc6-dev-arm64-cross gcc-arm-linux-gnueabihf libc6-dev-armhf-cross \
-	gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
+# Of the processors that make nodes is called for.
+node_packages  = $(run_packages) dpkg-dev \
+	$(foreach a,$(node_for),$(node_packages_$(a)))
+node_packages_aarch64 = gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+node_packages_armhf   = gcc-arm-linux-gnueabihf libc6-dev-armhf-cross
+node_packages_riscv64 = gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps tmux \
 	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi \

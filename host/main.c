@@ -82,9 +82,11 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
         return 0;
     case ARGP_KEY_END:
         if (s->count < s->least) {
+            const char *blank = strrchr(state->name, ' '); /* incode gen */
             host_fail(s->error, HOST_USAGE,
-                      "%s: too few arguments; give %s, see --help", state->name,
-                      s->wanted);
+                      "%s: too few arguments; give %s, see %s --help",
+                      blank == NULL ? state->name : blank + 1, s->wanted,
+                      state->name);
         }
         return 0;
     default:
@@ -169,12 +171,20 @@ static int command_gen(int argc, char **argv, struct host_error *error)
               2, &s, error) != 0) {
         return error->code;
     }
-    if (host_parse_number(s.argument[1], HOST_GEN_MIN, host_gen_max, &n) != 0) {
+    if (host_parse_number(s.argument[0], 0, UINT64_MAX, &n) == 0) {
         return host_fail(error, HOST_USAGE,
-                         "gen %s %s: not a whole number of points; give %d to "
-                         "%llu",
-                         s.argument[0], s.argument[1], HOST_GEN_MIN,
-                         (unsigned long long)host_gen_max);
+                         "gen %s %s: the kind comes before the number; write "
+                         "gen %s %s",
+                         s.argument[0], s.argument[1], s.argument[1],
+                         s.argument[0]);
+    }
+    bool number = host_parse_number(s.argument[1], 0, UINT64_MAX, &n) == 0;
+    if (!number || n < HOST_GEN_MIN || n > host_gen_max) {
+        return host_fail(error, HOST_USAGE, "gen %s %s: %s; give %d to %llu",
+                         s.argument[0], s.argument[1],
+                         number ? "too few points, or too many"
+                                : "not a whole number of points",
+                         HOST_GEN_MIN, (unsigned long long)host_gen_max);
     }
     if (s.output == NULL && isatty(STDOUT_FILENO)) {
         return host_fail(error, HOST_USAGE,
@@ -424,7 +434,7 @@ static const struct argp top = {
     "COMMAND ARGUMENT...",
     "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
     "Commands:\n%s\n"
-    "incode COMMAND --help says more of each.",
+    "incode COMMAND --help says more of each, and README.md of all.",
     NULL,
     list_commands,
     NULL};

@@ -6,6 +6,7 @@
 #include "incode/pages/bricks.h"
 
 enum { KIND_TETRAHEDRON, KIND_STAR, KIND_COMMIT, KIND_FINDER };
+enum { FINDER_FOLLOWS = 63 /* in a finder's head */ };
 
 static inline uint32_t zigzag(uint32_t difference)
 {
@@ -61,7 +62,11 @@ int node_result_finder(struct node_result_writer *writer, uint16_t node)
                                               NODE_RESULT_TETRAHEDRON_MAX) {
         return 0;
     }
-    put_single(writer, KIND_FINDER, node);
+    uint8_t *at = writer->buffer + writer->size;
+    bool follows = node >= FINDER_FOLLOWS;
+    *at = (uint8_t)(KIND_FINDER | (follows ? FINDER_FOLLOWS : node) << 2);
+    memcpy(at + 1, &node, sizeof node); /* the next record covers it, or not */
+    writer->size += follows ? 1 + sizeof node : 1;
     writer->finder = node;
     return 1;
 }
@@ -151,6 +156,9 @@ static size_t record_size(uint32_t head)
     if ((head & 3) == KIND_TETRAHEDRON) {
         return first + 2 + (head >> 4 & 3) + (head >> 6);
     }
+    if ((head & 3) == KIND_FINDER) {
+        return head >> 2 == FINDER_FOLLOWS ? 3 : 1;
+    }
     return head >> 4 == 0 ? first : 0;
 }
 
@@ -175,15 +183,16 @@ static size_t read_slowly(struct node_result_reader *reader, uint32_t row[4],
         *rows_read = 1;
         return row_in_range(row, reader->vertices) ? size : 0;
     }
+    if (kind == KIND_FINDER) {
+        reader->finder =
+            size == 1 ? copy[0] >> 2 : copy[1] | (uint32_t)copy[2] << 8;
+        return reader->finder < reader->nodes ? size : 0;
+    }
     uint32_t difference = get(copy + 1, copy[0] >> 2 & 3);
     if (kind == KIND_STAR) {
         reader->vertex += difference;
         reader->in_star = 1;
         return reader->vertex < reader->vertices ? size : 0;
-    }
-    if (kind == KIND_FINDER) {
-        reader->finder = difference;
-        return reader->finder < reader->nodes ? size : 0;
     }
     reader->brick = reader->vertex / INCODE_BRICK_POINTS + difference;
     *committed = 1;

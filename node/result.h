@@ -6,11 +6,11 @@
  * each value that follows, its length in bytes less one; unused length bits are
  * 0.  Values are little-endian zigzag differences: a star's vertex from the
  * vertex before it in the batch (0 at its start), a tetrahedron's three apexes
- * from the star's vertex, a committed brick from the brick of that vertex, a
- * finder from 0.
+ * from the star's vertex, a committed brick from the brick of that vertex.
  *
  * A finder is the node that has found the tetrahedra from there on, up to the
- * next finder or the end of the batch; at the start it is the sender.
+ * next finder or the end of the batch; at the start it is the sender.  Its
+ * number stands in bits 2-7 of the head; 63 there: in the two bytes that follow.
  *
  * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
  * read whatever its bytes are, without reading past its end.
@@ -32,7 +32,7 @@ enum {
     NODE_RESULT_TETRAHEDRON_MAX = 13, /* bytes of a record, at most */
     NODE_RESULT_STAR_MAX = 5,
     NODE_RESULT_COMMIT_MAX = 5,
-    NODE_RESULT_FINDER_MAX = 4,
+    NODE_RESULT_FINDER_MAX = 3,
     NODE_RESULT_SLACK = 4 /* bytes of a writer's buffer beyond its use */
 };
 

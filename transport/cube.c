@@ -87,13 +87,33 @@ static uint32_t ways_to_all(const struct cube *cube, unsigned source)
     return self == source ? ways : ways | (uint32_t)1 << LOCAL;
 }
 
-/* Of a message that came in; 0: it has lost its way. */
-static uint32_t ways_of(const struct cube *cube, unsigned source, unsigned dest)
+/* The one link by which messages of that source come here: the host's number,
+ * or another node's, counts by no other. */
+static unsigned way_from(const struct cube *cube, unsigned source)
+{
+    unsigned self = cube->config.self;
+    if (is_host(cube)) {
+        return link_of_host_port(cube, host_port_of(cube, source));
+    }
+    if (source == CUBE_HOST) {
+        source = host_port_of(cube, self);
+        if (source == self) {
+            return cube->config.dimension;
+        }
+    }
+    return routes_way_from(&cube->routes, self, source);
+}
+
+/* Of a message that came in by link d; 0: it has lost its way, or its source is
+ * not behind that link. */
+static uint32_t ways_of(const struct cube *cube, unsigned d, unsigned source,
+                        unsigned dest)
 {
     bool source_known = source < nodes(cube) || source == CUBE_HOST;
     bool dest_known =
         dest < nodes(cube) || dest == CUBE_HOST || dest == CUBE_ALL;
-    if (!source_known || !dest_known || source == cube->config.self) {
+    if (!source_known || !dest_known || source == cube->config.self ||
+        way_from(cube, source) != d) {
         return 0;
     }
     if (is_host(cube)) {
@@ -185,9 +205,10 @@ static bool look_at(struct cube *cube, unsigned d)
         bool whole = a->message.size >= HEAD;
         unsigned hops_max =
             cube->routes.tree ? HOPS_MAX : cube->config.dimension + 2u;
-        a->ways = whole && head[5] < hops_max
-                      ? ways_of(cube, bytes_get16(head + 2), bytes_get16(head))
-                      : 0;
+        a->ways =
+            whole && head[5] < hops_max
+                ? ways_of(cube, d, bytes_get16(head + 2), bytes_get16(head))
+                : 0;
         a->ways &= ~((uint32_t)1 << d); /* never back */
         if (a->ways == 0) {
             cube->statistics.misrouted++;

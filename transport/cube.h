@@ -151,7 +151,8 @@ struct cube_message {
 struct cube_statistics {
     uint64_t written, read; /* messages of this node */
     uint64_t passed_on;     /* copies of messages of others */
-    uint64_t misrouted;     /* dropped: no such node, or too many hops */
+    uint64_t misrouted;     /* dropped: no such node, too many hops, or by
+                               another link than its source's messages come */
     uint64_t blocked;       /* polls in which a message found no room ahead */
     uint64_t unreachable;   /* written to where no way leads: dropped */
     uint64_t outdated;      /* dropped: of an older generation */

@@ -235,12 +235,27 @@ unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest)
     return lowest_bit(self ^ next);
 }
 
+static unsigned highest_bit(unsigned bits)
+{
+    return 31u - (unsigned)__builtin_clz(bits);
+}
+
+/* E-cube changes the bits of an address in ascending order, and so do binomial
+ * trees: the last that was changed is the highest in which the two differ.  On
+ * the tree the way from a node is the way to it. */
+unsigned routes_way_from(const struct routes *routes, unsigned self,
+                         unsigned source)
+{
+    LINK_ASSERT(self != source);
+    return routes->tree ? routes_way(routes, self, source)
+                        : highest_bit(self ^ source);
+}
+
 /* The binomial tree rooted at root: from a node whose relative address ends
  * at bit h, on along the dimensions above h.  Its paths are those of e-cube. */
 static uint32_t binomial(const struct routes *routes, unsigned relative)
 {
-    unsigned above =
-        relative == 0 ? 0 : 32u - (unsigned)__builtin_clz(relative);
+    unsigned above = relative == 0 ? 0 : highest_bit(relative) + 1;
     return ((1u << routes->dimension) - 1) >> above << above;
 }
 

@@ -55,6 +55,12 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring);
  * dest != self. */
 unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest);
 
+/* The link of `self` by which comes what `source` has sent to `self`, to a node
+ * behind it, or to all; or ROUTES_NONE: no way leads here from there.
+ * source != self. */
+unsigned routes_way_from(const struct routes *routes, unsigned self,
+                         unsigned source);
+
 /* The links, as bits, on which `self` passes on a message to all nodes that
  * `root` has sent (the gateway where the host has).  On the tree these are all
  * its links: the message does not go back where it came from. */

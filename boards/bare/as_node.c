@@ -1,5 +1,6 @@
 #include "as_node.h"
 
+#include <assert.h>
 #include <string.h>
 
 #include "bare.h"
@@ -185,15 +186,35 @@ static uint32_t lost(void *context, unsigned d)
 /* --- its start -------------------------------------------------------------
  */
 
+static struct loader_budget kept __attribute__((section(".noinit.budget")));
+
+static_assert(sizeof kept <= BARE_BUDGET_BYTES, "as start.ld has it");
+
 void bare_node_begin(struct bare_node *bare, bool loader)
 {
     memset(bare, 0, sizeof *bare);
     bare->loader = loader;
+    bare->budget = &kept;
+    loader_budget_open(bare->budget);
     bare_uarts_init();
     bare_shell_init(&bare->shell, bare_uart_pipe(0));
     board_start();
     board_guard(GUARD_US);
     board_unlock(0);
+}
+
+void bare_node_may_start(struct bare_node *bare)
+{
+    if (!loader_budget_has(bare->budget, LOADER_STARTS)) {
+        bare_console_begin();
+        bare_console_put("incode: too many starts since the board was switched "
+                         "on; it waits for a minute at most\r\n");
+        bare_console_end();
+    }
+    while (!loader_budget_take(bare->budget, LOADER_STARTS)) {
+        bare_node_idle(bare, LOOK_US);
+        loader_budget_pass(bare->budget, board_now_us());
+    }
 }
 
 /* Its text is on the stack only now. */
@@ -422,6 +443,7 @@ static __attribute__((noinline)) void answer(struct bare_node *bare,
 void bare_node_console(struct bare_node *bare)
 {
     char line[BARE_SHELL_LINE + 1];
+    loader_budget_pass(bare->budget, board_now_us());
     if (bare_uart[0].unused) {
         bare_shell_alone(&bare->shell);
     }

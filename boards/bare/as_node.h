@@ -16,6 +16,7 @@
 #include "handover.h"
 #include "node/board.h"
 #include "node/identity.h"
+#include "node/loader/budget.h"
 #include "node/questions.h"
 #include "reason.h"
 #include "shell.h"
@@ -23,6 +24,7 @@
 struct bare_node {
     struct node_board board;
     bool loader; /* runs, not the program */
+    struct loader_budget *budget;
     struct bare_reason reason;
     struct bare_handover handover; /* a loader's: what it starts */
     uint32_t boot;                 /* 0: the board counts none */
@@ -39,6 +41,10 @@ struct bare_node {
 /* Time, UARTs and guard. */
 void bare_node_begin(struct bare_node *bare, bool loader);
 
+/* Before the start is counted in the flash, by the first program that runs:
+ * waits where there were too many of late (budget.h). */
+void bare_node_may_start(struct bare_node *bare);
+
 /* What a node needs of its board, and what is known of this start: to be called
  * once reason and boot are. */
 void bare_node_fill_in(struct bare_node *bare);
@@ -50,7 +56,7 @@ void bare_node_tell_start(const struct bare_node *bare);
  * places. */
 void bare_node_learn(struct bare_node *bare);
 
-/* Answers who has typed a line; between two steps. */
+/* Between two steps: answers who has typed a line, and counts the time. */
 void bare_node_console(struct bare_node *bare);
 
 /* Sleeps until a link has something to do, at most so long. */

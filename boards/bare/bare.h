@@ -24,7 +24,8 @@
 enum {
     BARE_STACK_BYTES = 49152,
     /* Memory that a restart leaves as it is. */
-    BARE_REASON_BYTES = 256,
+    BARE_REASON_BYTES = 224,
+    BARE_BUDGET_BYTES = 32,
     BARE_HANDOVER_BYTES = 256
 };
 

@@ -82,7 +82,9 @@ static void begin(void)
                                   .board = board_facts.name,
                                   .address = board_facts.image_at,
                                   .room = board_facts.image_bytes,
-                                  .alive = board_feed};
+                                  .alive = board_feed,
+                                  .budget = bare.budget};
+    bare_node_may_start(&bare);
     unsigned slot = loader_slots_start(&slots, &rules, ended_badly, &bare.boot);
     describe(slot);
     if (slot < LOADER_SLOTS && bare.reason.kind != BARE_STAY) {

@@ -30,6 +30,7 @@ static void begin(void)
                                                bare.handover.slot, &up);
     } else {
         bare.reason = bare_reason_take();
+        bare_node_may_start(&bare);
         if (board_facts.flash != NULL) {
             (void)loader_boots_next(board_facts.flash, &bare.boot);
         }

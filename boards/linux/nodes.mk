@@ -12,9 +12,16 @@ nodes_riscv64 := riscv64-linux-gnu- -march=rv64gc
 node_programs := $(node_arches:%=$(BUILD)/nodes/incode-node-%)
 node_sources  := $(freestanding) $(wildcard boards/*.c boards/linux/*.c) \
 	$(node_drivers)
-nodes: deps-nodes
+# FOR: some of them alone.
+node_for     := $(or $(filter $(node_arches),$(FOR)),$(node_arches))
+node_unknown := $(filter-out $(node_arches),$(FOR))
+node_refusal := FOR=$(node_unknown): there is no node program of that; allowed: \
+	$(node_arches)
+nodes:
+	$(if $(node_unknown),$(error $(node_refusal)))
+	@$(MAKE) --no-print-directory deps-nodes
 	@$(MAKE) --no-print-directory cross
-cross: $(node_programs)
+cross: $(node_for:%=$(BUILD)/nodes/incode-node-%)
 
 # What of them a node calls; of musl also all that is a processor's own.
 musl_folders := $(addprefix src/,env errno exit internal ldso linux setjmp signal \

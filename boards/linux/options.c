@@ -229,6 +229,13 @@ bool linux_options_read(char **argv, struct linux_options *options,
                         struct linux_fault *fault)
 {
     memset(fault, 0, sizeof *fault);
+    if (argv[0] == NULL) {
+        fault->where = "arguments";
+        fault->what = "none is given, and a node has to know its wires";
+        fault->next = "incode run starts nodes by itself, and incode cube FILE "
+                      "prints the lines for a cube of your own";
+        return false;
+    }
     fault->next = see_help;
     for (; argv[0] != NULL; argv += 2) {
         fault->where = argv[0];

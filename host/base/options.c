@@ -2,9 +2,12 @@
 
 #include <assert.h>
 #include <getopt.h>
+#include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "parse.h"
 #include "text.h"
@@ -136,6 +139,45 @@ static int refuse(const struct table *t, char **argv, struct host_error *error)
     return refuse_letter(t, argv[0], word, optopt, error);
 }
 
+/* README.md as make install has put it beside this program's folder; false:
+ * this program is not installed. */
+static bool find_readme(char path[PATH_MAX])
+{
+    static const char readme[] = "/../share/doc/incode/README.md";
+    ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - sizeof readme);
+    if (n <= 0) {
+        return false;
+    }
+    path[n] = '\0';
+    *strrchr(path, '/') = '\0';
+    strcat(path, readme);
+    char *whole = realpath(path, NULL);
+    snprintf(path, PATH_MAX, "%s", whole == NULL ? "" : whole);
+    free(whole);
+    return path[0] != '\0';
+}
+
+static char *(*filter_of_table)(int key, const char *text, void *input);
+
+/* As argp asks for it: names the document where it is. */
+static char *name_readme(int key, const char *text, void *input)
+{
+    static const char name[] = "README.md";
+    char *mine = filter_of_table == NULL ? (char *)text
+                                         : filter_of_table(key, text, input);
+    char path[PATH_MAX], *whole = NULL;
+    char *at = mine == NULL ? NULL : strstr(mine, name);
+    if (at == NULL || !find_readme(path) ||
+        asprintf(&whole, "%.*s%s%s", (int)(at - mine), mine, path,
+                 at + strlen(name)) < 0) {
+        return mine;
+    }
+    if (mine != text) {
+        free(mine);
+    }
+    return whole;
+}
+
 /* Ends the program, as --help does, unless argp is not to. */
 static void answer_help(const struct argp *argp, char *command, unsigned flags,
                         void *input)
@@ -181,8 +223,12 @@ static int check(const struct argp *argp, int argc, char **argv, unsigned flags,
 int host_options_parse(const struct argp *argp, int argc, char **argv,
                        unsigned flags, void *input, struct host_error *error)
 {
-    int status = check(argp, argc, argv, flags, input, error);
-    if (status == 0 && argp_parse(argp, argc, argv, flags, NULL, input) != 0) {
+    struct argp named = *argp;
+    filter_of_table = argp->help_filter;
+    named.help_filter = name_readme;
+    int status = check(&named, argc, argv, flags, input, error);
+    if (status == 0 &&
+        argp_parse(&named, argc, argv, flags, NULL, input) != 0) {
         status = host_fail(error, HOST_USAGE, "%s: wrong usage; see %s --help",
                            argv[0], argv[0]);
     }

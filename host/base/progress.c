@@ -13,6 +13,7 @@
 
 enum {
     EVERY_US = 100000,
+    LINE_US = 3000000, /* without a terminal */
     BAR_MAX = 40,
     BAR_MIN = 6,
     WIDTH = 80,
@@ -24,7 +25,7 @@ enum {
 };
 
 static struct {
-    bool wanted;
+    bool wanted, terminal;
     const char *what, *unit;
     uint64_t start_us, next_us; /* of the phase; when a line is due */
     uint64_t added;
@@ -90,6 +91,10 @@ static void draw(void)
         draw_rows();
         return;
     }
+    if (!line.terminal) {
+        host_note("%s", line.text);
+        return;
+    }
     int n =
         snprintf(text, sizeof text, "\r%.*s\033[K", (int)columns(), line.text);
     show(text, (size_t)n, 1);
@@ -97,7 +102,15 @@ static void draw(void)
 
 void host_progress_begin(bool wanted)
 {
-    line.wanted = wanted && isatty(STDERR_FILENO) != 0;
+    line.terminal = isatty(STDERR_FILENO) != 0;
+    line.wanted = wanted && line.terminal;
+}
+
+void host_progress_begin_anywhere(void)
+{
+    host_progress_begin(true);
+    line.wanted = true;
+    line.next_us = host_now_us() + LINE_US;
 }
 
 void host_progress_phase(const char *what, const char *unit)
@@ -106,9 +119,9 @@ void host_progress_phase(const char *what, const char *unit)
     line.unit = unit;
     line.added = 0;
     line.start_us = host_now_us();
-    line.next_us = line.start_us + EVERY_US;
     snprintf(line.text, sizeof line.text, "%s", what);
-    if (line.wanted) {
+    if (line.wanted && line.terminal) {
+        line.next_us = line.start_us + EVERY_US;
         draw();
     }
 }
@@ -161,7 +174,7 @@ static void compose(double part, bool has_total, struct tails tails)
         tail++;
     }
     used += (unsigned)strlen(tails.text[tail]);
-    if (has_total && used + bar <= width) {
+    if (has_total && line.terminal && used + bar <= width) {
         unsigned room = width - used - 3;
         unsigned cells = room < BAR_MAX ? room : BAR_MAX;
         int full = (int)(part * cells);
@@ -181,7 +194,7 @@ void host_progress_show(uint64_t done, uint64_t total, uint64_t amount)
     if (now < line.next_us) {
         return;
     }
-    line.next_us = now + EVERY_US;
+    line.next_us = now + (line.terminal ? EVERY_US : LINE_US);
     double seconds = 1e-6 * (double)(now - line.start_us);
     double part = total == 0 ? 0.0 : (double)done / (double)total;
     part = part < 1.0 ? part : 1.0;
@@ -198,7 +211,7 @@ void host_progress_add(uint64_t amount)
 unsigned host_progress_rows_max(void)
 {
     struct winsize size;
-    if (!line.wanted) {
+    if (!line.wanted || !line.terminal) {
         return 0;
     }
     bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row;
@@ -236,7 +249,7 @@ void host_progress_row(unsigned row, const char *head, double part,
 void host_progress_draw(void)
 {
     uint64_t now = host_now_us();
-    if (line.wanted && line.rows > 0 && now >= line.next_us) {
+    if (line.wanted && line.terminal && line.rows > 0 && now >= line.next_us) {
         line.next_us = now + EVERY_US;
         draw();
     }

@@ -24,6 +24,10 @@
 /* wanted: false for quiet. */
 void host_progress_begin(bool wanted);
 
+/* The same where standard error is no terminal, as a line of its own every
+ * three seconds. */
+void host_progress_begin_anywhere(void);
+
 /* What is done from now on, shown at once.  unit: of a million of what is
  * counted, as "MB"; NULL where nothing is.  Both have to stay.  Nothing happens
  * where no line has begun, so that each room may say what it does. */

@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "bench_boards_count.h"
@@ -14,6 +13,7 @@
 #include "bench_build.h"
 #include "bench_set.h"
 #include "bench_trial.h"
+#include "host/base/create.h"
 #include "host/base/progress.h"
 #include "host/machines/boards.h"
 
@@ -43,14 +43,15 @@ static int stand_in(const struct bench *b, const struct host_bare *bare,
 {
     char path[160];
     (void)snprintf(path, sizeof path, "%s/%s", b->folder, bare->program);
-    FILE *file = fopen(path, "we");
+    int fd = host_create(path, 0700);
+    FILE *file = fd < 0 ? NULL : fdopen(fd, "w");
     if (file != NULL) {
         fprintf(file,
                 "#!/bin/sh\nexec '%s' \"$@\" -icount shift=%d,sleep=on "
                 "-plugin '%s,folder=%s'\n",
                 program, SHIFT, b->counter, b->folder);
     }
-    if (file == NULL || fclose(file) != 0 || chmod(path, 0700) != 0) {
+    if (file == NULL || fclose(file) != 0) {
         host_fail(error, HOST_BROKEN, "%s: %s; make room there", path,
                   strerror(errno));
     }
@@ -221,7 +222,7 @@ static void print_row(const struct host_boards_row *row)
 static int write_csv(const struct bench *b, struct host_error *error)
 {
     const char *path = b->options->csv;
-    FILE *file = fopen(path, "we");
+    FILE *file = host_create_over(path);
     if (file != NULL) {
         fprintf(file, "board,nodes,points,tetrahedra,instructions");
         for (unsigned i = 0; i < HOST_ROOMS; i++) {

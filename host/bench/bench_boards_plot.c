@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "host/base/create.h"
+
 enum { WIDTH = 760, LEFT = 110, BAR = 520, TOP = 60, STEP = 44, HIGH = 26 };
 enum { KEY_STEP = 70 };
 
@@ -58,7 +60,7 @@ int host_boards_plot(const char *path, const struct host_boards_row *rows,
     for (unsigned i = 0; i < count; i++) {
         most = rows[i].instructions > most ? rows[i].instructions : most;
     }
-    FILE *file = fopen(path, "we");
+    FILE *file = host_create_over(path);
     if (file != NULL) {
         fprintf(file,
                 "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" "

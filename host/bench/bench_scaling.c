@@ -8,6 +8,7 @@
 #include "bench_set.h"
 #include "bench_trial.h"
 #include "gnuplot.h"
+#include "host/base/create.h"
 #include "host/base/progress.h"
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
@@ -170,7 +171,7 @@ int host_bench_scaling(const struct host_scaling_options *options,
     if (rows == NULL) {
         return host_fail_memory(error, "the rows");
     }
-    if (o->csv != NULL && (rows->csv = fopen(o->csv, "we")) == NULL) {
+    if (o->csv != NULL && (rows->csv = host_create_over(o->csv)) == NULL) {
         host_fail(error, HOST_INPUT, "%s: %s; choose another file", o->csv,
                   strerror(errno));
     } else {

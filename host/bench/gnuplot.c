@@ -6,6 +6,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "host/base/create.h"
+
 /* gnuplot, with these as its standard input and output: as waitpid has it, or
  * -1. */
 static int gnuplot(const char *word, int in, int out)
@@ -39,13 +41,13 @@ int host_gnuplot_draw(FILE *script, const char *path, struct host_error *error)
 {
     (void)fflush(script);
     rewind(script);
-    int out = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (out < 0) {
+    FILE *out = host_create_over(path);
+    if (out == NULL) {
         return host_fail(error, HOST_INPUT, "%s: %s; choose another file", path,
                          strerror(errno));
     }
-    int status = gnuplot("-", fileno(script), out);
-    (void)close(out);
+    int status = gnuplot("-", fileno(script), fileno(out));
+    (void)fclose(out);
     if (status != 0) {
         (void)unlink(path);
         return host_fail(error, HOST_BROKEN,

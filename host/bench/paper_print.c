@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <string.h>
 
+#include "host/base/create.h"
 #include "host/base/progress.h"
 #include "host/order/names.h"
 
@@ -14,7 +15,7 @@ int host_paper_print_begin(struct host_paper_print *print, const char *csv,
     if (csv == NULL) {
         return 0;
     }
-    print->csv = fopen(csv, "w");
+    print->csv = host_create_over(csv);
     if (print->csv == NULL) {
         return host_fail(error, HOST_INPUT, "%s: %s; choose another file", csv,
                          strerror(errno));

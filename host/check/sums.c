@@ -94,19 +94,17 @@ static void check_range(struct block *b)
     }
 }
 
-static void gather(struct block *b)
+static void gather_marks(struct block *b)
 {
-    const struct host_sites *sites = b->c->sites;
+    const uint64_t *mark = b->c->mark;
     int64_t none = 0;
     for (uint32_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 4; k++) {
-            uint32_t v = b->v[i][k];
-            double xyz[3];
-            host_site(sites, v, xyz);
-            b->mark[k][i] = (int64_t)b->c->mark[v];
-            b->p[k][0][i] = xyz[0];
-            b->p[k][1][i] = xyz[1];
-            b->p[k][2][i] = xyz[2];
+            b->mark[k][i] = (int64_t)mark[b->v[i][k]];
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        for (uint32_t i = 0; i < b->n; i++) {
             none |= b->mark[k][i] == 0;
         }
     }
@@ -115,9 +113,23 @@ static void gather(struct block *b)
             (b->mark[0][i] == 0 || b->mark[1][i] == 0 || b->mark[2][i] == 0 ||
              b->mark[3][i] == 0)) {
             leave_out(b, i,
-                      sites->order == NULL
+                      b->c->sites->order == NULL
                           ? "uses a row that repeats an earlier one"
                           : "has a vertex that is no point");
+        }
+    }
+}
+
+static void gather_points(struct block *b)
+{
+    const struct host_sites *sites = b->c->sites;
+    for (uint32_t i = 0; i < b->n; i++) {
+        for (int k = 0; k < 4; k++) {
+            double xyz[3];
+            host_site(sites, b->v[i][k], xyz);
+            b->p[k][0][i] = xyz[0];
+            b->p[k][1][i] = xyz[1];
+            b->p[k][2][i] = xyz[2];
         }
     }
 }
@@ -160,6 +172,7 @@ static void filter_orientation(struct block *b)
 static void check_orientation(struct block *b)
 {
     int64_t sure = 1;
+    gather_points(b);
     filter_orientation(b);
     for (uint32_t i = 0; i < b->n; i++) {
         sure &= b->sure[i];
@@ -243,7 +256,7 @@ static void sum_part(void *context, unsigned number)
         b.v = (const uint32_t(*)[4])c->tets->v + i;
         b.bad = 0;
         check_range(&b);
-        gather(&b);
+        gather_marks(&b);
         check_orientation(&b);
         sum_facets(&b);
         add_sums(&b, part->sum);
@@ -287,8 +300,10 @@ static void list_part(void *context, unsigned number)
     const uint8_t *hot = c->hot;
     for (uint64_t i = part->first; i < part->last; i++) {
         const uint32_t *t = c->tets->v[i];
-        if (!check_is_bad(c, i) &&
-            hot[t[0]] + hot[t[1]] + hot[t[2]] + hot[t[3]] >= 3) {
+        if (check_is_bad(c, i) || (hot[t[0]] | hot[t[1]]) == 0) {
+            continue; /* at most two are hot: most */
+        }
+        if (hot[t[0]] + hot[t[1]] + hot[t[2]] + hot[t[3]] >= 3) {
             part->list[part->listed++] = (uint32_t)(i - part->first);
         }
     }

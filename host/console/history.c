@@ -1,54 +1,46 @@
 #include "history.h"
 
-#include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH = 4096, PRIVATE = 0700, OWN = 0600 };
+#include "host/base/create.h"
+#include "host/base/progress.h"
 
-static char path[PATH]; /* "": there is none */
+#define NAME "history"
 
-/* The folders of a path, as far as they are missing. */
-static bool make_folders(char *whole)
-{
-    for (char *p = strchr(whole + 1, '/'); p != NULL; p = strchr(p + 1, '/')) {
-        *p = '\0';
-        int made = mkdir(whole, PRIVATE);
-        *p = '/';
-        if (made != 0 && errno != EEXIST) {
-            return false;
-        }
-    }
-    return true;
-}
+static int folder = -1; /* -1: there is none */
 
-static void find_path(void)
+static void find_folder(void)
 {
     const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
+    struct host_error error = {0};
+    char path[PATH_MAX];
     int n = -1;
-    path[0] = '\0';
     if (state != NULL && state[0] == '/') {
-        n = snprintf(path, sizeof path, "%s/incode/history", state);
+        n = snprintf(path, sizeof path, "%s/incode", state);
     } else if (home != NULL && home[0] == '/') {
-        n = snprintf(path, sizeof path, "%s/.local/state/incode/history", home);
+        n = snprintf(path, sizeof path, "%s/.local/state/incode", home);
     }
-    if (n < 0 || n >= (int)sizeof path || !make_folders(path)) {
-        path[0] = '\0';
+    if (n > 0 && n < (int)sizeof path) {
+        folder = host_folder_open_all(path, &error);
+    }
+    if (error.code != 0) {
+        host_note("no history is kept: %s", error.text);
     }
 }
 
 /* The newest lines alone, in place of all, once there are too many. */
 static void shorten(FILE *file, size_t lines)
 {
-    char other[PATH + 16], *line = NULL;
+    char other[64], *line = NULL;
     size_t room = 0, at = 0;
-    snprintf(other, sizeof other, "%s.%ld", path, (long)getpid());
-    int fd = open(other, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, OWN);
+    snprintf(other, sizeof other, NAME ".%ld", (long)getpid());
+    int fd = host_folder_file(folder, other, O_WRONLY | O_CREAT | O_EXCL);
     FILE *out = fd < 0 ? NULL : fdopen(fd, "w");
     if (out == NULL) {
         return;
@@ -60,8 +52,8 @@ static void shorten(FILE *file, size_t lines)
         }
     }
     free(line);
-    if (fclose(out) != 0 || rename(other, path) != 0) {
-        (void)unlink(other);
+    if (fclose(out) != 0 || renameat(folder, other, folder, NAME) != 0) {
+        (void)unlinkat(folder, other, 0);
     }
 }
 
@@ -70,7 +62,8 @@ static void load(History *list)
     HistEvent event;
     char *line = NULL;
     size_t room = 0, lines = 0;
-    FILE *file = path[0] == '\0' ? NULL : fopen(path, "re");
+    int fd = folder < 0 ? -1 : host_folder_file(folder, NAME, O_RDONLY);
+    FILE *file = fd < 0 ? NULL : fdopen(fd, "r");
     if (file == NULL) {
         return;
     }
@@ -94,7 +87,7 @@ History *host_history_open(void)
     }
     (void)history(list, &event, H_SETSIZE, HOST_HISTORY_LINES);
     (void)history(list, &event, H_SETUNIQUE, 1);
-    find_path();
+    find_folder();
     load(list);
     return list;
 }
@@ -108,9 +101,9 @@ void host_history_add(History *list, const char *line)
         return;
     }
     (void)history(list, &event, H_ENTER, line);
-    int fd = path[0] == '\0'
-                 ? -1
-                 : open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, OWN);
+    int fd = folder < 0 ? -1
+                        : host_folder_file(folder, NAME,
+                                           O_WRONLY | O_CREAT | O_APPEND);
     if (fd >= 0) {
         (void)dprintf(fd, "%s\n", line);
         (void)close(fd);
@@ -120,4 +113,8 @@ void host_history_add(History *list, const char *line)
 void host_history_close(History *list)
 {
     history_end(list);
+    if (folder >= 0) {
+        (void)close(folder);
+        folder = -1;
+    }
 }

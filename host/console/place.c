@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "commands.h"
+#include "host/base/create.h"
 
 static int open_site(void *context, struct host_machine *machine,
                      struct host_error *error)
@@ -189,7 +190,7 @@ static int prepare(void *context, const struct host_visit *visit,
         return error->code;
     }
     snprintf(p->cube, sizeof p->cube, "%s/console.cube", p->folder);
-    FILE *out = fopen(p->cube, "we");
+    FILE *out = host_create_over(p->cube);
     bool good = out != NULL;
     if (good) {
         write_cube(p, visit, out);

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/utsname.h>
 #include <unistd.h>
 
 enum { PROGRAM_MAX = 64 << 20 };
@@ -57,6 +58,7 @@ int host_programs_open(struct host_programs *programs, const char *folder,
     here[length] = '\0';
     *strrchr(here, '/') = '\0';
     snprintf(programs->folder, sizeof programs->folder, "%s/nodes", here);
+    snprintf(programs->own, sizeof programs->own, "%s/incode-node", here);
     if (access(programs->folder, X_OK) != 0) {
         char installed[PATH_MAX];
         snprintf(installed, sizeof installed, "%s/../lib/incode", here);
@@ -102,12 +104,11 @@ static int read_program(struct host_program *program, FILE *file,
     return 0;
 }
 
-const struct host_program *host_programs_take(struct host_programs *programs,
-                                              const char *machine,
-                                              struct host_error *error)
+/* That of a machine; NULL: there is none. */
+static struct host_program *program_of(struct host_programs *programs,
+                                       const char *machine)
 {
     struct host_program *program = NULL;
-    char path[PATH_MAX + 64];
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         for (int k = 0; k < HOST_PROGRAMS_MAX; k++) {
             bool mine = strcmp(names[i].machine, machine) == 0 &&
@@ -115,6 +116,23 @@ const struct host_program *host_programs_take(struct host_programs *programs,
             program = mine ? &programs->program[k] : program;
         }
     }
+    return program;
+}
+
+static bool is_own(struct host_programs *programs,
+                   const struct host_program *program)
+{
+    struct utsname here;
+    return programs->own[0] != '\0' && uname(&here) == 0 &&
+           program_of(programs, here.machine) == program;
+}
+
+const struct host_program *host_programs_take(struct host_programs *programs,
+                                              const char *machine,
+                                              struct host_error *error)
+{
+    struct host_program *program = program_of(programs, machine);
+    char path[PATH_MAX + 64];
     if (program == NULL) {
         host_fail(error, HOST_CUBE,
                   "its processor is %.40s, for which there is no node program; "
@@ -128,9 +146,13 @@ const struct host_program *host_programs_take(struct host_programs *programs,
     snprintf(path, sizeof path, "%s/incode-node-%s", programs->folder,
              program->processor);
     FILE *file = fopen(path, "rbe");
+    if (file == NULL && errno == ENOENT && is_own(programs, program)) {
+        snprintf(path, sizeof path, "%s", programs->own);
+        file = fopen(path, "rbe");
+    }
     if (file == NULL) {
-        host_fail(error, HOST_CUBE, "%s: %s; make it with: make nodes", path,
-                  strerror(errno));
+        host_fail(error, HOST_CUBE, "%s: %s; make it with: make nodes FOR=%s",
+                  path, strerror(errno), program->processor);
         return NULL;
     }
     int status = read_program(program, file, path, error);

@@ -29,11 +29,13 @@ struct host_program {
 
 struct host_programs {
     char folder[PATH_MAX];
+    char own[PATH_MAX]; /* of make, for this machine's processor; "": none */
     struct host_program program[HOST_PROGRAMS_MAX];
 };
 
 /* folder: NULL for nodes/ beside this program, or lib/incode/ where it is
- * installed.  0, or HOST_BROKEN. */
+ * installed; where these lack that of this machine's processor, incode-node
+ * beside this program is taken, which make has made.  0, or HOST_BROKEN. */
 int host_programs_open(struct host_programs *programs, const char *folder,
                        struct host_error *error);
 void host_programs_free(struct host_programs *programs);

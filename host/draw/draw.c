@@ -16,7 +16,7 @@ static int check_claims(const struct host_draw_options *options,
     struct host_claims claims = {0};
     host_claims_read(&claims, options->points, error);
     host_claims_read(&claims, options->tets, error);
-    host_claims_write(&claims, "-o ", options->output, error);
+    host_claims_write(&claims, "-o ", options->output, NULL, error);
     host_claims_free(&claims);
     return error->code == 0 ? host_output_probe(options->output, error)
                             : error->code;

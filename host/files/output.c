@@ -2,7 +2,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdbool.h>
@@ -13,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/base/create.h"
 #include "host/base/progress.h"
 #include "target.h"
 
@@ -195,12 +195,11 @@ static bool is_ours(const char *name)
 static int open_part(struct host_part *part)
 {
     sigset_t signals;
-    const int flags = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
     hold(&signals);
-    int file = open(part->name, flags, 0666);
+    int file = host_create(part->name, 0666);
     if (file < 0 && errno == EEXIST && !is_ours(part->name) &&
         unlink(part->name) == 0) {
-        file = open(part->name, flags, 0666);
+        file = host_create(part->name, 0666);
     }
     int reason = errno;
     if (file >= 0) {
@@ -380,20 +379,6 @@ void host_output_unsigned(struct host_output *out, uint64_t value)
         value /= 10;
     } while (value != 0);
     host_output_bytes(out, digits + at, sizeof digits - at);
-}
-
-void host_output_double(struct host_output *out, double value)
-{
-    char text[40];
-    if (value == floor(value) && fabs(value) < 1e15) {
-        if (signbit(value)) {
-            host_output_text(out, "-");
-        }
-        host_output_unsigned(out, (uint64_t)fabs(value));
-        return;
-    }
-    int n = snprintf(text, sizeof text, "%.17g", value);
-    host_output_bytes(out, text, (size_t)n);
 }
 
 /* --- the end -------------------------------------------------------------- */

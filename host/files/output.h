@@ -66,9 +66,6 @@ static inline void host_output_text(struct host_output *out, const char *text)
     host_output_bytes(out, text, strlen(text)); /* known of most, here */
 }
 
-/* So that reading it gives the same double. */
-void host_output_double(struct host_output *out, double value);
-
 /* Ends the writing of n outputs; where one of them is not whole or error->code
  * is not 0, removes their parts.  Returns error->code. */
 int host_output_close(struct host_output *out, size_t n,

@@ -126,6 +126,7 @@ static int refuse(const char *path, enum key_file_state state,
                          "incode key --sign FILE",
                          path, strerror(reason));
     case KEY_FILE_WRITABLE:
+    case KEY_FILE_FOREIGN:
         return host_fail(error, HOST_INPUT, "%s: %s; %s", path,
                          key_file_text(state).what, key_file_text(state).next);
     default:

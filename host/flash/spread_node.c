@@ -71,7 +71,9 @@ static void refuse(struct host_spread *spread, unsigned i,
         [LOADER_WRONG_KEY] = "sign it with the pair whose public half is in "
                              "the board's loader: incode sign IMAGE --key FILE",
         [LOADER_WORN] = "reset the board and flash again; if that does not "
-                        "help, its log says why its flash takes nothing"};
+                        "help, its log says why its flash takes nothing",
+        [LOADER_TOO_OFTEN] = "flash again in a minute; if that does not help, "
+                             "switch the board off and on"};
     const char *what = loader_fault_text(fault);
     bool known = (unsigned)fault < LOADER_FAULTS && next[fault] != NULL;
     end(spread, i, HOST_SPREAD_REFUSED, "refuses the image: %s; %s",

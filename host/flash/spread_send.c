@@ -85,15 +85,24 @@ static void begin(struct host_spread *spread)
     spread->ask_due = true;
 }
 
+static bool has_answered(const struct host_spread_node *n)
+{
+    return n->asks > 0 && n->replies == n->asks;
+}
+
+/* Within the transfer, once the board has proved the image's signature. */
 static void name(struct host_spread *spread, unsigned i)
 {
     static const uint8_t nobody[NODE_SERIAL_BYTES];
     const struct host_spread_options *options = &spread->options;
     struct host_spread_node *n = &spread->node[i];
-    struct loader_do_message message = {.what = LOADER_NAME};
+    struct loader_do_message message = {.transfer = spread->transfer,
+                                        .what = LOADER_NAME};
+    bool proved = n->phase >= HOST_SPREAD_TAKES &&
+                  n->phase <= HOST_SPREAD_VERIFIED && has_answered(n);
     bool nameless =
         memcmp(spread->visit->node[i].who.serial, nobody, sizeof nobody) == 0;
-    if (nameless && !n->named && options->serial != NULL &&
+    if (proved && nameless && !n->named && options->serial != NULL &&
         options->serial(options->context, message.serial)) {
         n->named =
             send(spread, (uint16_t)i, NODE_IMAGE_DO, &message, sizeof message);
@@ -106,11 +115,6 @@ static bool is_asked(const struct host_spread *spread, unsigned i)
 {
     return spread_in_loader(spread, i) &&
            spread->node[i].phase < HOST_SPREAD_VERIFIED;
-}
-
-static bool has_answered(const struct host_spread_node *n)
-{
-    return n->asks > 0 && n->replies == n->asks;
 }
 
 /* Answers take a tenth of the slowest wire at most, by what it is said to

@@ -120,14 +120,15 @@ int host_claims_read(struct host_claims *claims, const char *path,
 }
 
 int host_claims_write(struct host_claims *claims, const char *option,
-                      const char *path, struct host_error *error)
+                      const char *path, const char *input,
+                      struct host_error *error)
 {
     struct host_claim c = {.option = option, .path = path};
     char name[HOST_PATH_MAX];
     const char *file = path;
     for (unsigned k = 0; file != NULL && error->code == 0; k++) {
         file = k == 0 ? path : host_write_file(path, k, name, sizeof name);
-        if (file != NULL) {
+        if (file != NULL && (k == 0 || !host_write_leaves(input, file))) {
             claim(claims, c, file, error);
         }
     }

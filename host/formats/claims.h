@@ -7,7 +7,7 @@
  *
  *     struct host_claims claims = {0};
  *     host_claims_read(&claims, "a.node", &error);
- *     if (host_claims_write(&claims, "-o ", "a.ele", &error) != 0)
+ *     if (host_claims_write(&claims, "-o ", "a.ele", NULL, &error) != 0)
  *         return error.code;
  *     host_claims_free(&claims);
  */
@@ -28,10 +28,12 @@ int host_claims_read(struct host_claims *claims, const char *path,
                      struct host_error *error);
 
 /* Notes an output, which the command line gives as `option` and `path`, with
- * all files that belong to it; "-" is standard output.  HOST_USAGE where one of
- * them is read, or written for another output. */
+ * all files that belong to it; "-" is standard output.  `input`: as of
+ * host_write.  HOST_USAGE where one of them is read, or written for another
+ * output. */
 int host_claims_write(struct host_claims *claims, const char *option,
-                      const char *path, struct host_error *error);
+                      const char *path, const char *input,
+                      struct host_error *error);
 
 void host_claims_free(struct host_claims *claims);
 

@@ -17,7 +17,7 @@ static int check_claims(const char *in, const char *out,
 {
     struct host_claims claims = {0};
     host_claims_read(&claims, in, error);
-    host_claims_write(&claims, "", out, error);
+    host_claims_write(&claims, "", out, NULL, error);
     host_claims_free(&claims);
     return error->code;
 }
@@ -89,7 +89,7 @@ static int convert_tetrahedra(const char *in, const char *out,
     if (error->code == 0 &&
         (!needed || host_rows_check(in, &tets, &points, error) == 0)) {
         host_tetrahedra_sort(&tets);
-        host_write(out, &points, &tets, error);
+        host_write(out, NULL, &points, &tets, error);
     }
     host_tetrahedra_free(&tets);
     host_points_free(&points);

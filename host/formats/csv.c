@@ -190,7 +190,8 @@ int host_csv_header(struct host_csv *csv, struct host_scan *s,
             return host_scan_fail(s, s->at, error,
                                   "the names of columns are not three, and x, "
                                   "y and z are not among them; name the "
-                                  "columns x, y and z");
+                                  "columns x, y and z, or put # before a line "
+                                  "that names none");
         }
         memcpy(csv->column, (uint64_t[3]){0, 1, 2}, sizeof csv->column);
     }
@@ -231,7 +232,9 @@ static int take_number(const struct host_scan *s, const char **at,
     }
     return host_scan_more(&part)
                ? host_scan_fail(&part, part.at, error,
-                                "more than one number in a column; correct it")
+                                "more than one number in a column; correct "
+                                "it, and write decimal points where the comma "
+                                "is a decimal one")
                : 0;
 }
 

@@ -1,4 +1,4 @@
-/* The columns of a .csv whose first line names them.
+/* The columns of a text whose first line names them.
  *
  * Memory: none.  Work: one pass over a line.
  *

@@ -103,8 +103,7 @@ static int msh_elements(const struct host_source *source, struct host_scan *s,
 static int read_msh(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     bool any = false;
     while (host_scan_skip_blank_lines(&s)) {
         if (host_scan_take(&s, "$MeshFormat")) {
@@ -159,5 +158,6 @@ const struct host_format host_format_msh = {
     .name = "Gmsh",
     .extensions = {".msh"},
     .read_tetrahedra = read_msh,
+    .pieces = true,
     .write_tetrahedra = write_msh,
 };

@@ -64,7 +64,18 @@ static int check_known(const struct host_source *source, const struct las *las,
     return 0;
 }
 
-/* Whether all records are within the file, and behind the header. */
+static int cut_short(const struct host_source *source, const struct las *las,
+                     uint64_t points, struct host_error *error)
+{
+    return host_fail(error, HOST_INPUT,
+                     "%s: %llu points where its header tells of %llu; the "
+                     "file is cut short, get it whole",
+                     source->path, (unsigned long long)points,
+                     (unsigned long long)las->count);
+}
+
+/* Whether all records are within the file, as far as that is known, and behind
+ * the header. */
 static int check_bounds(const struct host_source *source, const struct las *las,
                         struct host_error *error)
 {
@@ -88,26 +99,46 @@ static int check_bounds(const struct host_source *source, const struct las *las,
     uint64_t room = las->offset > source->bytes
                         ? 0
                         : (source->bytes - las->offset) / las->length;
-    if (las->count > room) {
-        return host_fail(error, HOST_INPUT,
-                         "%s: %llu points where its header tells of %llu; the "
-                         "file is cut short, get it whole",
-                         source->path, (unsigned long long)room,
-                         (unsigned long long)las->count);
-    }
-    return 0;
+    return source->feed == NULL && las->count > room
+               ? cut_short(source, las, room, error)
+               : 0;
 }
 
 /* Points of 1.0 come behind two bytes of a signature, which some writers do not
  * count in the offset; nothing comes behind the points. */
-static void skip_signature(const struct host_source *source, struct las *las)
+static int skip_signature(const struct host_source *source, struct las *las,
+                          const uint8_t **at, const uint8_t **end,
+                          struct host_error *error)
 {
     static const uint8_t signature[] = {0xdd, 0xcc};
-    if (las->minor == 0 && las->offset + 2 <= source->bytes &&
-        source->bytes - las->offset == las->count * las->length + 2 &&
-        memcmp(source->data + las->offset, signature, 2) == 0) {
+    if (las->minor != 0) {
+        return 0;
+    }
+    if (host_source_all(source, at, end, error) != 0) {
+        return error->code;
+    }
+    uint64_t bytes = (uint64_t)(*end - *at);
+    if (las->offset + 2 <= bytes &&
+        bytes - las->offset == las->count * las->length + 2 &&
+        memcmp(*at + las->offset, signature, 2) == 0) {
         las->offset += 2;
     }
+    return 0;
+}
+
+/* Goes on by so many bytes; false where the file ends before. */
+static bool skip(const struct host_source *source, uint64_t bytes,
+                 const uint8_t **at, const uint8_t **end)
+{
+    while ((uint64_t)(*end - *at) < bytes) {
+        bytes -= (uint64_t)(*end - *at);
+        *at = *end;
+        if (!host_source_more(source, at, end)) {
+            return false;
+        }
+    }
+    *at += bytes;
+    return true;
 }
 
 static int read_header(const struct host_source *source, struct las *las,
@@ -152,12 +183,22 @@ static int read_las(const struct host_source *source, struct host_mesh *mesh,
     if (read_header(source, &las, error) != 0) {
         return error->code;
     }
-    skip_signature(source, &las);
-    for (uint64_t i = 0; i < las.count; i++) {
-        const uint8_t *record = source->data + las.offset + i * las.length;
+    const uint8_t *at = source->data, *end = source->data + source->bytes;
+    if (skip_signature(source, &las, &at, &end, error) != 0) {
+        return error->code;
+    }
+    if (!skip(source, las.offset, &at, &end)) {
+        return cut_short(source, &las, 0, error);
+    }
+    for (uint64_t i = 0; i < las.count; i++, at += las.length) {
         double xyz[3];
+        while ((uint64_t)(end - at) < las.length) {
+            if (!host_source_more(source, &at, &end)) {
+                return cut_short(source, &las, i, error);
+            }
+        }
         for (size_t d = 0; d < 3; d++) {
-            double whole = host_number_at(record + 4 * d, HOST_I32, false);
+            double whole = host_number_at(at + 4 * d, HOST_I32, false);
             xyz[d] = whole * las.scale[d] + las.shift[d]; /* both rounded */
         }
         if (host_points_append(mesh->points, xyz, 1, error) != 0) {
@@ -171,6 +212,7 @@ const struct host_format host_format_las = {
     .name = "LAS",
     .extensions = {".las"},
     .read_points = read_las,
+    .pieces = true,
 };
 
 const struct host_format host_format_laz = {

@@ -52,8 +52,7 @@ static int medit_tetrahedra(const struct host_source *source,
 static int read_mesh(const struct host_source *source, struct host_mesh *mesh,
                      struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     bool any = false;
     if (!host_scan_skip_blank_lines(&s) ||
         !host_scan_take(&s, "MeshVersionFormatted")) {
@@ -112,5 +111,6 @@ const struct host_format host_format_mesh = {
     .name = "Medit",
     .extensions = {".mesh"},
     .read_tetrahedra = read_mesh,
+    .pieces = true,
     .write_tetrahedra = write_mesh,
 };

@@ -93,7 +93,7 @@ static int parse_header(const struct host_source *source, struct npy *npy,
     if (!parse_dictionary(header, npy)) {
         return host_source_fail(source, error,
                                 "the array has not two dimensions; save one "
-                                "of shape (n, 3)");
+                                "of shape (n, 3), as a.reshape(-1, 3)");
     }
     if (npy->type == HOST_NO_NUMBER) {
         return host_source_fail(source, error,
@@ -108,27 +108,116 @@ static bool is_floating(const struct npy *npy)
     return npy->type == HOST_F64 || npy->type == HOST_F32;
 }
 
-static int check_size(const struct host_source *source, const struct npy *npy,
-                      struct host_error *error)
+static int wrong_size(const struct host_source *source, const struct npy *npy,
+                      uint64_t have, struct host_error *error)
+{
+    return host_fail(error, HOST_INPUT,
+                     "%s: %llu bytes of numbers where %llu rows of %llu "
+                     "numbers are due; the file is cut short or damaged, "
+                     "get it whole",
+                     source->path, (unsigned long long)have,
+                     (unsigned long long)npy->rows,
+                     (unsigned long long)npy->columns);
+}
+
+/* Takes `rows` rows at `from`. */
+typedef int taker(const struct host_source *source, const struct npy *npy,
+                  const uint8_t *from, uint64_t rows, struct host_mesh *mesh,
+                  struct host_error *error);
+
+/* All rows, as many at a time as are there.  A file that is there whole has
+ * just these; of another one that shows at the end.  Columns behind one another
+ * are taken from all of them. */
+static int take_rows(const struct host_source *source, const struct npy *npy,
+                     taker *take, struct host_mesh *mesh,
+                     struct host_error *error)
+{
+    const uint64_t row = host_number_bytes(npy->type) * npy->columns;
+    const uint8_t *at = source->data + npy->start;
+    const uint8_t *end = source->data + source->bytes;
+    uint64_t left = npy->rows, taken = 0;
+    bool more = source->feed != NULL;
+    if (npy->fortran && host_source_all(source, &at, &end, error) != 0) {
+        return error->code;
+    }
+    if (npy->columns > UINT32_MAX || (more && npy->rows > UINT32_MAX)) {
+        return wrong_size(source, npy, (uint64_t)(end - at), error);
+    }
+    if (!more || npy->fortran) {
+        uint64_t have = (uint64_t)(end - at);
+        return have / row < left || have != left * row
+                   ? wrong_size(source, npy, have, error)
+                   : take(source, npy, at, left, mesh, error);
+    }
+    while (more) {
+        uint64_t n = (uint64_t)(end - at) / row;
+        n = n < left ? n : left;
+        if (take(source, npy, at, n, mesh, error) != 0) {
+            return error->code;
+        }
+        at += n * row;
+        left -= n;
+        taken += n * row;
+        more = (left > 0 || at == end) && host_source_more(source, &at, &end);
+    }
+    return left > 0 || at != end
+               ? wrong_size(source, npy, taken + (uint64_t)(end - at), error)
+               : 0;
+}
+
+static int take_points(const struct host_source *source, const struct npy *npy,
+                       const uint8_t *from, uint64_t rows,
+                       struct host_mesh *mesh, struct host_error *error)
 {
     size_t bytes = host_number_bytes(npy->type);
-    size_t have = source->bytes - npy->start;
-    if (npy->columns > have / bytes ||
-        npy->rows > have / (bytes * (size_t)npy->columns) ||
-        npy->rows * bytes * npy->columns != have) {
-        return host_fail(error, HOST_INPUT,
-                         "%s: %zu bytes of numbers where %llu rows of %llu "
-                         "numbers are due; the file is cut short or damaged, "
-                         "get it whole",
-                         source->path, have, (unsigned long long)npy->rows,
-                         (unsigned long long)npy->columns);
+    (void)source;
+    if (!npy->fortran) {
+        return host_append_numbers(mesh->points, from, rows,
+                                   (size_t)npy->columns * bytes, npy->type,
+                                   npy->big, error);
+    }
+    for (uint64_t i = 0; i < rows; i++) {
+        double xyz[3];
+        for (uint64_t d = 0; d < 3; d++) {
+            xyz[d] = host_number_at(from + (d * rows + i) * bytes, npy->type,
+                                    npy->big);
+        }
+        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+            return error->code;
+        }
+    }
+    return 0;
+}
+
+static int take_tetrahedra(const struct host_source *source,
+                           const struct npy *npy, const uint8_t *from,
+                           uint64_t rows, struct host_mesh *mesh,
+                           struct host_error *error)
+{
+    size_t bytes = host_number_bytes(npy->type);
+    for (uint64_t i = 0; i < rows; i++) {
+        uint64_t v[4];
+        for (uint64_t k = 0; k < 4; k++) {
+            uint64_t at = npy->fortran ? k * rows + i : 4 * i + k;
+            v[k] = host_whole_at(from + at * bytes, npy->type, npy->big);
+        }
+        if (host_append_tetrahedron(mesh->tets, v, source, error) != 0) {
+            return error->code;
+        }
     }
     return 0;
 }
 
 static int read_points(const struct host_source *source, const struct npy *npy,
-                       struct host_points *points, struct host_error *error)
+                       struct host_mesh *mesh, struct host_error *error)
 {
+    if (npy->rows == 3 && npy->columns > 3) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: an array of shape (3, %llu), of which each row "
+                         "would be a point; save its transpose: "
+                         "numpy.save(FILE, a.T)",
+                         source->path, (unsigned long long)npy->columns);
+    }
     if (npy->columns < 3 || (npy->columns > 3 && !is_floating(npy))) {
         return host_fail(error, HOST_INPUT,
                          "%s: %llu columns%s where x, y and z are due; save an "
@@ -136,32 +225,12 @@ static int read_points(const struct host_source *source, const struct npy *npy,
                          source->path, (unsigned long long)npy->columns,
                          npy->columns > 3 ? " of whole numbers" : "");
     }
-    points->wide = npy->columns > 3;
-    if (check_size(source, npy, error) != 0) {
-        return error->code;
-    }
-    const uint8_t *data = source->data + npy->start;
-    size_t bytes = host_number_bytes(npy->type);
-    if (!npy->fortran) {
-        return host_append_numbers(points, data, npy->rows,
-                                   (size_t)npy->columns * bytes, npy->type,
-                                   npy->big, error);
-    }
-    for (uint64_t i = 0; i < npy->rows; i++) {
-        double xyz[3];
-        for (uint64_t d = 0; d < 3; d++) {
-            xyz[d] = host_number_at(data + (d * npy->rows + i) * bytes,
-                                    npy->type, npy->big);
-        }
-        if (host_points_append(points, xyz, 1, error) != 0) {
-            return error->code;
-        }
-    }
-    return 0;
+    mesh->points->wide = npy->columns > 3;
+    return take_rows(source, npy, take_points, mesh, error);
 }
 
 static int read_tetrahedra(const struct host_source *source,
-                           const struct npy *npy, struct host_tetrahedra *tets,
+                           const struct npy *npy, struct host_mesh *mesh,
                            struct host_error *error)
 {
     if (npy->columns != 4 || is_floating(npy)) {
@@ -171,22 +240,7 @@ static int read_tetrahedra(const struct host_source *source,
                          source->path, (unsigned long long)npy->columns,
                          is_floating(npy) ? "floating-point" : "whole");
     }
-    if (check_size(source, npy, error) != 0) {
-        return error->code;
-    }
-    const uint8_t *data = source->data + npy->start;
-    size_t bytes = host_number_bytes(npy->type);
-    for (uint64_t i = 0; i < npy->rows; i++) {
-        uint64_t v[4];
-        for (uint64_t k = 0; k < 4; k++) {
-            uint64_t at = npy->fortran ? k * npy->rows + i : 4 * i + k;
-            v[k] = host_whole_at(data + at * bytes, npy->type, npy->big);
-        }
-        if (host_append_tetrahedron(tets, v, source, error) != 0) {
-            return error->code;
-        }
-    }
-    return 0;
+    return take_rows(source, npy, take_tetrahedra, mesh, error);
 }
 
 static int read_npy(const struct host_source *source, struct host_mesh *mesh,
@@ -197,9 +251,9 @@ static int read_npy(const struct host_source *source, struct host_mesh *mesh,
         return error->code;
     }
     if (mesh->tets != NULL) {
-        return read_tetrahedra(source, &npy, mesh->tets, error);
+        return read_tetrahedra(source, &npy, mesh, error);
     }
-    return read_points(source, &npy, mesh->points, error);
+    return read_points(source, &npy, mesh, error);
 }
 
 /* The header of an array of `columns`, so long that numbers are aligned to 64.
@@ -248,6 +302,7 @@ const struct host_format host_format_npy = {
     .extensions = {".npy"},
     .read_points = read_npy,
     .read_tetrahedra = read_npy,
+    .pieces = true,
     .write_points = write_points,
     .write_tetrahedra = write_tetrahedra,
     .rows_only = true,

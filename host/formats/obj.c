@@ -61,8 +61,7 @@ static void pass_line(struct host_scan *s)
 static int read_obj(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     while (host_scan_skip_blank_lines(&s)) {
         double xyz[3];
         if (host_scan_take(&s, "v") &&
@@ -81,4 +80,5 @@ const struct host_format host_format_obj = {
     .name = "Wavefront",
     .extensions = {".obj"},
     .read_points = read_obj,
+    .pieces = true,
 };

@@ -51,8 +51,7 @@ static int take_vertex(struct host_scan *s, double xyz[3], uint64_t *columns,
 static int read_off(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     if (!host_scan_skip_blank_lines(&s) ||
         !(host_scan_take(&s, "OFF") || host_scan_take(&s, "COFF") ||
           host_scan_take(&s, "NOFF") || host_scan_take(&s, "CNOFF"))) {
@@ -100,5 +99,6 @@ const struct host_format host_format_off = {
     .name = "Geomview",
     .extensions = {".off"},
     .read_points = read_off,
+    .pieces = true,
     .write_points = write_off,
 };

@@ -118,6 +118,9 @@ static int read_header(struct ply *ply, struct host_error *error)
                            "the header has no end_header; get the file whole");
         }
         if (host_scan_take(&ply->scan, "end_header")) {
+            if (ply->coding != TEXT) { /* no lines follow, which are long */
+                ply->scan.source = NULL;
+            }
             host_scan_next_line(&ply->scan);
             break;
         }
@@ -132,6 +135,7 @@ static int read_header(struct ply *ply, struct host_error *error)
         }
     }
     ply->at = (const uint8_t *)ply->scan.at;
+    ply->end = (const uint8_t *)ply->scan.end;
     return ply->coding == UNKNOWN
                ? damaged(ply, error, "the header has no format line; add one")
                : 0;
@@ -153,8 +157,10 @@ static int take_number(struct ply *ply, enum host_number type, uint64_t row,
         return host_scan_double_anywhere(&ply->scan, value, error);
     }
     size_t bytes = host_number_bytes(type);
-    if ((size_t)(ply->end - ply->at) < bytes) {
-        return cut_short(ply, error, row);
+    while ((size_t)(ply->end - ply->at) < bytes) {
+        if (!host_source_more(ply->source, &ply->at, &ply->end)) {
+            return cut_short(ply, error, row);
+        }
     }
     *value = host_number_at(ply->at, type, ply->coding == BIG);
     ply->at += bytes;
@@ -222,9 +228,12 @@ static int check_end(struct ply *ply, struct host_error *error)
     if (ply->coding == TEXT) {
         return host_scan_end(&ply->scan, error, what);
     }
-    while (ply->at < ply->end && isspace(*ply->at)) {
-        ply->at++;
-    }
+    do {
+        while (ply->at < ply->end && isspace(*ply->at)) {
+            ply->at++;
+        }
+    } while (ply->at == ply->end &&
+             host_source_more(ply->source, &ply->at, &ply->end));
     return ply->at == ply->end ? 0 : host_source_fail(ply->source, error, what);
 }
 
@@ -232,10 +241,7 @@ static int read_ply(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
     struct ply ply = {
-        .source = source,
-        .coding = UNKNOWN,
-        .scan = host_scan_start(source->path, source->data, source->bytes),
-        .end = source->data + source->bytes};
+        .source = source, .coding = UNKNOWN, .scan = host_scan_source(source)};
     if (read_header(&ply, error) != 0) {
         return error->code;
     }
@@ -272,5 +278,6 @@ const struct host_format host_format_ply = {
     .name = "Stanford",
     .extensions = {".ply"},
     .read_points = read_ply,
+    .pieces = true,
     .write_points = write_ply,
 };

@@ -36,8 +36,7 @@ static int wrong_count(const struct host_scan *s, uint64_t rows, uint64_t count,
 static int read_pts(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     uint64_t rows = 0, count = 0;
     bool more = host_scan_skip_blank_lines(&s);
     const bool counted = more && take_count(&s, &count);
@@ -65,5 +64,6 @@ const struct host_format host_format_pts = {
     .name = "Leica",
     .extensions = {".pts"},
     .read_points = read_pts,
+    .pieces = true,
     .write_points = write_pts,
 };

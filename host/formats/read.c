@@ -2,8 +2,10 @@
 
 #include <math.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "formats.h"
+#include "host/base/memory.h"
 #include "host/base/progress.h"
 
 static const struct host_format *format_of(const char *path, enum host_use use,
@@ -13,14 +15,22 @@ static const struct host_format *format_of(const char *path, enum host_use use,
     char list[HOST_FORMAT_LIST_MAX];
     const struct host_format *format = host_format_of(path, use);
     const struct host_format *named = host_format_named(path);
-    if (named != NULL && named->unread != NULL) {
+    struct stat status;
+    if (format == NULL && stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
+        host_fail(error, HOST_INPUT, "%s: it is a directory; name a file in it",
+                  path);
+    } else if (named != NULL && named->unread != NULL) {
         host_fail(error, HOST_INPUT, "%s: %s", path, named->unread);
     } else if (format == NULL) {
         host_format_list(use, list, sizeof list);
         host_fail(error, HOST_INPUT,
-                  "%s: no format of %s has this extension; use %s, or any of "
+                  "%s: no format of %s has this extension%s; use %s, or any of "
                   "them with .gz%s",
-                  path, what, list,
+                  path, what,
+                  named == NULL             ? ""
+                  : use == HOST_READ_POINTS ? ", which tetrahedra have"
+                                            : ", which points have",
+                  list,
                   use == HOST_READ_POINTS ? ", or say which with --format"
                                           : "");
     }
@@ -42,13 +52,63 @@ static int check_finite(const char *path, const struct host_points *points,
     return 0;
 }
 
+/* Whether it is text whose lines end in CR alone: one comes before the first
+ * LF, and not right before it. */
+static bool ends_in_cr(const struct host_source *source)
+{
+    const uint8_t *data = source->data, *end = data + source->bytes;
+    const uint8_t *lf = memchr(data, '\n', source->bytes);
+    const uint8_t *cr =
+        memchr(data, '\r', (size_t)((lf == NULL ? end : lf) - data));
+    while (cr != NULL && cr < end && *cr == '\r') {
+        cr++;
+    }
+    return cr != NULL && cr < end && cr != lf &&
+           memchr(data, '\0', source->bytes) == NULL;
+}
+
+/* Such ends become those that readers know, in the file's own bytes or, where
+ * these are the caller's, in a copy.  A packed file is held whole where it has
+ * such ends, or where its format needs that. */
+static int mend_line_ends(struct host_source *source,
+                          const struct host_format *format,
+                          struct host_error *error)
+{
+    bool mends = ends_in_cr(source);
+    if ((mends || !format->pieces) && host_source_hold(source, error) != 0) {
+        return error->code;
+    }
+    if (!mends) {
+        return 0;
+    }
+    if (source->owned == NULL) {
+        source->owned = host_map(source->bytes);
+        if (source->owned == NULL) {
+            return host_fail_memory(error, source->path);
+        }
+        source->capacity = source->bytes;
+        memcpy(source->owned, source->data, source->bytes);
+        source->data = source->owned;
+    }
+    char *text = source->owned;
+    for (size_t i = 0; i < source->bytes; i++) {
+        bool alone =
+            i + 1 == source->bytes || strchr("\r\n", text[i + 1]) == NULL;
+        text[i] = text[i] == '\r' && alone ? '\n' : text[i];
+    }
+    return 0;
+}
+
 static int take_points(struct host_source *source,
                        const struct host_format *format,
                        struct host_points *points, struct host_error *error)
 {
     struct host_mesh mesh = {.points = points};
     host_progress_phase("reading", "Mpoint");
-    format->read_points(source, &mesh, error);
+    if (mend_line_ends(source, format, error) == 0) {
+        format->read_points(source, &mesh, error);
+        host_source_fault(source, error);
+    }
     if (error->code == 0 && points->count == 0) {
         host_source_fail(source, error,
                          "the file holds no point; give one with points");
@@ -73,7 +133,7 @@ int host_points_read_as(const char *path, const char *format,
                        : host_format_told(format, HOST_READ_POINTS, error);
     bool packed =
         host_is_packed(path) || (format != NULL && host_is_packed(format));
-    if (f != NULL && host_source_open(&source, path, packed, error) == 0) {
+    if (f != NULL && host_source_begin(&source, path, packed, error) == 0) {
         take_points(&source, f, points, error);
     }
     return error->code;
@@ -87,10 +147,17 @@ int host_points_read(const char *path, struct host_points *points,
 
 void host_points_note(const char *path, const struct host_points *points)
 {
+    const char *name = strcmp(path, "-") == 0 ? "stdin" : path;
+    if (points->named) {
+        host_note("%s: its first line is taken for names of columns", name);
+    }
     if (points->wide) {
         host_note("%s: the first three columns are x, y and z; those after "
-                  "them are passed over",
-                  strcmp(path, "-") == 0 ? "stdin" : path);
+                  "them are passed over%s",
+                  name,
+                  points->doubtful ? " (if its commas are decimal ones, write "
+                                     "decimal points instead)"
+                                   : "");
     }
 }
 
@@ -126,7 +193,11 @@ static int take_tetrahedra(struct host_source *source,
                            struct host_points *points, struct host_error *error)
 {
     struct host_mesh mesh = {.points = points, .tets = tets};
-    if (format->read_tetrahedra(source, &mesh, error) != 0) {
+    if (mend_line_ends(source, format, error) == 0) {
+        format->read_tetrahedra(source, &mesh, error);
+        host_source_fault(source, error);
+    }
+    if (error->code != 0) {
         host_tetrahedra_free(tets);
         if (points != NULL) {
             host_points_free(points);
@@ -142,7 +213,7 @@ int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
     if (format != NULL &&
-        host_source_open(&source, path, host_is_packed(path), error) == 0) {
+        host_source_begin(&source, path, host_is_packed(path), error) == 0) {
         take_tetrahedra(&source, format, tets, points, error);
     }
     return error->code;

@@ -25,8 +25,8 @@ int host_points_read(const char *path, struct host_points *points,
 int host_points_read_as(const char *path, const char *format,
                         struct host_points *points, struct host_error *error);
 
-/* Says on standard error, once, that there were columns which reading has
- * passed over; nothing where there were none. */
+/* Says on standard error, once, what reading has taken for granted: a line of
+ * names, columns passed over. */
 void host_points_note(const char *path, const struct host_points *points);
 
 /* The same from memory; `path` gives the extension and the name in errors. */

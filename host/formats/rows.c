@@ -1,7 +1,11 @@
 #include "rows.h"
 
 #include <ctype.h>
+#include <float.h>
 #include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "csv.h"
@@ -22,7 +26,8 @@ static enum next go_to_field(struct host_scan *s, unsigned most)
             }
         } else if (*c != ' ' && *c != '\t' && *c != '\r') {
             s->at = c;
-            return *c == '\n' || *c == '#' ? NEXT_NONE : NEXT_FIELD;
+            return *c == '\n' || host_scan_is_comment(c, s->end) ? NEXT_NONE
+                                                                 : NEXT_FIELD;
         }
     }
     s->at = c;
@@ -30,27 +35,99 @@ static enum next go_to_field(struct host_scan *s, unsigned most)
 }
 
 static int wrong_columns(struct host_scan *s, int columns, enum next next,
-                         struct host_error *error)
+                         bool first, struct host_error *error)
 {
     static const char *const few[] = {
         "", "1 column where x, y and z are due; complete the line",
         "2 columns where x, y and z are due; complete the line"};
-    return host_scan_fail(s, s->at, error,
-                          next == NEXT_EMPTY ? HOST_CSV_EMPTY : few[columns]);
+    return host_scan_fail(
+        s, s->at, error,
+        next == NEXT_EMPTY ? HOST_CSV_EMPTY
+        : first && columns == 1
+            ? "1 column where x, y and z are due; complete the line, or, where "
+              "it counts the points, remove it or say --format pts"
+            : few[columns]);
 }
 
-/* What stands between two numbers of a line, for the eye that looks for decimal
- * commas: those that are alone, before a digit. */
-enum { COMMA_NONE = 1, COMMA_DECIMAL = 2 };
+/* --- decimal commas ------------------------------------------------------- */
 
-static unsigned commas_between(const char *from, const char *to)
+/* What stands between two numbers of a line, for the eye that looks for decimal
+ * commas: those that are alone, before a digit; and before a 0 and a digit, as
+ * no coordinate begins that is a whole number. */
+enum { COMMA_NONE = 1, COMMA_DECIMAL = 2, COMMA_ZERO = 4 };
+
+static bool is_digit(char c)
 {
-    if (to - from == 1) {
-        return *from != ','               ? COMMA_NONE
-               : *to >= '0' && *to <= '9' ? COMMA_DECIMAL
-                                          : 0;
+    return c >= '0' && c <= '9';
+}
+
+/* `to` is before `end`. */
+static unsigned commas_between(const char *from, const char *to,
+                               const char *end, bool coordinate)
+{
+    if (to - from > 1 || *from != ',') {
+        return memchr(from, ',', (size_t)(to - from)) == NULL ? COMMA_NONE : 0;
     }
-    return memchr(from, ',', (size_t)(to - from)) == NULL ? COMMA_NONE : 0;
+    bool zero = coordinate && *to == '0' && end - to > 1 && is_digit(to[1]);
+    return zero            ? COMMA_DECIMAL | COMMA_ZERO
+           : is_digit(*to) ? COMMA_DECIMAL
+                           : 0;
+}
+
+/* Commas of a line of more than three numbers. */
+enum commas { COMMAS_PART, COMMAS_DOUBTFUL, COMMAS_DECIMAL };
+
+/* Of a line whose first is between two digits: `1,2,3,4` tells nothing, and
+ * `1,5, 2,5, 3` is three numbers.  Anything but whole numbers tells that commas
+ * part them. */
+static enum commas commas_of(const char *at, const char *end)
+{
+    unsigned alone = 0, other = 0;
+    while (at < end && *at != '\n' && !host_scan_is_comment(at, end)) {
+        const char *gap = at;
+        while (at < end && strchr(" \t\r,;", *at) != NULL) {
+            at++;
+        }
+        if (at == gap && !is_digit(*at) && *at != '-' && *at != '+') {
+            return COMMAS_PART;
+        }
+        if (at == gap) {
+            at++;
+        } else if (at < end && *at != '\n' && !host_scan_is_comment(at, end)) {
+            bool comma = at - gap == 1 && *gap == ',';
+            alone += comma && is_digit(*at);
+            other += !comma;
+        }
+    }
+    return other == 0                 ? COMMAS_DOUBTFUL
+           : other == 2 && alone >= 2 ? COMMAS_DECIMAL
+                                      : COMMAS_PART;
+}
+
+/* Of a line that begins with the number at `line`, more than three of them:
+ * what is between the first ones is `seen`. */
+static int check_commas(struct host_scan *s, const char *line, unsigned seen,
+                        struct host_points *points, struct host_error *error)
+{
+    enum commas commas =
+        (seen & COMMA_DECIMAL) == 0 ? COMMAS_PART : commas_of(line, s->end);
+    if ((seen & COMMA_NONE) != 0 && (seen & COMMA_DECIMAL) != 0) {
+        return host_scan_fail(s, s->at, error,
+                              "more than 3 columns, parted by commas here and "
+                              "by something else there; write decimal points, "
+                              "or part all columns alike");
+    }
+    if (commas == COMMAS_DECIMAL ||
+        (commas == COMMAS_DOUBTFUL && (seen & COMMA_ZERO) != 0)) {
+        return host_scan_fail(s, s->at, error,
+                              "more than 3 columns, all of whole numbers, by "
+                              "commas that look like decimal ones; write "
+                              "decimal points, or name the columns in a first "
+                              "line");
+    }
+    points->doubtful =
+        commas == COMMAS_DOUBTFUL && (points->count == 0 || points->doubtful);
+    return 0;
 }
 
 int host_take_point(struct host_scan *s, bool is_csv,
@@ -59,8 +136,9 @@ int host_take_point(struct host_scan *s, bool is_csv,
     double xyz[3];
     unsigned most = is_csv ? 1 : UINT_MAX, commas = 0;
     enum next next = NEXT_NONE;
+    const char *line = s->at;
     if (is_csv && host_csv_begins_empty(s)) {
-        return wrong_columns(s, 0, NEXT_EMPTY, error);
+        return wrong_columns(s, 0, NEXT_EMPTY, false, error);
     }
     for (int d = 0; d < 3; d++) {
         if (host_scan_double(s, &xyz[d], error) != 0) {
@@ -68,20 +146,21 @@ int host_take_point(struct host_scan *s, bool is_csv,
         }
         const char *end = s->at;
         next = go_to_field(s, most);
-        commas |= next == NEXT_FIELD ? commas_between(end, s->at) : 0;
+        if (next == NEXT_FIELD) {
+            commas |= commas_between(end, s->at, s->end, d < 2);
+        }
         if (d < 2 && next != NEXT_FIELD) {
-            return wrong_columns(s, d + 1, next, error);
+            return wrong_columns(s, d + 1, next, points->count == 0, error);
         }
     }
     if (next != NEXT_NONE) {
-        if (commas == (COMMA_NONE | COMMA_DECIMAL)) {
-            return host_scan_fail(s, s->at, error,
-                                  "more than 3 columns, parted by commas here "
-                                  "and by something else there; write decimal "
-                                  "points, or part all columns alike");
+        if (check_commas(s, line, commas, points, error) != 0) {
+            return error->code;
         }
         points->wide = true;
         host_scan_next_line(s);
+    } else {
+        points->doubtful = false;
     }
     return host_points_append(points, xyz, 1, error);
 }
@@ -123,10 +202,131 @@ void host_put_line(struct host_output *out, const char *before, uint64_t number,
     host_output_text(out, after);
 }
 
+/* --- numbers -------------------------------------------------------------- */
+
+enum { DOUBLE_BYTES = 40, DIGITS = 17 };
+
+/* The doubles whose shortest decimals are found in 128 bits, integers apart. */
+static const double fast_least = 1e-5, fast_most = 1e15;
+
+/* What reads back as a double, times a power of ten: all whole numbers from
+ * least to most.  It is itself `at` and a fraction. */
+struct decimals {
+    uint64_t least, most, at;
+    enum { PART_NONE, PART_BELOW_HALF, PART_HALF, PART_ABOVE_HALF } part;
+    int places; /* the power of ten */
+};
+
+/* value = m 2^-s, of which what lies within half a unit of m reads back: from
+ * P - T / 2 to P + T / 2, for P = m T and T a power of ten, in units of 2^-s,
+ * and with both ends where m is even.  Below a power of two it is half of that.
+ * With `places` such that 10^16 <= P 2^-s < 10^18, T is at most 10^22 and at
+ * least 100, and P below 2^127. */
+static struct decimals decimals_of(double value)
+{
+    int exponent;
+    uint64_t m = (uint64_t)ldexp(frexp(value, &exponent), DBL_MANT_DIG);
+    int s = DBL_MANT_DIG - exponent;
+    struct decimals d = {.places = DIGITS - 1 -
+                                   (int)floor((exponent - 1) * 0.30102999566)};
+    unsigned __int128 power = 1;
+    for (int i = 0; i < d.places; i++) {
+        power *= 10;
+    }
+    unsigned __int128 whole = m * power, mask = ((unsigned __int128)1 << s) - 1;
+    unsigned __int128 high = whole + power / 2;
+    unsigned __int128 low =
+        whole - power / (m == UINT64_C(1) << (DBL_MANT_DIG - 1) ? 4 : 2);
+    unsigned __int128 half = (mask + 1) / 2;
+    bool closed = m % 2 == 0;
+    d.most = (uint64_t)(high >> s) - (!closed && (high & mask) == 0);
+    d.least = (uint64_t)((low + mask) >> s) + (!closed && (low & mask) == 0);
+    d.at = (uint64_t)(whole >> s);
+    unsigned __int128 part = whole & mask;
+    d.part = part == 0     ? PART_NONE
+             : part < half ? PART_BELOW_HALF
+             : part > half ? PART_ABOVE_HALF
+                           : PART_HALF;
+    return d;
+}
+
+/* The multiple of the largest power of ten that reads back, without its zeros:
+ * the nearest one, of two the even one. */
+static uint64_t shortest(struct decimals *d)
+{
+    uint64_t unit = 1;
+    while (d->most / (10 * unit) * (10 * unit) >= d->least) {
+        unit *= 10;
+        d->places--;
+    }
+    uint64_t n = d->at / unit, rest = d->at % unit;
+    bool odd = n % 2 != 0;
+    bool up = unit == 1 ? d->part > PART_HALF || (d->part == PART_HALF && odd)
+                        : rest > unit / 2 || (rest == unit / 2 &&
+                                              (d->part != PART_NONE || odd));
+    return (up || n * unit < d->least) && (n + 1) * unit <= d->most ? n + 1 : n;
+}
+
+/* n 10^-places, of more than 0 places. */
+static size_t print_fixed(char *text, bool negative, uint64_t n, int places)
+{
+    char digits[DOUBLE_BYTES];
+    size_t at = sizeof digits;
+    for (int i = 0; i < places || n > 0; i++, n /= 10) {
+        if (i == places) {
+            digits[--at] = '.';
+        }
+        digits[--at] = (char)('0' + n % 10);
+    }
+    if (sizeof digits - at == (size_t)places) {
+        digits[--at] = '.';
+        digits[--at] = '0';
+    }
+    if (negative) {
+        digits[--at] = '-';
+    }
+    memcpy(text, digits + at, sizeof digits - at);
+    return sizeof digits - at;
+}
+
+/* By trial, which needs no more than 17 digits; of normal numbers fewer than 15
+ * are 15 with zeros behind them.  Some powers of two have 17 where 16 that are
+ * not the nearest would do. */
+static size_t print_rare(char *text, double value)
+{
+    int n = 0, digits = fabs(value) < DBL_MIN ? 1 : DBL_DIG;
+    do {
+        n = snprintf(text, DOUBLE_BYTES, "%.*g", digits, value);
+    } while (digits++ < DIGITS && strtod(text, NULL) != value);
+    return (size_t)n;
+}
+
+static void put_double(struct host_output *out, double value)
+{
+    char text[DOUBLE_BYTES];
+    double size = fabs(value);
+    if (size < fast_most && size == floor(size)) {
+        if (signbit(value)) {
+            host_output_text(out, "-");
+        }
+        host_output_unsigned(out, (uint64_t)size);
+        return;
+    }
+    size_t n = 0;
+    if (size >= fast_least && size < fast_most) {
+        struct decimals d = decimals_of(size);
+        uint64_t digits = shortest(&d);
+        n = print_fixed(text, signbit(value) != 0, digits, d.places);
+    } else {
+        n = print_rare(text, value);
+    }
+    host_output_bytes(out, text, n);
+}
+
 void host_put_xyz(struct host_output *out, const double *xyz)
 {
     for (int d = 0; d < 3; d++) {
-        host_output_double(out, xyz[d] + 0.0);
+        put_double(out, xyz[d] + 0.0);
         if (d < 2) {
             host_output_text(out, " ");
         }
@@ -151,7 +351,7 @@ void host_put_points(struct host_output *out, const struct host_points *points,
             host_output_text(out, separator);
         }
         for (uint64_t d = 0; d < 3; d++) {
-            host_output_double(out, points->xyz[3 * i + d]);
+            put_double(out, points->xyz[3 * i + d]);
             host_output_text(out, d < 2 ? separator : "\n");
         }
     }

@@ -15,8 +15,8 @@
 
 /* Appends the point on the line at hand, and goes to the end of that: its first
  * three columns, whatever those behind them hold.  Fewer are HOST_INPUT; so are
- * columns parted by commas that look like decimal ones.  In a .csv none of the
- * three is empty. */
+ * columns parted by commas that look like decimal ones; where that cannot be
+ * told, points->doubtful is set.  In a .csv none of the three is empty. */
 int host_take_point(struct host_scan *s, bool is_csv,
                     struct host_points *points, struct host_error *error);
 
@@ -33,14 +33,17 @@ int host_take_section_end(struct host_scan *s, struct host_error *error);
 void host_put_line(struct host_output *out, const char *before, uint64_t number,
                    const char *after);
 
-/* x, y and z, blanks between them; -0.0 as 0.0. */
+/* x, y and z, blanks between them; -0.0 as 0.0.  Of the numbers that read back
+ * as the same double it is the one with the fewest digits, and of these the
+ * nearest; 17 digits at most. */
 void host_put_xyz(struct host_output *out, const double *xyz);
 
 /* n numbers, each plus base and with a blank before it. */
 void host_put_row(struct host_output *out, const uint32_t *v, int n,
                   uint64_t base);
 
-/* A line a point, as it is, its number first where `numbered`. */
+/* A line a point, as it is, its number first where `numbered`; numbers as
+ * above. */
 void host_put_points(struct host_output *out, const struct host_points *points,
                      const char *separator, bool numbered);
 

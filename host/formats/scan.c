@@ -1,6 +1,7 @@
 #include "scan.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -9,9 +10,43 @@ struct host_scan host_scan_start(const char *path, const void *data,
                                  size_t bytes)
 {
     const char *text = data;
-    struct host_scan s = {path, text, text, text + bytes, 0};
+    struct host_scan s = {path, text, text, text + bytes, 0, NULL, NULL};
     if (bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) {
         s.at += 3;
+    }
+    return s;
+}
+
+/* Until the line at hand is whole, or the file has ended. */
+static void fill(struct host_scan *s)
+{
+    const uint8_t *at = (const uint8_t *)s->at, *end = (const uint8_t *)s->end;
+    const char *last = NULL;
+    for (const char *c = s->start; c < s->at; c++) {
+        s->lines_before += *c == '\n';
+    }
+    while (last == NULL && host_source_more(s->source, &at, &end)) {
+        last = memrchr(at, '\n', (size_t)(end - at));
+    }
+    s->start = s->at = (const char *)at;
+    s->end = (const char *)end;
+    s->whole = last == NULL ? s->end : last + 1;
+    if (last == NULL) {
+        s->source = NULL; /* there is no more */
+    }
+}
+
+struct host_scan host_scan_source(const struct host_source *source)
+{
+    struct host_scan s =
+        host_scan_start(source->path, source->data, source->bytes);
+    if (source->feed != NULL) {
+        const char *last = memrchr(s.start, '\n', source->bytes);
+        s.source = source;
+        s.whole = last == NULL ? s.start : last + 1;
+        if (s.at >= s.whole) {
+            fill(&s);
+        }
     }
     return s;
 }
@@ -31,18 +66,27 @@ static bool is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
+bool host_scan_is_comment(const char *at, const char *end)
+{
+    return *at == '#' || (*at == '/' && end - at > 1 && at[1] == '/');
+}
+
 bool host_scan_more(struct host_scan *s)
 {
     while (s->at < s->end && is_blank(*s->at)) {
         s->at++;
     }
-    return s->at < s->end && !is_end(*s->at);
+    return s->at < s->end && *s->at != '\n' &&
+           !host_scan_is_comment(s->at, s->end);
 }
 
 void host_scan_next_line(struct host_scan *s)
 {
     const char *line = memchr(s->at, '\n', (size_t)(s->end - s->at));
     s->at = line == NULL ? s->end : line + 1;
+    if (s->source != NULL && s->at >= s->whole) {
+        fill(s);
+    }
 }
 
 bool host_scan_skip_blank_lines(struct host_scan *s)
@@ -267,9 +311,10 @@ static int no_number(struct host_scan *s, struct host_error *error)
         return host_scan_fail(s, at, error,
                               "infinity is no coordinate; remove the point");
     }
-    strcpy(text, "'");
-    strcat(text, word);
-    strcat(text, "' is no number; correct it");
+    (void)snprintf(text, sizeof text,
+                   "'%s' is no number; correct it, or put # before a line "
+                   "that holds none",
+                   word);
     return host_scan_fail(s, at, error, text);
 }
 

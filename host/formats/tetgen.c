@@ -13,8 +13,7 @@
 static int read_node(const struct host_source *source, struct host_mesh *mesh,
                      struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     uint64_t count, dimensions, base = 0;
     if (host_scan_unsigned(&s, UINT32_MAX - 1, &count, error) != 0 ||
         host_scan_unsigned(&s, UINT32_MAX, &dimensions, error) != 0) {
@@ -207,8 +206,7 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
 static int read_ele(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
-    struct host_scan s =
-        host_scan_start(source->path, source->data, source->bytes);
+    struct host_scan s = host_scan_source(source);
     uint64_t count, corners, base = 0;
     if (host_scan_unsigned(&s, UINT64_MAX / 64, &count, error) != 0 ||
         host_scan_unsigned(&s, UINT32_MAX, &corners, error) != 0) {
@@ -258,7 +256,9 @@ static int write_ele(struct host_output *out, struct host_output *beside,
 {
     enum { NODE, NEIGH, FACE };
     if (beside != NULL) {
-        write_node_beside(&beside[NODE], points);
+        if (beside[NODE].file >= 0) {
+            write_node_beside(&beside[NODE], points);
+        }
         write_topology(&beside[NEIGH], &beside[FACE], points, tets, error);
     }
     host_put_line(out, "", tets->count, " 4 0\n");
@@ -274,6 +274,7 @@ const struct host_format host_format_node = {
     .name = "TetGen",
     .extensions = {".node"},
     .read_points = read_node,
+    .pieces = true,
     .write_points = write_node,
 };
 
@@ -281,6 +282,7 @@ const struct host_format host_format_ele = {
     .name = "TetGen",
     .extensions = {".ele"},
     .read_tetrahedra = read_ele,
+    .pieces = true,
     .write_tetrahedra = write_ele,
     .beside = {".node", ".neigh", ".face"},
     .rows_only = true,

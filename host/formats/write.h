@@ -7,12 +7,14 @@
  *
  *     host_tetrahedra_map(&tets, order.row);
  *     host_tetrahedra_sort(&tets);
- *     if (host_write("out.vtu", &points, &tets, &error) != 0)
+ *     if (host_write("out.vtu", NULL, &points, &tets, &error) != 0)
  *         return error.code;
  *     return host_output_commit(&error);
  */
 #ifndef HOST_WRITE_H
 #define HOST_WRITE_H
+
+#include <stdbool.h>
 
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
@@ -31,9 +33,15 @@ int host_points_write_as(const char *path, const char *format,
                          struct host_error *error);
 
 /* Writes the tetrahedra (sorted, vertices = rows of points), and what belongs
- * beside them; "-" as above. */
-int host_write(const char *path, const struct host_points *points,
+ * beside them; "-" as above.  `input` is the file of the points, or NULL: if it
+ * is what would be beside them, it stays as it is. */
+int host_write(const char *path, const char *input,
+               const struct host_points *points,
                const struct host_tetrahedra *tets, struct host_error *error);
+
+/* Whether `name`, which belongs beside an output, is `input` and of the same
+ * format, and so has the points already.  input: NULL is none. */
+bool host_write_leaves(const char *input, const char *name);
 
 /* 0 where `path` has an extension that host_write knows, else HOST_USAGE with
  * the list of those that are allowed.  For checking before the work starts. */
@@ -44,7 +52,9 @@ int host_write_check(const char *path, struct host_error *error);
 const char *host_write_file(const char *path, unsigned k, char *name,
                             size_t size);
 
-/* 0 where a file can be made beside `path`, else HOST_INPUT. */
-int host_write_probe(const char *path, struct host_error *error);
+/* 0 where a file can be made beside `path`, else HOST_INPUT.  `input`: as of
+ * host_write. */
+int host_write_probe(const char *path, const char *input,
+                     struct host_error *error);
 
 #endif

@@ -1,16 +1,21 @@
 #include "holder.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <netinet/in.h>
 #include <pwd.h>
 #include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/pidfd.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "host/base/text.h"
+#include "transport/drivers/tcp_address.h"
 
 enum { NAME_BYTES = 16, START_FIELD = 22, DAY_S = 86400 };
 
@@ -110,6 +115,122 @@ bool host_holder_of(struct host_holder *holder, int file)
     return true;
 }
 
+/* --- whether a process has a wire open -------------------------------------
+ */
+
+/* That the process is still the one that took the place. */
+static bool is_of_user(const struct host_holder *holder)
+{
+    char text[2048];
+    unsigned long real, effective;
+    (void)read_of(holder->pid, "status", text, sizeof text);
+    const char *line = strstr(text, "\nUid:");
+    return line != NULL &&
+           sscanf(line, "\nUid: %lu %lu", &real, &effective) == 2 &&
+           effective == holder->uid;
+}
+
+static bool is_device(int file, const char *path)
+{
+    struct stat device, open_file;
+    return stat(path, &device) == 0 && fstat(file, &open_file) == 0 &&
+           S_ISCHR(device.st_mode) && S_ISCHR(open_file.st_mode) &&
+           device.st_rdev == open_file.st_rdev;
+}
+
+/* The process may have called it by a path from where it is. */
+static bool is_called(pid_t pid, const struct sockaddr_un *peer,
+                      const char *path)
+{
+    char called[sizeof peer->sun_path + 64];
+    struct stat one, other;
+    snprintf(called, sizeof called, "/proc/%ld/%s/%.*s", (long)pid,
+             peer->sun_path[0] == '/' ? "root" : "cwd",
+             (int)sizeof peer->sun_path, peer->sun_path);
+    return peer->sun_path[0] != '\0' && stat(called, &one) == 0 &&
+           stat(path, &other) == 0 && one.st_dev == other.st_dev &&
+           one.st_ino == other.st_ino;
+}
+
+static bool is_at(const struct sockaddr *peer, const char *text)
+{
+    struct tcp_address address;
+    const struct sockaddr *to = &address.to.any;
+    if (tcp_address_parse(&address, text) != 0 ||
+        peer->sa_family != to->sa_family) {
+        return false;
+    }
+    if (to->sa_family == AF_INET) {
+        const struct sockaddr_in *a = (const void *)peer, *b = (const void *)to;
+        return a->sin_port == b->sin_port &&
+               a->sin_addr.s_addr == b->sin_addr.s_addr;
+    }
+    const struct sockaddr_in6 *a = (const void *)peer, *b = (const void *)to;
+    return a->sin6_port == b->sin6_port &&
+           memcmp(&a->sin6_addr, &b->sin6_addr, sizeof a->sin6_addr) == 0;
+}
+
+/* wire: "KIND:PATH" of host/machines/remote.h. */
+static bool is_wire(pid_t pid, int file, const char *wire)
+{
+    union {
+        struct sockaddr any;
+        struct sockaddr_un un;
+        struct sockaddr_storage storage;
+    } peer;
+    socklen_t size = sizeof peer;
+    const char *path = strchr(wire, ':');
+    memset(&peer, 0, sizeof peer);
+    if (path++ == NULL) {
+        return false;
+    }
+    if (strncmp(wire, "serial:", 7) == 0) {
+        return is_device(file, path);
+    }
+    if (getpeername(file, &peer.any, &size) != 0) {
+        return false;
+    }
+    return peer.any.sa_family == AF_UNIX ? is_called(pid, &peer.un, path)
+                                         : is_at(&peer.any, path);
+}
+
+/* Looks at each of its open files, by a copy, which the kernel gives to root.
+ */
+static bool has_open(const struct host_holder *holder, const char *wire)
+{
+    char path[64];
+    int process = pidfd_open(holder->pid, 0);
+    snprintf(path, sizeof path, "/proc/%ld/fd", (long)holder->pid);
+    DIR *folder = process < 0 ? NULL : opendir(path);
+    const struct dirent *entry;
+    bool found = false;
+    while (folder != NULL && !found && is_of_user(holder) &&
+           (entry = readdir(folder)) != NULL) {
+        int file =
+            pidfd_getfd(process, (int)strtol(entry->d_name, NULL, 10), 0);
+        if (file >= 0) {
+            found = is_wire(holder->pid, file, wire);
+            close(file);
+        }
+    }
+    if (folder != NULL) {
+        closedir(folder);
+    }
+    if (process >= 0) {
+        close(process);
+    }
+    return found;
+}
+
+bool host_holder_believed(const struct host_holder *holder, const char *wire)
+{
+    return holder->uid == geteuid() || holder->uid == 0 ||
+           (geteuid() == 0 && has_open(holder, wire));
+}
+
+/* --- who has it ------------------------------------------------------------
+ */
+
 /* One that takes no calls for so long that its queue is full has the wire, and
  * nobody is told who it is. */
 bool host_holder_find(struct host_holder *holder, const char *wire)
@@ -119,7 +240,8 @@ bool host_holder_find(struct host_holder *holder, const char *wire)
     int file = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     bool found = file >= 0;
     if (found && connect(file, (const struct sockaddr *)&address, size) == 0) {
-        found = host_holder_of(holder, file) && holder->pid != getpid();
+        found = host_holder_of(holder, file) && holder->pid != getpid() &&
+                (geteuid() != 0 || host_holder_believed(holder, wire));
     } else if (found) {
         found = errno == EAGAIN;
         memset(holder, 0, sizeof *holder);

@@ -33,7 +33,7 @@ struct host_holder {
     int64_t since_s;   /* of the epoch, when it began; 0: not known */
 };
 
-/* False: nobody, or this process. */
+/* False: nobody, or this process, or one that is not to be believed. */
 bool host_holder_find(struct host_holder *holder, const char *wire);
 
 /* "incode run bunny.xyz --cube lab.cube, process 4711 of alice, since 19:02" */
@@ -44,5 +44,9 @@ const char *host_holder_text(const struct host_holder *holder, char *text,
  * end of a socket there. */
 socklen_t host_holder_address(const char *wire, struct sockaddr_un *address);
 bool host_holder_of(struct host_holder *holder, int file);
+
+/* Anybody may take a meeting place: whether it is of this user, or of root; or,
+ * for root, who may look at all, of a process that has that wire open. */
+bool host_holder_believed(const struct host_holder *holder, const char *wire);
 
 #endif

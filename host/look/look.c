@@ -159,10 +159,13 @@ int host_look_open(struct host_look *look, const char *wire,
                          wire);
     }
     /* Another's word on a cube is not to be taken for the cube's. */
-    if (look->holder.uid != geteuid() && look->holder.uid != 0 &&
-        geteuid() != 0) {
-        return host_fail(error, HOST_CUBE, "%s has the cube; ask them",
-                         host_holder_text(&look->holder, text, sizeof text));
+    if (!host_holder_believed(&look->holder, wire)) {
+        return host_fail(error, HOST_CUBE, "%s %s",
+                         host_holder_text(&look->holder, text, sizeof text),
+                         geteuid() != 0
+                             ? "has the cube; ask them"
+                             : "says that it has the cube, and does not have "
+                               "its wire open; ask them, or end it");
     }
     return take_greeting(look, error);
 }

@@ -6,7 +6,9 @@
  *
  * The meeting place is an abstract socket: it needs no file, is gone with its
  * process however that ends, and is seen by other users, to whom the kernel
- * vouches for who listens.  No one but root and its own user is answered.
+ * vouches for who listens.  No one but root and its own user is answered, and
+ * no one else is believed: root believes another user's process that has the
+ * wire open.
  *
  * A line of JSON each.  Unasked, first: {"incode": VERSION, "protocol":
  * NODE_PROTOCOL, "nodes": N, "dimension": D, "serial_baud": B}, or {"error":

@@ -12,6 +12,7 @@
 #include "console.h"
 #include "emulator.h"
 #include "host/base/clock.h"
+#include "host/base/create.h"
 #include "host/base/progress.h"
 #include "qmp.h"
 #include "transport/drivers/tcp.h"
@@ -27,10 +28,8 @@ struct board {
     off_t heard;    /* so far */
     int flash;
     pid_t pid; /* of the process that qmp speaks to */
-    /* Where they have names: of UARTs, of what UART 0 has said, of the chip, of
-     * the monitor. */
-    char wire[HOST_UARTS_MAX][PATH_MAX];
-    char log[PATH_MAX], chip[PATH_MAX], control[PATH_MAX];
+    /* Sockets in the folder, where there is one: of UARTs, of the monitor. */
+    char wire[HOST_UARTS_MAX][80], control[80];
 };
 
 struct cube {
@@ -70,75 +69,104 @@ static int refuse(const char *what, struct host_error *error)
                      what, strerror(errno));
 }
 
-static int refuse_file(const char *path, struct host_error *error)
+static int refuse_file(const char *name,
+                       const struct host_cluster_options *options,
+                       struct host_error *error)
 {
     return host_fail(error, HOST_INPUT,
-                     "%s: cannot be written (%s); free %u MB a board there, or "
-                     "choose another place",
-                     path, strerror(errno), HOST_FLASH_BYTES >> 20);
+                     "%s/%s: cannot be written (%s); free %u MB a board there, "
+                     "or choose another place",
+                     options->directory, name, strerror(errno),
+                     HOST_FLASH_BYTES >> 20);
+}
+
+/* A file in the folder, or one that has no name. */
+static int open_file(const char *name,
+                     const struct host_cluster_options *options,
+                     struct host_error *error)
+{
+    if (options->directory == NULL) {
+        int file = memfd_create(name, MFD_CLOEXEC);
+        return file >= 0 ? file : (refuse(name, error), -1);
+    }
+    int file = host_folder_file(options->folder, name, O_RDWR | O_CREAT);
+    if (file < 0 && (errno == ELOOP || errno == EPERM)) {
+        host_fail(error, HOST_INPUT,
+                  "%s/%s: is no plain file of this user's alone; remove it, or "
+                  "choose another place",
+                  options->directory, name);
+    } else if (file < 0) {
+        refuse_file(name, options, error);
+    }
+    return file;
 }
 
 /* A chip that is new, unless a file has one, with the board's image; empty: as
  * it is. */
-static int make_flash(struct board *board, bool named, bool empty,
+static int make_flash(struct board *board, unsigned node,
+                      const struct host_cluster_options *options,
                       struct host_error *error)
 {
     struct stat about;
+    char name[32];
     bool card = board->emulator.bare->card;
-    board->flash = named ? open(board->chip, O_RDWR | O_CREAT | O_CLOEXEC, 0600)
-                         : memfd_create("flash", MFD_CLOEXEC);
-    if (board->flash < 0 || fstat(board->flash, &about) != 0) {
-        return named ? refuse_file(board->chip, error) : refuse("flash", error);
+    snprintf(name, sizeof name, "flash%u", node);
+    board->flash = open_file(name, options, error);
+    if (board->flash < 0) {
+        return error->code;
     }
-    if (about.st_size != HOST_FLASH_BYTES &&
+    if ((fstat(board->flash, &about) != 0 ||
+         about.st_size != HOST_FLASH_BYTES) &&
         host_chip_make(board->flash, card) != 0) {
-        if (!named) {
-            return refuse("flash", error);
+        if (options->directory == NULL) {
+            return refuse(name, error);
         }
-        (void)refuse_file(board->chip, error);
-        (void)unlink(board->chip); /* half a chip fills what is full */
+        (void)refuse_file(name, options, error);
+        (void)unlinkat(options->folder, name, 0); /* half a chip fills what is
+                                                     full */
         return error->code;
     }
     board->emulator.flash.fd = board->flash;
-    return empty ? 0
-                 : host_chip_install(board->flash, card, board->emulator.image,
-                                     error);
+    return options->empty ? 0
+                          : host_chip_install(board->flash, card,
+                                              board->emulator.image, error);
 }
 
 /* What UART 0 says where no frames go over it. */
-static int make_log(struct board *board, bool named, struct host_error *error)
+static int make_log(struct board *board, unsigned node,
+                    const struct host_cluster_options *options,
+                    struct host_error *error)
 {
-    board->said =
-        named ? open(board->log, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)
-              : memfd_create("console", MFD_CLOEXEC);
-    if (board->said < 0) {
-        return named ? refuse_file(board->log, error)
-                     : refuse("console", error);
+    char name[32];
+    snprintf(name, sizeof name, "console%u.log", node);
+    board->said = open_file(name, options, error);
+    if (board->said >= 0 && ftruncate(board->said, 0) != 0) {
+        refuse(name, error);
     }
     board->emulator.uart[0].log.fd = board->said;
-    return 0;
+    return error->code;
 }
 
 /* What is to be reached from outside: the host's wire or the console, those to
- * nodes that are left out or not joined, and the monitor. */
+ * nodes that are left out or not joined, and the monitor.  Their paths lead
+ * through the open folder, whatever its name leads to meanwhile. */
 static void name_files(struct cube *cube, unsigned node,
                        const struct host_cluster_options *options)
 {
     struct board *board = &cube->board[node];
     struct host_emulator *e = &board->emulator;
+    const size_t size = sizeof board->control;
     char name[32];
-    snprintf(board->log, PATH_MAX, "%s/console%u.log", options->directory,
-             node);
-    snprintf(board->chip, PATH_MAX, "%s/flash%u", options->directory, node);
-    snprintf(board->control, PATH_MAX, "%s/qmp%u.socket", options->directory,
-             node);
+    e->folder = options->folder;
+    snprintf(board->control, size, "/proc/self/fd/%d/qmp%u.socket",
+             options->folder, node);
     e->qmp.path = board->control;
     for (unsigned i = 0; 1u << i <= options->nodes; i++) {
         unsigned other = i == 0 ? node : node ^ 1u << (i - 1);
         if (i == 0 || options->open || (options->left_out >> other & 1) != 0) {
             host_emulated_wire(node, i, name);
-            snprintf(board->wire[i], PATH_MAX, "%s/%s", options->directory,
-                     name);
+            snprintf(board->wire[i], size, "/proc/self/fd/%d/%s",
+                     options->folder, name);
             e->uart[i].wire.path = board->wire[i];
         }
     }
@@ -159,12 +187,11 @@ static int make_board(struct cube *cube, const struct host_bare *bare,
                       struct host_error *error)
 {
     struct board *board = &cube->board[node];
-    bool named = options->directory != NULL;
     host_console_init(&board->console, node, bare->machine);
     if (host_emulator_find(bare, &board->emulator, error) != 0) {
         return error->code;
     }
-    if (named) {
+    if (options->directory != NULL) {
         name_files(cube, node, options);
     } else if (unix_file_pair(board->monitor) != 0) {
         return refuse("monitor", error);
@@ -172,10 +199,10 @@ static int make_board(struct cube *cube, const struct host_bare *bare,
         host_qmp_init(&board->qmp, board->monitor[0]);
         board->emulator.qmp.fd = board->monitor[1];
     }
-    if (node != 0 && make_log(board, named, error) != 0) {
+    if (node != 0 && make_log(board, node, options, error) != 0) {
         return error->code;
     }
-    return make_flash(board, named, options->empty, error);
+    return make_flash(board, node, options, error);
 }
 
 static void close_boards(struct cube *cube)

@@ -47,6 +47,7 @@ struct host_cluster_options {
     uint64_t left_out;     /* a bit for each node that is not to be started */
     const char *directory; /* of emulated boards: what is to stay, or to be
                               reached from outside; NULL: nothing */
+    int folder;            /* that directory, from host_folder_open */
     bool open;             /* there, all wires between boards: not joined */
     bool empty;            /* boards have their loaders, and no image */
     uint32_t serial_baud;  /* see machine.h */

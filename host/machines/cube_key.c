@@ -1,7 +1,6 @@
 #include "cube_key.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -9,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "host/base/create.h"
 #include "transport/secure.h"
 #include "transport/secure_wipe.h"
 
@@ -52,7 +52,7 @@ static bool fill(int fd, const char *text, size_t size, mode_t mode)
 int host_key_write(const char *path, const char *text, size_t size, mode_t mode,
                    struct host_error *error)
 {
-    int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode & 0600);
+    int fd = host_create(path, mode & 0600);
     if (fd < 0 && errno == EEXIST) {
         return host_fail(error, HOST_INPUT,
                          "%s: is there already, and may be a key in use; give "

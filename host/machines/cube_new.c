@@ -2,7 +2,6 @@
 
 #include <argp.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +9,7 @@
 
 #include "cube_file.h"
 #include "cube_key.h"
+#include "host/base/create.h"
 #include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/base/text.h"
@@ -314,7 +314,7 @@ static int write_new(const struct cube_new *c)
         make_key(c, key, sizeof key) != 0) {
         return c->error->code;
     }
-    int fd = open(c->output, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    int fd = host_create(c->output, 0644);
     FILE *out = fd < 0 ? NULL : fdopen(fd, "w");
     if (out == NULL) {
         return host_fail(

@@ -69,6 +69,7 @@ int host_emulator_find(const struct host_bare *bare,
     memset(emulator, 0, sizeof *emulator);
     emulator->bare = bare;
     emulator->flash.fd = emulator->qmp.fd = emulator->errors = -1;
+    emulator->folder = -1;
     for (unsigned i = 0; i < HOST_UARTS_MAX; i++) {
         emulator->uart[i].wire.fd = emulator->uart[i].log.fd = -1;
     }
@@ -207,6 +208,9 @@ void host_emulator_become(const struct host_emulator *emulator, unsigned turn)
     const struct host_emulator *e = emulator;
     struct words *w = &words;
     (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
+    if (e->folder >= 0) {
+        (void)fcntl(e->folder, F_SETFD, 0);
+    }
     if (e->errors >= 0) {
         (void)dup2(e->errors, STDERR_FILENO);
     }

@@ -60,6 +60,7 @@ struct host_emulator {
         struct host_place wire, log;
     } uart[HOST_UARTS_MAX];
     struct host_place qmp; /* in the same way: of the monitor */
+    int folder; /* that the paths of wires and monitor lead through; -1: none */
     int errors; /* what it says of itself goes there; -1: to standard error */
 };
 

@@ -25,6 +25,10 @@ struct host_points {
     uint64_t capacity; /* rows that xyz has room for */
     uint32_t base;     /* number of row 0 in the input: 0, or 1 in a .node */
     bool wide;         /* columns after the third were passed over */
+    bool named;        /* a line of names was taken for those of columns */
+    /* Every row was of more than three whole numbers, parted by commas alone,
+     * which may be decimal ones. */
+    bool doubtful;
 };
 
 /* Appends rows; HOST_INPUT past 2^32 - 2 rows, or what the memory holds. */

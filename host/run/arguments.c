@@ -86,7 +86,11 @@ static const struct argp_option options_of_run[] = {
     {"table", KEY_TABLE, NULL, 0,
      "Run on one node too, and print the columns of the paper's Table 2", 2},
     {"map", KEY_MAP, NULL, 0, "Print the memory map of a node", 2},
+    {"explain", KEY_EXPLAIN, NULL, 0,
+     "Say why --strategy auto took the strategy that it took", 2},
     {"quiet", 'q', NULL, 0, "Print nothing but errors", 2},
+    {"progress", KEY_PROGRESS, NULL, 0,
+     "Without a terminal, too: a line of progress every three seconds", 2},
     {"no-progress", KEY_NO_PROGRESS, NULL, 0,
      "No line of progress on a terminal", 2},
     {NULL, 0, NULL, 0, "Testing:", 3},
@@ -325,14 +329,20 @@ static error_t parse_report(int key, const char *value,
     case 'q':
         o->quiet = true;
         return 0;
+    case KEY_EXPLAIN:
+        o->explain = true;
+        return 0;
+    case KEY_PROGRESS:
     case KEY_NO_PROGRESS:
-        o->progress = false;
+        o->progress = o->anywhere = key == KEY_PROGRESS;
         return 0;
     case ARGP_KEY_ARG:
         if (o->input != NULL) {
+            bool output = host_format_of(value, HOST_WRITE_TETRAHEDRA) != NULL;
             host_fail(p->error, HOST_USAGE,
-                      "%s: a second file of points after %s; give one", value,
-                      o->input);
+                      "%s: a second file of points after %s; give one%s%s",
+                      value, o->input, output ? ", and an output as -o " : "",
+                      output ? value : "");
         }
         o->input = value;
         return 0;
@@ -397,7 +407,8 @@ static int parse_run(int argc, char **argv, unsigned flags,
         "Triangulates POINTS on a cube of nodes that it starts on this "
         "machine, and writes each output by its extension.\v"
         "POINTS: %s; .gz of any of them; - is .xyz from standard input. Of a "
-        ".csv whose first line names columns x, y and z, in any order and "
+        ".csv, .xyz or .txt whose first line names columns x, y and z, in any "
+        "order and "
         "among others, these are taken; of other text, and of .npy, the first "
         "three columns.\n\n"
         "Examples:\n"

@@ -34,6 +34,8 @@ enum {
     KEY_VERIFY,
     KEY_NO_VERIFY,
     KEY_NO_PROGRESS,
+    KEY_PROGRESS,
+    KEY_EXPLAIN,
     KEY_TABLE,
     KEY_MAP,
     KEY_WINDOW,

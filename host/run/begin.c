@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include "host/files/output.h"
@@ -20,6 +21,7 @@ static void open_standard(void)
 
 void host_begin(void)
 {
+    (void)prctl(PR_SET_NAME, "incode"); /* if started as /proc/self/exe */
     open_standard();
     (void)signal(SIGCHLD, SIG_DFL);
     host_output_guard();

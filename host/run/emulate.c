@@ -9,10 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
+#include "host/base/create.h"
 #include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/base/progress.h"
@@ -60,7 +60,7 @@ struct emulate {
     bool empty;           /* and their chips have no image */
     const char *file;
     char directory[PATH_MAX];
-    int locked; /* the directory, open */
+    int folder; /* the directory, open, and locked */
     struct host_error *error;
 };
 
@@ -185,12 +185,11 @@ static int take_directory(struct emulate *e)
                          "give a shorter one, or go to its folder",
                          e->file);
     }
-    if (mkdir(e->directory, 0700) != 0 && errno != EEXIST) {
-        return host_fail(e->error, HOST_INPUT, "%s: %s; give another -o",
-                         e->directory, strerror(errno));
+    e->folder = host_folder_open(e->directory, e->error);
+    if (e->folder < 0) {
+        return e->error->code;
     }
-    e->locked = open(e->directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (e->locked < 0 || flock(e->locked, LOCK_EX | LOCK_NB) != 0) {
+    if (flock(e->folder, LOCK_EX | LOCK_NB) != 0) {
         return host_fail(
             e->error, HOST_INPUT,
             "%s: %s; end what uses it, or give another -o", e->directory,
@@ -206,13 +205,15 @@ static int take_directory(struct emulate *e)
 static int check_file(const struct emulate *e)
 {
     char text[sizeof FIRST_LINE] = "";
-    FILE *file = fopen(e->file, "re");
-    if (file == NULL) {
+    int file = open(e->file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (file < 0 && errno != ELOOP) {
         return 0;
     }
-    size_t size = fread(text, 1, sizeof text - 1, file);
-    (void)fclose(file);
-    return size == 0 || strcmp(text, FIRST_LINE) == 0
+    ssize_t size = file < 0 ? -1 : read(file, text, sizeof text - 1);
+    if (file >= 0) {
+        (void)close(file);
+    }
+    return size == 0 || (size > 0 && strcmp(text, FIRST_LINE) == 0)
                ? 0
                : host_fail(e->error, HOST_INPUT,
                            "%s: not a file that incode emulate has written; "
@@ -327,6 +328,7 @@ static int start(const struct emulate *e, struct host_started *started)
                                            .link = host_link_named("uart"),
                                            .left_out = e->linux_nodes,
                                            .directory = e->directory,
+                                           .folder = e->folder,
                                            .open = e->open,
                                            .empty = e->empty};
     return e->board->start(e->board, &options, started, e->error);
@@ -336,15 +338,14 @@ static int start(const struct emulate *e, struct host_started *started)
  */
 static void remove_leftovers(const struct emulate *e)
 {
-    char path[PATH_MAX + 64], name[32];
+    char name[32];
     for (unsigned i = 0; i < e->nodes; i++) {
         for (unsigned u = 0; u < HOST_UARTS_MAX; u++) {
             host_emulated_wire(i, u, name);
-            snprintf(path, sizeof path, "%s/%s", e->directory, name);
-            (void)unlink(path);
+            (void)unlinkat(e->folder, name, 0);
         }
-        snprintf(path, sizeof path, "%s/qmp%u.socket", e->directory, i);
-        (void)unlink(path);
+        snprintf(name, sizeof name, "qmp%u.socket", i);
+        (void)unlinkat(e->folder, name, 0);
     }
     (void)rmdir(e->directory);
 }
@@ -402,7 +403,7 @@ int host_emulate(int argc, char **argv, struct host_error *error)
         NULL,
         NULL,
         NULL};
-    static struct emulate e = {.locked = -1};
+    static struct emulate e = {.folder = -1};
     struct host_started started = {0};
     e.error = error;
     if (host_options_parse(&argp, argc, argv, 0, &e, error) != 0 ||

@@ -150,7 +150,7 @@ void host_report_run(FILE *file, const struct host_run_options *options,
         fprintf(file, "coordinates of -0.0, which count as 0.0: %llu\n",
                 (unsigned long long)r->negative_zeros);
     }
-    if (r->why[0] != '\0') {
+    if (options->explain) {
         fprintf(file, "auto: %s\n", r->why);
     }
     fprintf(file, "%s on ", r->strategy->name);

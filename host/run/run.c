@@ -13,6 +13,7 @@
 #include "host/base/progress.h"
 #include "host/files/output.h"
 #include "host/formats/claims.h"
+#include "host/formats/formats.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
 #include "host/service/strategies/strategies.h"
@@ -377,6 +378,13 @@ void host_run_clean(const struct host_run_options *options, pid_t writer)
     }
 }
 
+/* Whose .node beside an .ele stays as it is: that of the points, if its name
+ * tells its format. */
+static const char *points_file(const struct host_run_options *options)
+{
+    return options->format == NULL ? options->input : NULL;
+}
+
 /* No output may be a file that is read, nor be another output. */
 static int check_claims(const struct host_run_options *options,
                         struct host_error *error)
@@ -387,10 +395,11 @@ static int check_claims(const struct host_run_options *options,
         host_claims_read(&claims, options->cube, error);
     }
     for (unsigned i = 0; i < options->outputs; i++) {
-        host_claims_write(&claims, "-o ", options->output[i], error);
+        host_claims_write(&claims, "-o ", options->output[i],
+                          points_file(options), error);
     }
     if (options->stats != NULL) {
-        host_claims_write(&claims, "--stats ", options->stats, error);
+        host_claims_write(&claims, "--stats ", options->stats, NULL, error);
     }
     host_claims_free(&claims);
     return error->code;
@@ -403,12 +412,13 @@ static int check_outputs(const struct host_run_options *options,
         return error->code;
     }
     if (options->stats != NULL && strcmp(options->stats, "-") != 0 &&
-        host_write_probe(options->stats, error) != 0) {
+        host_write_probe(options->stats, NULL, error) != 0) {
         return error->code;
     }
     for (unsigned i = 0; i < options->outputs; i++) {
         if (host_write_check(options->output[i], error) != 0 ||
-            host_write_probe(options->output[i], error) != 0) {
+            host_write_probe(options->output[i], points_file(options), error) !=
+                0) {
             return error->code;
         }
     }
@@ -438,7 +448,8 @@ static int write_outputs(const struct host_run_options *options,
 {
     uint64_t start = host_now_us();
     for (unsigned i = 0; i < options->outputs; i++) {
-        if (host_write(options->output[i], points, tets, error) != 0) {
+        if (host_write(options->output[i], points_file(options), points, tets,
+                       error) != 0) {
             return error->code;
         }
     }
@@ -502,6 +513,33 @@ static int run_on(const struct host_run_options *options,
     return status;
 }
 
+/* Says what is not as somebody may think, before time is spent on it. */
+static int look_at_points(const struct host_run_options *options,
+                          const struct host_points *points,
+                          struct host_error *error)
+{
+    char list[HOST_FORMAT_LIST_MAX];
+    if (points->count == 3 && points->wide) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: 3 rows of more than 3 numbers, of which each "
+                         "would be a point; give a row a point, which is the "
+                         "transpose",
+                         options->input);
+    }
+    if (options->quiet) {
+        return 0;
+    }
+    host_points_note(options->input, points);
+    if (options->outputs == 0 && options->stats == NULL && !options->table &&
+        !options->map) {
+        host_format_list(HOST_WRITE_TETRAHEDRA, list, sizeof list);
+        host_note("no output was asked for, so only the counts and the digest "
+                  "will be printed; -o FILE writes the tetrahedra, as %s",
+                  list);
+    }
+    return 0;
+}
+
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error)
 {
@@ -513,12 +551,16 @@ int host_run(const struct host_run_options *options,
     if (check_outputs(options, error) != 0) {
         return error->code;
     }
-    host_progress_begin(options->progress && !options->quiet);
+    if (options->anywhere) {
+        host_progress_begin_anywhere();
+    } else {
+        host_progress_begin(options->progress && !options->quiet);
+    }
     int status =
         host_points_read_as(options->input, options->format, &points, error);
     result->time_read_s = seconds_since(start);
-    if (status == 0 && !options->quiet) {
-        host_points_note(options->input, &points);
+    if (status == 0) {
+        status = look_at_points(options, &points, error);
     }
     if (status == 0) {
         status = run_on(options, &points, result, &alone, error);

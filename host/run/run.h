@@ -50,7 +50,9 @@ struct host_run_options {
     const char *cube;    /* a file that describes real nodes, or NULL */
     const char *stats;   /* a file for the statistics, or NULL */
     enum host_verifying verifying;
-    bool quiet, progress, table, map;
+    bool quiet, table, map;
+    bool explain;            /* why `auto` chose what it chose */
+    bool progress, anywhere; /* on a terminal; without one, too */
     /* For tests. */
     unsigned window;
     uint64_t shuffle_seed;

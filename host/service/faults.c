@@ -40,9 +40,10 @@ static int fail(const struct host_service *s, struct host_error *error)
                          "build/firmware/BOARD.img",
                          s->fault.node, s->fault.text, host_where(s->machine));
     }
-    return host_fail(
-        error, HOST_CUBE, "node %u: %s; %s", s->fault.node, s->fault.text,
-        next != NULL ? next : "please report this with the points");
+    next = next != NULL ? next : "please report this with the points";
+    bool told = strstr(s->fault.text, next) != NULL;
+    return host_fail(error, HOST_CUBE, "node %u: %s%s%s", s->fault.node,
+                     s->fault.text, told ? "" : "; ", told ? "" : next);
 }
 
 int host_faults_take(struct host_service *service,

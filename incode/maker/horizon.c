@@ -27,7 +27,7 @@ void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
     INCODE_ASSERT(boxes >= INCODE_HORIZON_MIN && boxes <= INCODE_HORIZON_MAX &&
                   boxes % 64 == 0 && copies >= 1 &&
                   copies <= INCODE_HORIZON_COPIES);
-    incode_pause_clear(pause, memory, incode_horizon_bytes(boxes, copies));
+    incode_pause_fill(pause, memory, 0, incode_horizon_bytes(boxes, copies));
     memset(h, 0, sizeof *h);
     h->boxes = boxes;
     h->room = copies;

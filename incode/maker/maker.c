@@ -52,7 +52,7 @@ static void take(struct incode_maker *m, void *memory,
                         &m->counts.tally.pause);
     incode_maker_breathe(m, INCODE_PAUSE_UNITS);
     incode_pager_init(&m->pager, (uint8_t *)memory + horizon_bytes(share),
-                      share->frames, bricks);
+                      share->frames, bricks, &m->counts.tally.pause);
     m->lookahead = lookahead_of(m);
     m->local.pages_max = share->frames / 2;
     incode_local_reset(&m->local);

@@ -25,7 +25,8 @@ size_t incode_pager_bytes(uint32_t frames)
 }
 
 void incode_pager_init(struct incode_pager *pager, void *memory,
-                       uint32_t frames, uint32_t bricks)
+                       uint32_t frames, uint32_t bricks,
+                       struct incode_pause *pause)
 {
     INCODE_ASSERT(frames >= 1 && frames < INCODE_NO_FRAME &&
                   (uintptr_t)memory % alignof(struct incode_frame) == 0);
@@ -42,8 +43,8 @@ void incode_pager_init(struct incode_pager *pager, void *memory,
     pager->loading_max = frames / 4 < 1 ? 1 : frames / 4;
     pager->bricks = bricks;
     memset(pager->oldest, 0, pager->group_count * sizeof pager->oldest[0]);
-    for (uint32_t i = 0; i <= pager->hash_mask; i++)
-        pager->heads[i] = INCODE_NO_FRAME;
+    incode_pause_fill(pause, pager->heads, 0xff, /* INCODE_NO_FRAME each */
+                      (pager->hash_mask + 1) * sizeof pager->heads[0]);
 }
 
 static uint16_t *head_of(const struct incode_pager *pager, uint32_t page)

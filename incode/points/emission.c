@@ -6,10 +6,11 @@
 #include "stages.h"
 
 enum {
-    EMIT_A_UNIT = 8,  /* tetrahedra */
-    FETCHED = 32,     /* lists, side by side */
-    FETCHED_MOST = 8, /* of each, cells that come first */
-    AT_ONCE = 16      /* points or cells, in a breath */
+    EMIT_A_UNIT = 8,   /* tetrahedra, of what a step may work */
+    EMIT_A_BREATH = 2, /* of incode/predicates/pause.h */
+    FETCHED = 32,      /* lists, side by side */
+    FETCHED_MOST = 8,  /* of each, cells that come first */
+    AT_ONCE = 16       /* points or cells, in a breath */
 };
 
 /* Which of a cell's vertices is the smallest, whose brick owns it. */
@@ -139,6 +140,7 @@ static enum incode_insertion_step emit_some(struct incode_insertion *n,
     n->outside.emit(n->outside.context, v->id, (const uint32_t(*)[3])n->apexes,
                     count);
     n->kept += count;
+    incode_maker_breathe(n->maker, (uint32_t)count / EMIT_A_BREATH);
     incode_walker_spend(&n->maker->walker, (uint32_t)count / EMIT_A_UNIT);
     return INCODE_INSERTION_WORKED;
 }

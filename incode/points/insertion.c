@@ -17,7 +17,8 @@ enum {
     RESERVE = 4096,          /* bytes */
     ALIGNED = 64,            /* the same */
     AT_ONCE = 16,            /* points, in a breath */
-    A_STEP = 8               /* units, of what is the same for all points */
+    A_STEP = 8,              /* units, of what is the same for all points */
+    LOAD_A_UNIT = 2          /* points */
 };
 
 static_assert(sizeof(struct incode_insertion_work) + RESERVE <=
@@ -293,6 +294,7 @@ static enum incode_insertion_step load(struct incode_insertion *n)
     if (f == NULL)
         return INCODE_INSERTION_WAITING;
     const struct incode_brick *b = &f->page.brick;
+    incode_maker_breathe(n->maker, f->count / LOAD_A_UNIT);
     for (uint32_t i = 0; i < f->count; i++) {
         const double p[3] = {b->x[i], b->y[i], b->z[i]};
         uint32_t id = n->brick * INCODE_BRICK_POINTS + i;

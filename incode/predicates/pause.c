@@ -4,7 +4,7 @@
 
 #include "check.h"
 
-enum { CLEARED = 8192, CLEARED_UNITS = 16 }; /* bytes at once, and their work */
+enum { FILLED = 8192, FILLED_UNITS = 16 }; /* bytes at once, and their work */
 
 void incode_pause_look(struct incode_pause *pause)
 {
@@ -15,12 +15,13 @@ void incode_pause_look(struct incode_pause *pause)
     pause->left = (int32_t)units;
 }
 
-void incode_pause_clear(struct incode_pause *pause, void *memory, size_t bytes)
+void incode_pause_fill(struct incode_pause *pause, void *memory, int byte,
+                       size_t bytes)
 {
     uint8_t *at = memory;
     for (size_t done; bytes > 0; at += done, bytes -= done) {
-        done = bytes < CLEARED ? bytes : CLEARED;
-        incode_breathe(pause, CLEARED_UNITS);
-        memset(at, 0, done);
+        done = bytes < FILLED ? bytes : FILLED;
+        incode_breathe(pause, FILLED_UNITS);
+        memset(at, byte, done);
     }
 }

@@ -39,8 +39,9 @@ struct incode_pause {
 /* Calls `look`, and sets what is left. */
 void incode_pause_look(struct incode_pause *pause);
 
-/* Fills memory with zeros, and looks on the way. */
-void incode_pause_clear(struct incode_pause *pause, void *memory, size_t bytes);
+/* Fills memory with a byte, and looks on the way. */
+void incode_pause_fill(struct incode_pause *pause, void *memory, int byte,
+                       size_t bytes);
 
 /* So many units, at most INCODE_PAUSE_OVER, are about to be worked. */
 static inline void incode_breathe(struct incode_pause *pause, uint32_t units)

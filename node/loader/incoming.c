@@ -72,6 +72,15 @@ static void refuse(struct loader_incoming *in, enum loader_fault fault)
     in->work = LOADER_NO_WORK;
 }
 
+/* False: there were too many of these of late, and the transfer ends. */
+static bool affords(struct loader_incoming *in, bool affordable)
+{
+    if (!affordable) {
+        refuse(in, LOADER_TOO_OFTEN);
+    }
+    return affordable;
+}
+
 static void go_on(struct loader_incoming *in, enum loader_work work)
 {
     in->work = work;
@@ -139,8 +148,16 @@ void loader_incoming_begin(struct loader_incoming *incoming,
 static void prove(struct loader_incoming *in)
 {
     const struct loader_rules *rules = in->slots->rules;
+    struct loader_budget *budget = rules->budget;
+    if (!affords(in,
+                 budget == NULL || loader_budget_has(budget, LOADER_FALSE))) {
+        return;
+    }
     enum loader_fault fault =
         loader_image_signed(in->header, rules->suite, rules->key);
+    if (fault == LOADER_WRONG_SIGNATURE && budget != NULL) {
+        (void)loader_budget_take(budget, LOADER_FALSE);
+    }
     if (fault != LOADER_GOOD) {
         refuse(in, fault);
     } else {
@@ -180,6 +197,19 @@ static unsigned begun_slot(const struct loader_incoming *in)
     return 0;
 }
 
+/* Erasures begin with this.  Of a sector there are at most three for each slot
+ * that is made ready: as it is, of what was brought where that is false, and
+ * once more, where parts of it had been there before. */
+static void make_ready(struct loader_incoming *in, unsigned slot)
+{
+    struct loader_budget *budget = in->slots->rules->budget;
+    in->slot = slot;
+    if (affords(in, budget == NULL ||
+                        loader_budget_take(budget, LOADER_TRANSFERS))) {
+        go_on(in, LOADER_READIES);
+    }
+}
+
 /* The slot that is not in use; of two good ones, of which one is on trial, that
  * one.  The other is looked at first: it is in use from then on. */
 static void choose(struct loader_incoming *in)
@@ -193,8 +223,7 @@ static void choose(struct loader_incoming *in)
         return;
     }
     if (state->slot >= LOADER_SLOTS) {
-        in->slot = begun_slot(in);
-        go_on(in, LOADER_READIES);
+        make_ready(in, begun_slot(in));
         return;
     }
     if (state->trial && !slots->known[other]) {
@@ -210,8 +239,7 @@ static void choose(struct loader_incoming *in)
         }
         return; /* that may be the one which is to come */
     }
-    in->slot = other;
-    go_on(in, LOADER_READIES);
+    make_ready(in, other);
 }
 
 /* One sector a step: the header's, unless it has this header already, and where

@@ -133,7 +133,9 @@ static void take_order(struct loader *l, const struct cube_message *message)
         leave(l);
         break;
     case LOADER_NAME:
-        (void)loader_slots_name(l->slots->rules->flash, order.serial);
+        if (order.transfer != 0 && loader_incoming_proved(&l->incoming)) {
+            (void)loader_slots_name(l->slots->rules->flash, order.serial);
+        }
         break;
     default: /* of a later version */
         break;

@@ -51,7 +51,8 @@ struct loader_ask_message {
 enum loader_order {
     LOADER_VERIFY = 1, /* what has come whole: digest and signature */
     LOADER_BOOT,       /* restart, and start the newest good image */
-    LOADER_NAME        /* takes `serial` for its number, if it has none */
+    LOADER_NAME        /* takes `serial` for its number, if it has none; counts
+                          within a transfer alone, whose signature was proved */
 };
 
 /* To one, or all who are in that transfer. */

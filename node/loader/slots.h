@@ -22,6 +22,7 @@
 #ifndef NODE_LOADER_SLOTS_H
 #define NODE_LOADER_SLOTS_H
 
+#include "budget.h"
 #include "flash.h"
 #include "image.h"
 
@@ -44,6 +45,7 @@ struct loader_rules {
     /* Called while loader_slots_choose, or loader_look_copy, has long work, so
      * that a watchdog waits.  NULL: nobody does. */
     void (*alive)(void);
+    struct loader_budget *budget; /* of transfers; NULL: they are not counted */
 };
 
 /* What a record in the flash says; all zeros: there was none. */

@@ -22,13 +22,13 @@ make_flash() {
 
 # begin BOARD IMAGE: starts it; its console is read and written by the two
 # numbers of `wire`, as ${wire[0]} and ${wire[1]}.  $flash: a file, which
-# need not be there.
+# need not be there.  clock: half an hour at most, for one that is left behind.
 begin() {
     local command
     command=$(fact "$1" emulator)
     make_flash "$1"
     # shellcheck disable=SC2086
-    coproc wire { exec timeout -k 1 30 $command -kernel "$2" -display none \
+    coproc wire { exec timeout -k 1 1800 $command -kernel "$2" -display none \
         -nic none -monitor none -serial stdio 2> /dev/null; }
 }
 finish() { # as one who pulls the plug
@@ -38,11 +38,11 @@ finish() { # as one who pulls the plug
     wait "$pid" 2> /dev/null
 }
 
-# hear PATTERN: reads lines of the console until one is like it, at most five
-# seconds: $line.  What it has read is in $said_there.
+# hear PATTERN: reads lines of the console until one is like it, or clock: none
+# comes for five minutes: $line.  What it has read is in $said_there.
 hear() {
     : > "$said_there"
-    while IFS= read -r -t 5 -u "${wire[0]}" line; do
+    while IFS= read -r -t 300 -u "${wire[0]}" line; do
         line=$(printf '%s' "$line" | tr -d '\0\r\377')
         printf '%s\n' "$line" >> "$said_there"
         # shellcheck disable=SC2053

@@ -80,6 +80,7 @@ static bool pass(int from, int to)
     while (n > 0 && done < n && to >= 0) {
         struct pollfd room = {to, POLLOUT, 0};
         ssize_t part = write(to, bytes + done, (size_t)(n - done));
+        /* clock: looks again */
         if (part <= 0 && poll(&room, 1, TURN_MS) <= 0) {
             break;
         }
@@ -104,6 +105,7 @@ int main(int argc, char **argv)
             pull_out(argv[1]);
         } else if (!toggled && port < 0 && !plug_in(argv[1])) {
             break;
+            /* clock: looks again */
         } else if (poll(fds, port < 0 ? 1 : 2, TURN_MS) > 0) {
             goes_on = fds[0].revents == 0 || pass(board, port);
             if (port >= 0 && fds[1].revents != 0) {

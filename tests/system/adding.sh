@@ -210,7 +210,8 @@ check adding/format/digest 'another triangulation' test \
     "$("$new" digest "$scratch/t.toy")" = "$("$old" digest "$scratch/t.ele")"
 
 "$tree/build/tests/test_fuzzed" > "$scratch/fuzzed" 2>&1
-check adding/format/fuzzed "$(last "$scratch/fuzzed")" [ $? = 0 ]
+status=$?
+check adding/format/fuzzed "$(last "$scratch/fuzzed")" [ $status = 0 ]
 for name in a.toy a.toy.gz; do
     check "adding/format/fuzzed-$name" 'the fuzzer does not try it' \
         grep -qx "$name" "$scratch/fuzzed"

@@ -35,6 +35,7 @@ for image in "$BUILD"/firmware/tests/*-arithmetic.img; do
     within tests/arithmetic/compare "0 1089 $step,1090 1099 1" \
         $(fact "$board" emulator) -kernel "$image" -display none -nic none \
         -serial stdio > "$scratch/said" 2> "$scratch/errors"
-    check "arithmetic/$board" "$(head -n 1 "$scratch/said")" [ $? = 0 ]
+    status=$?
+    check "arithmetic/$board" "$(head -n 1 "$scratch/said")" [ $status = 0 ]
     cat "$scratch/said"
 done

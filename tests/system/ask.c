@@ -19,6 +19,7 @@
 
 enum { AGAIN_MS = 3000, DEADLINE_MS = 120000, BYTES_MAX = 65536 };
 
+/* clock: two minutes in all. */
 static int64_t now_ms(void)
 {
     struct timespec now;

@@ -40,6 +40,6 @@ int main(void)
         (void)!write(board, banner, sizeof banner - 1);
         while (read(board, noise, sizeof noise) > 0) {
         }
-        (void)usleep(EVERY_US);
+        (void)usleep(EVERY_US); /* clock: now and then */
     }
 }

@@ -94,7 +94,7 @@ refuses_run 'trouble without boards' 2 '^incode: --board-kill: ' \
     --board-kill 100
 refuses 'boards/no emulator' 4 "^incode: qemu-system-arm: not found .*; \
 install it with: apt-get install qemu-system-arm$" within env PATH="$scratch" \
-    "$(realpath "$INCODE")" run "$points" --board mps2-an500 --nodes 2
+    "$(realpath "$INCODE")" run "$points" -q --board mps2-an500 --nodes 2
 refuses 'boards/emulate: no emulator' 4 '^incode: qemu-system-arm: not found' \
     within env PATH="$scratch" "$(realpath "$INCODE")" emulate \
     --board mps2-an500 --nodes 2 -o "$scratch/none.cube"
@@ -107,14 +107,15 @@ mkdir "$scratch/bin"
 cp "$INCODE" "$scratch/bin"
 refuses 'boards/no firmware' 4 "mps2-an500.img: .*; make the board's firmware \
 with: make firmware$" within "$scratch/bin/incode" run "$points" \
-    --board mps2-an500 --nodes 2
+    -q --board mps2-an500 --nodes 2
 # An emulator that cannot: what it says is told, and the run ends.
 printf '#!/bin/sh\necho "qemu: no such board" >&2\nexit 1\n' \
     > "$scratch/bin/qemu-system-arm"
 chmod +x "$scratch/bin/qemu-system-arm"
 PATH=$scratch/bin:$PATH incode run "$points" --no-progress --board mps2-an500 \
     --nodes 2 > /dev/null 2> "$errors"
-check 'boards/an emulator that ends: exit 4' "exit $?" [ $? = 4 ]
+status=$?
+check 'boards/an emulator that ends: exit 4' "exit $status" [ $status = 4 ]
 check 'boards/an emulator that ends: says why' "$(last "$errors")" \
     grep -q '^incode: qemu: no such board' "$errors"
 # Half an image: the emulator's registers do not hide what it says, and the image
@@ -128,11 +129,12 @@ half() { # FILE: but for the other, which is whole
 half mps2-an500.img
 refuses 'boards/half an image' 4 "mps2-an500.img: not a board's image, or not \
 all of it; make it with: make firmware$" within "$scratch/bin/incode" run \
-    "$points" --no-progress --board mps2-an500 --nodes 2
+    "$points" -q --board mps2-an500 --nodes 2
 half loader/mps2-an500.img
 within "$scratch/bin/incode" run "$points" --no-progress --board mps2-an500 \
     --nodes 2 > /dev/null 2> "$errors"
-check 'boards/half a loader: exit 4' "exit $?" [ $? = 4 ]
+status=$?
+check 'boards/half a loader: exit 4' "exit $status" [ $status = 4 ]
 check 'boards/half a loader: is named' "$(last "$errors")" \
     grep -q '^incode: qemu: fatal: .*loader/mps2-an500.img whole?' "$errors"
 
@@ -167,8 +169,9 @@ emulate() {
 end_emulator() { # NAME
     kill -INT $emulator
     wait $emulator
-    check "boards/$1: ends" "exit $?: $(last "$scratch/emulate.errors")" \
-        [ $? = 0 ]
+    status=$?
+    check "boards/$1: ends" "exit $status: $(last "$scratch/emulate.errors")" \
+        [ $status = 0 ]
     check "boards/$1: removes its file and sockets" "$(find "$cube"*)" \
         [ ! -e "$cube" -a -z "$(find "$cube.d" -type s)" ]
 }
@@ -215,7 +218,8 @@ incode run "$points" -q --cube "$cube" --strategy spatial \
 host=$!
 await is_up
 wait $host
-check 'boards/console: in mid-run' "exit $?: $(last "$errors")" \
+status=$?
+check 'boards/console: in mid-run' "exit $status: $(last "$errors")" \
     [ "$(stat_of "$stats" digest)" = "$expected" ]
 check 'boards/console: links' "$(tr '\n' '|' < "$scratch/links")" \
     grep -q '^UART 1, node 2: up, frames in' "$scratch/links"

@@ -11,14 +11,13 @@ points=$scratch/points.npy
 check 'cluster/one node' "$(last "$scratch/errors")" \
     test -f "$scratch/first.npy"
 
-# start [OPTION...]: a run in the background; $host its process, $nodes those
-# of its nodes.  The host reads a small part of the result in the first five
-# seconds, so that it is at work for so long, whatever the processors.
-start() {
+# slowed SECONDS [OPTION...]: a run in the background; $host its process, $nodes
+# those of its nodes.
+slowed() {
     rm -f "$scratch/out.npy"
-    "$INCODE" run "$points" -q --strategy spatial --nodes 8 \
-        --host-rate 100000 --host-rate-time 5 \
-        -o "$scratch/out.npy" "$@" 2> "$scratch/errors" &
+    "$INCODE" run "$points" -q --strategy spatial --nodes 8 --patience 600 \
+        --host-rate 100000 --host-rate-time "$1" \
+        -o "$scratch/out.npy" "${@:2}" 2> "$scratch/errors" &
     host=$!
     await all_there
     read -r node _ <<< "$nodes"
@@ -27,16 +26,29 @@ all_there() {
     nodes=$(pgrep -P $host -x incode-node | tr '\n' ' ')
     [ "$(echo "$nodes" | wc -w)" = 8 ] || ! kill -0 $host 2> /dev/null
 }
-at_work() { # NAME
-    check "cluster/$1: the run was at work" "it had ended: \
-$(last "$scratch/errors")" kill -0 $host
-}
 
-start
-sleep 0.2
-kill -STOP "$node"
-sleep 10
-at_work 'a node stopped for 10 s'
+# Two that are slow to read, beside the rest: a host that reads 1 KB/s for 30 s,
+# and a reader of standard output behind a pipe.
+"$INCODE" run "$points" -q --strategy spatial --nodes 8 --patience 600 \
+    --host-rate 1024 --host-rate-time 30 -o "$scratch/host.npy" \
+    2> "$scratch/host.errors" &
+slow_host=$!
+"$INCODE" run "$points" -q --nodes 8 --patience 600 -o - \
+    2> "$scratch/reader.errors" | {
+    for _ in $(seq 30); do
+        head -c 1024
+        sleep 1 # clock: a reader of 1 KB/s, or less
+    done
+    cat
+} > "$scratch/slow.ele" &
+slow_reader=$!
+
+at_first=5
+# clock: it was stopped for ten seconds at least.
+stopped() { kill -STOP "$node" && sleep 10; }
+amid stopped
+check 'cluster/a node stopped for 10 s: the run was at work' \
+    "it had ended: $(last "$scratch/errors")" kill -0 $host
 kill -CONT "$node"
 wait $host
 status=$?
@@ -44,14 +56,13 @@ check 'cluster/a node stopped for 10 s' "exit $status: \
 $(last "$scratch/errors")" test $status = 0
 check 'cluster/a stopped node: what would become of it' \
     "$(cat "$scratch/errors")" grep -qE '^incode: node [0-7] link [0-3]: no answer .*'\
-'; it is ended and started again after 60 s' "$scratch/errors"
+'; it is ended and started again after 600 s' "$scratch/errors"
 check 'cluster/the same bytes after it' 'the output differs' \
     cmp -s "$scratch/first.npy" "$scratch/out.npy"
 
-start
-sleep 0.1
-at_work 'no node outlives the host'
-kill -KILL $host
+amid true
+check 'cluster/no node outlives the host: the run was at work' \
+    "it had ended: $(last "$scratch/errors")" kill -KILL $host
 wait $host 2> /dev/null
 alive=$nodes
 all_gone() {
@@ -64,10 +75,9 @@ all_gone() {
 await all_gone
 check 'cluster/no node outlives the host' "alive:$alive" test -z "$alive"
 
-start
-sleep 0.1
-at_work 'a terminated run'
-kill -TERM $host
+amid true
+check 'cluster/a terminated run: it was at work' \
+    "it had ended: $(last "$scratch/errors")" kill -TERM $host
 wait $host
 status=$?
 check 'cluster/a terminated run leaves no output' "exit $status" \
@@ -81,7 +91,7 @@ if [ "$(stat_of "$scratch/stats.json" memory_limited)" != true ]; then
     skip 'cluster/writable memory of a node' \
         'sanitizers need more memory than a node has'
 else
-    start --memory 4M
+    slowed 5 --memory 4M
     shared=
     while kill -0 $host 2> /dev/null; do
         for node in $nodes; do
@@ -105,13 +115,16 @@ else
     check 'cluster/no allocator in the node' "$found" test -z "$found"
 
     # Much memory costs what is used of it: not 1,048,576 KB.
-    start --memory 1G
-    sleep 1
-    worst=0
-    for node in $nodes; do
-        used=$(awk '/^VmHWM/ { print $2 }' "/proc/$node/status")
-        [ "${used:-0}" -gt $worst ] && worst=$used
-    done
+    # clock: looked at a second after they came up, while they work.
+    used() {
+        sleep 1
+        worst=0
+        for node in $nodes; do
+            used=$(awk '/^VmHWM/ { print $2 }' "/proc/$node/status")
+            [ "${used:-0}" -le $worst ] || worst=$used
+        done
+    }
+    amid used --memory 1G
     wait $host
     status=$?
     check 'cluster/nodes of 1 GB' \
@@ -124,20 +137,22 @@ same() {
     local name=$1
     shift
     rm -f "$scratch/out.npy"
-    "$INCODE" run "$points" -q --strategy spatial -o "$scratch/out.npy" "$@" \
-        2> "$scratch/errors"
-    check "cluster/$name" "exit $?: $(last "$scratch/errors")" \
+    succeeds "cluster/$name: exit 0" "$INCODE" run "$points" -q \
+        --strategy spatial --patience 600 -o "$scratch/out.npy" "$@"
+    check "cluster/$name" "the output differs: $(last "$scratch/errors")" \
         cmp -s "$scratch/first.npy" "$scratch/out.npy"
 }
 same '32 nodes, one frame a link, a host that stalls' --nodes 32 --window 1 \
     --host-stall 20
-same 'a host that reads 1 KB/s for 30 s' --nodes 8 --host-rate 1024 \
-    --host-rate-time 30
 same '64 nodes' --nodes 64
-# A reader of 1 KB/s behind a pipe, for 30 s, then all of the rest.
-"$INCODE" run "$points" -q --nodes 8 -o - 2> "$scratch/errors" |
-    { for _ in $(seq 30); do head -c 1024; sleep 1; done; cat; } \
-    > "$scratch/slow.ele"
+
+wait $slow_host
+status=$?
+check 'cluster/a host that reads 1 KB/s for 30 s' \
+    "exit $status: $(last "$scratch/host.errors")" \
+    cmp -s "$scratch/first.npy" "$scratch/host.npy"
+wait $slow_reader
 "$INCODE" convert "$scratch/slow.ele" "$scratch/slow.npy"
-check 'cluster/a slow reader of standard output' 'the output differs' \
+check 'cluster/a slow reader of standard output' \
+    "the output differs: $(last "$scratch/reader.errors")" \
     cmp -s "$scratch/first.npy" "$scratch/slow.npy"

@@ -118,7 +118,8 @@ take_ports
 node=$!
 by_tcp() { within "$program" console --tcp "127.0.0.1:$base" --insecure "$@"; }
 by_tcp -c 'ping 0 1' -c 'run points.npy -o tcp.ele' -c 'ping 0 1' > output 2>&1
-check console-tcp "exit $?: $(last output)" \
+status=$?
+check console-tcp "exit $status: $(last output)" \
     test "$(grep -c '1 of 1' output)" = 2 -a -s tcp.ele
 kill "$node"
 "$(dirname "$program")/incode-node" --node 0 --dimension 0 \
@@ -127,7 +128,8 @@ node=$!
 await test -S node.socket
 within "$program" console --unix node.socket -c 'ping 0 1' -c 'log 0' \
     -c 'run points.npy -o unix.ele' > output 2>&1
-check console-unix "exit $?: $(last output)" test -s unix.ele
+status=$?
+check console-unix "exit $status: $(last output)" test -s unix.ele
 kill "$node"
 
 # --- a person ------------------------------------------------------------------
@@ -136,7 +138,8 @@ has_terminals console-terminal || exit 0
 session=incode-console-$$
 t() { tmux -L "$session" -f /dev/null "$@"; }
 trap 't kill-server 2> /dev/null; kill $(jobs -p) 2> /dev/null; rm -rf "$scratch"' EXIT
-t new-session -d -s keep 'sleep 600' # or the server would end with its last
+# clock: it stays for that long, or the server would end with its last
+t new-session -d -s keep 'sleep 1800' #
 screen() { t capture-pane -p -t desk 2> /dev/null; }
 shows() { screen | grep -qE -e "$1"; }
 type() { t send-keys -t desk "$@"; }
@@ -151,7 +154,7 @@ seen() {
 begin_console() {
     t kill-session -t desk 2> /dev/null
     t new-session -d -s desk -x 100 -y 30 \
-        "'$program' console $*; echo status \$?; sleep 600"
+        "'$program' console $*; echo status \$?; sleep 1800" # clock: as long
     await shows '^incode>$'
 }
 
@@ -170,7 +173,7 @@ check console-history-is-private "$(ls -l state/incode/history)" \
     test "$(stat -c %a state/incode/history)" = 600
 type clear C-u 'ping all 100000' Enter
 await shows 'ping all 100000'
-sleep 0.3 # Ctrl-C takes away what is typed and not read
+sleep 0.3 # clock: Ctrl-C takes away what is typed and not read by then
 type C-c
 seen console-abandons-command 'incode: ping: interrupted'
 type 'ping 3 1' Enter

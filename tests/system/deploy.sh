@@ -29,6 +29,7 @@ clean_up() {
     for pid in "$scratch"/boards/*/node-*/pid; do
         [ ! -e "$pid" ] || kill -KILL "$(cat "$pid")" 2> /dev/null
     done
+    # clock: what is the user's has ended by then, or stays
     [ "$user" = "$(id -un)" ] || { sleep 0.2; userdel "$user" 2> /dev/null; }
     rm -rf "$scratch"
 }
@@ -142,6 +143,13 @@ says 'dry run: each board' 4 "^node [0-3] $to: would copy program \($machine, \
 says 'dry run: what starts each' 4 '^    exec .*/incode-node.* --node [0-3] '
 check 'deploy/dry run changes nothing' "$(ls "$scratch/boards")" \
     [ -z "$(ls "$scratch/boards")" ]
+# Without make nodes, what make has made for this machine's processor.
+mkdir "$scratch/alone"
+cp "$INCODE" "$BUILD/incode-node" "$scratch/alone"
+within "$scratch/alone/incode" deploy --cube "$scratch/four.cube" --ssh-config \
+    "$scratch/ssh.conf" --dry-run > "$scratch/said" 2> "$scratch/errors" < /dev/null
+says 'the program of make' 4 "would copy program \($machine, \
+$(stat -c %s "$BUILD/incode-node") bytes\)"
 does 'status of nothing' 4 --status
 says 'status of nothing: each' 4 'nothing is deployed$'
 says 'status of nothing: the next step' 1 \
@@ -179,7 +187,9 @@ if has_terminals 'deploy/a terminal'; then
     script -qec "stty cols 80 rows 24; exec '$INCODE' deploy --status \
 --cube '$scratch/four.cube' --programs '$scratch/programs' \
 --ssh-config '$scratch/ssh.conf'" "$scratch/said" > /dev/null 2>&1 < /dev/null
-    check 'deploy/a terminal: exit 0' "exit $?: $(last "$scratch/said")" [ $? = 0 ]
+    status=$?
+    check 'deploy/a terminal: exit 0' "exit $status: $(last "$scratch/said")" \
+        [ $status = 0 ]
     check 'deploy/a terminal: a row a board' "$(head -c 600 "$scratch/said")" \
         grep -qE $'^\r?node 3 .*: [^\r]*\033\\[K' "$scratch/said"
     says 'a terminal: and at the end' 4 ': [a-z0-9_]*, running by itself.*, since '

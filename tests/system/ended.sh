@@ -3,19 +3,26 @@
 # the signal's status.
 . tests/system/lib.sh
 
+has_open() { # PID FILE
+    readlink "/proc/$1/fd/"* | grep -qFx "$(realpath "$2")"
+} 2> /dev/null
+
 # ended NAME SIGNAL STATUS LINE [OPTION...]: of a run that waits for its points.
 ended() {
     local name=$1 signal=$2 status=$3 line=$4 points=$scratch/points.xyz run
+    local found
     shift 4
     rm -f "$points"
     mkfifo "$points"
     env --default-signal=INT "$INCODE" run "$points" "$@" \
         2> "$scratch/errors" > "$scratch/output" &
     run=$!
-    exec {hold}> "$points" # opens when the run has opened it
+    exec {hold}<> "$points" # does not wait for the run, which waits for more
+    await has_open $run "$points"
     kill -s "$signal" $run
     wait $run
-    check "ended/$name/status" "another than $status" [ $? = "$status" ]
+    found=$?
+    check "ended/$name/status" "$found, not $status" [ $found = "$status" ]
     exec {hold}>&-
     check "ended/$name/line" "it says: $(cat "$scratch/errors")" \
         [ "$(cat "$scratch/errors")" = "$line" ]

@@ -29,6 +29,7 @@ printf '0 0 0\n1 2 3\n2 4 6\n3 6 9\n-1 -2 -3\n' > "$in/line.xyz"
 : > "$in/empty.xyz"
 printf '\n  \n' > "$in/blank.xyz"
 cp "$good" "$in/points.dat"
+mkdir "$in/folder.xyz"
 printf 'this is no gzip' > "$in/notgzip.xyz.gz"
 gzip -c "$good" | head -c 900 > "$in/short.xyz.gz"
 "$INCODE" convert "$good" "$in/good.npy"
@@ -39,7 +40,9 @@ head -c 3000 "$in/good.ply" > "$in/short.ply"
 head -c 3000 "$in/good.vtu" > "$in/short.vtu"
 
 wrong 'missing file' 'absent.xyz' "$in/absent.xyz"
-wrong 'a directory' 'in' "$in"
+wrong 'a folder' 'in: it is a directory; name a file in it$' "$in"
+wrong 'a folder, by a name of a file' 'it is a directory; name a file in it$' \
+    "$in/folder.xyz"
 wrong 'empty file' 'empty.xyz' "$in/empty.xyz"
 wrong 'file of blanks' 'blank.xyz' "$in/blank.xyz"
 wrong 'no number, with line and column' 'text.xyz:3:3' "$in/text.xyz"
@@ -94,7 +97,16 @@ ln "$over/a.npy" "$over/hard.npy"
 ln -s . "$over/again"
 spares 'output beside another is the input' \
     '-o .*a.ele: .*a.node, beside it, would overwrite the input .*a.node; ' \
-    "$over/a.node" run "$over/a.node" -q -o "$over/a.ele"
+    "$over/a.node" run "$over/a.node" -q --format xyz -o "$over/a.ele"
+before=$(cd "$over" && stat -c '%i %Y %s' a.node && cksum < a.node)
+succeeds 'errors/.node stays beside its .ele' incode run "$over/a.node" -q \
+    -o "$over/a.ele"
+check 'errors/.node stays beside its .ele: as it was' 'it has changed' \
+    test "$before" = "$(cd "$over" && stat -c '%i %Y %s' a.node && cksum < a.node)"
+succeeds 'errors/.node stays beside its .ele: they belong together' \
+    incode verify "$over/a.node" "$over/a.ele"
+check 'errors/.node stays beside its .ele: the others are there' \
+    "$(ls "$over")" test -s "$over/a.neigh" -a -s "$over/a.face"
 for as in a link hard again/a; do
     spares "output is the input, as $as.npy" "$as.npy: it would overwrite" \
         "$over/a.npy" run "$over/a.npy" -q -o "$left/o.vtu" -o "$over/$as.npy"
@@ -183,9 +195,9 @@ check 'errors/a pipe with a reader' "exit $status" \
     eval 'wait $! && [ $status = 0 ] && cmp "$scratch/piped.npy" "$scratch/plain.npy"'
 # Whatever started it.
 has_terminals 'errors/a closed standard input' &&
-    check 'errors/a closed standard input' "exit $?" \
+    succeeds 'errors/a closed standard input' \
         incode run "$good" -q --nodes 2 --link serial <&-
-check 'errors/nothing is open' "exit $?" incode run "$good" -q \
+check 'errors/nothing is open' 'it fails' incode run "$good" -q \
     --nodes 2 -o "$scratch/closed.npy" <&- >&- 2>&-
 refuses 'errors/a closed standard output' 3 'standard output: Bad file' \
     bash -c '"$@" >&-' - "$INCODE" run "$good" --nodes 2 -o "$left/o.vtu"
@@ -344,6 +356,10 @@ usage 'clusters of three' '--cluster 3: .*a power of two, 2 to 8' run "$good" \
     -o "$out" --strategy hybrid --nodes 8 --cluster 3
 usage 'clusters larger than the cube' '--cluster 16: .*2 to 8' run "$good" \
     -o "$out" --strategy hybrid --nodes 8 --cluster 16
+usage 'clusters of two nodes' '--cluster 3: 2 nodes .*; give 2, or more --nodes$' \
+    run "$good" -o "$out" --strategy hybrid --nodes 2 --cluster 3
+usage 'builders of two nodes' '--builders 2: 2 nodes .*; give 1, or more --nodes$' \
+    run "$good" -o "$out" --strategy master-slaves --nodes 2 --builders 2
 for option in cluster builders faces-per-job jobs-per-worker; do
     usage "--$option without its strategy" "--$option: goes with .*leave it out" \
         run "$good" -o "$out" --nodes 4 --strategy spatial --$option 2
@@ -385,7 +401,8 @@ check 'as many as are triangulated' 'the limits differ' test \
     -n "$(grep 'At most 2^32 - 2^16 points' README.md)" -a \
     -n "$("$INCODE" gen --help | tr '\n' ' ' | grep -F '4 to 4294901760 (2^32 - 2^16)')"
 usage 'verify without tetrahedra' 'TETS' verify "$good"
-usage 'digest without a file' 'TETS' digest
+usage 'digest without a file' \
+    '^incode: digest: too few arguments; give TETS, see incode digest --help$' digest
 usage 'convert to nothing' 'OUT' convert "$good"
 
 # What a new user writes: done as it was meant, or what to write instead.
@@ -402,6 +419,21 @@ usage 'a short option' '-x: no such option of incode run; ' run "$good" -x
 usage 'two files' 'other.xyz: a second file of points' run "$good" other.xyz
 usage '128 nodes' '--nodes 128: .*allowed: 1, 2, .*64' run "$good" \
     --nodes 128
+usage 'gen, the number first' 'gen 100 uniform: the kind .*; write gen uniform 100$' \
+    gen 100 uniform -o "$left/o.xyz"
+usage 'a folder for the output' 'left: it is a directory; name a file in it' run \
+    "$good" -o "$left"
+usage 'a folder for points' 'left/: it is a directory; name a file in it' gen grid 27 \
+    -o "$left/"
+usage 'too many to generate' 'gen uniform 1e12: too few points, or too many; ' \
+    gen uniform 1e12 -o "$left/o.xyz"
+usage 'an output without -o' 'give one, and an output as -o o.vtu$' run "$good" o.vtu
+refuses 'usage/tetrahedra for points' 3 \
+    'a.ele: no format of points has this extension, which tetrahedra have; use ' \
+    incode verify "$in/a.ele" "$good"
+refuses 'usage/points for tetrahedra' 3 \
+    'good.xyz: no format of tetrahedra has this extension, which points have; use ' \
+    incode digest "$good"
 usage 'half a point' 'gen uniform 4.5: not a whole number' gen uniform 4.5
 usage 'help of nothing' 'runn: .*did you mean run\?' help runn
 for memory in 4MB '4 MiB' 4m 4096K; do
@@ -443,7 +475,8 @@ check 'duplicates and -0.0 are told' "$(tr '\n' ' ' < "$scratch/output")" \
 sed 's/$/ 255 0 0 roof/' "$in/four.xyz" > "$in/scan.xyz"
 incode run "$in/scan.xyz" -o "$scratch/scan.npy" > "$scratch/output" \
     2> "$scratch/errors"
-check 'columns after the third' "exit $?, $(last "$scratch/errors")" \
+status=$?
+check 'columns after the third' "exit $status, $(last "$scratch/errors")" \
     cmp "$scratch/scan.npy" "$scratch/four.npy"
 check 'columns after the third are told once' "$(cat "$scratch/errors")" \
     test "$(grep -c '^incode: .*scan.xyz: .*passed over$' "$scratch/errors") \
@@ -451,6 +484,64 @@ $(wc -l < "$scratch/errors")" = '1 1'
 check 'columns after the third, quietly' "$(cat "$scratch/errors")" \
     eval 'incode run "$in/scan.xyz" -q 2> "$scratch/errors" &&
         [ ! -s "$scratch/errors" ]'
+# Where nothing is asked for, that is said before it is computed.
+none='^incode: no output was asked for, .*; -o FILE writes .* \.ele \.vtu '
+incode run "$good" > "$scratch/output" 2> "$scratch/errors"
+check 'no output is told' "$(cat "$scratch/errors")" \
+    test "$(grep -cE "$none" "$scratch/errors") $(wc -l < "$scratch/errors")" = '1 1'
+for asked in -q "-o $scratch/o.npy" "--stats $scratch/o.json" --table --map; do
+    # shellcheck disable=SC2086
+    incode run "$good" --nodes 2 $asked > "$scratch/output" 2> "$scratch/errors"
+    check "no output is not told with ${asked%% *}" "$(cat "$scratch/errors")" \
+        [ ! -s "$scratch/errors" ]
+done
+# Why a strategy was taken is told to those who ask.
+explained() { grep -c '^auto: .* is expected to take ' "$scratch/output"; }
+incode run "$good" -o "$scratch/o.npy" > "$scratch/output"
+check 'the choice is not explained' "$(cat "$scratch/output")" \
+    [ "$(explained) $(wc -l < "$scratch/output")" = '0 2' ]
+incode run "$good" -o "$scratch/o.npy" --explain > "$scratch/output"
+check 'the choice is explained with --explain' "$(cat "$scratch/output")" \
+    [ "$(explained)" = 1 ]
+# What other tools write is read as it is meant, and what is taken for granted
+# is said once.
+reads() { # NAME EXTENSION NOTE: of four.xyz, as standard input has it
+    cat > "$in/other.$2"
+    incode run "$in/other.$2" -o "$scratch/other.npy" > "$scratch/output" \
+        2> "$scratch/errors"
+    check "$1" "exit $?, $(last "$scratch/errors")" \
+        cmp "$scratch/other.npy" "$scratch/four.npy"
+    check "$1: what is said" "$(cat "$scratch/errors")" [ "$(sed "s,.*/,," \
+        "$scratch/errors")" = "${3:+other.$2: $3}" ]
+}
+names='its first line is taken for names of columns'
+reads 'lines that end in CR' xyz '' < <(tr '\n' '\r' < "$in/four.xyz")
+reads 'names of columns in .xyz' xyz "$names" < <(echo 'X Y Z' && cat "$in/four.xyz")
+reads 'comments with //' txt '' < <(echo '//X Y Z' && sed 's,$, // a point,' \
+    "$in/four.xyz")
+columns='the first three columns are x, y and z; those after them are passed over'
+reads 'commas that may be decimal ones' csv \
+    "$columns (if its commas are decimal ones, write decimal points instead)" \
+    < <(sed 's/ /,/g; s/$/,1,2,3/' "$in/four.xyz")
+sed 's/^\([^ ]*\) \([^ ]*\) \(.*\)/\1,05,\2,5,\3,25/' "$in/four.xyz" > "$in/decimal.csv"
+wrong 'decimal commas' 'decimal.csv:1:.*decimal ones; write decimal points, or' \
+    "$in/decimal.csv"
+printf '1 2 3 4 5\n1 3 2 5 4\n9 8 1 7 6\n' > "$in/turned.xyz"
+wrong 'a row an axis' 'turned.xyz: 3 rows .*transpose' "$in/turned.xyz"
+"$INCODE" gen grid 27 -o "$in/grid.npy"
+sed 's/(27, 3), }/(3, 27), }/' "$in/grid.npy" > "$in/turned.npy"
+wrong 'a row an axis, .npy' 'shape \(3, 27\).*; save its transpose: numpy.save' \
+    "$in/turned.npy"
+# Coordinates have the digits that they came with.
+printf '512051.182 0.1 -3.7\n5403327.77 2e-9 0.30000000000000004\n' > "$in/digits.xyz"
+for format in xyz csv pts node off; do
+    "$INCODE" convert "$in/digits.xyz" "$scratch/digits.$format"
+    check "digits of .$format" "$(cat "$scratch/digits.$format")" \
+        grep -qE '(^|[ ,])512051.182[ ,]0.1[ ,]-3.7$' "$scratch/digits.$format"
+    check "digits of .$format: all of them" "$(cat "$scratch/digits.$format")" \
+        grep -qE '5403327.77[ ,]2e-09[ ,]0.30000000000000004$' \
+        "$scratch/digits.$format"
+done
 mkdir "$in/packed"
 "$INCODE" run "$good" -q -o "$in/packed/a.ele" -o "$scratch/plain.vtu"
 gzip "$in/packed/a.ele"
@@ -465,7 +556,8 @@ for arguments in --help --version 'run --help' 'gen --help' 'verify --help' \
     'digest --help' 'convert --help'; do
     # shellcheck disable=SC2086
     "$INCODE" $arguments > "$scratch/help" 2>&1
-    check "$arguments" "exit $?" test $? = 0 -a -s "$scratch/help"
+    status=$?
+    check "$arguments" "exit $status" test $status = 0 -a -s "$scratch/help"
 done
 
 # --- cube files ---------------------------------------------------------------
@@ -485,7 +577,9 @@ check 'cube/a key that others can read' "$(last "$scratch/errors")" \
     "$scratch/errors"
 chmod 600 "$in/seen.key"
 cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"
-check 'cube/a key of its own, from a file' "exit $?" test ! -s "$scratch/errors"
+status=$?
+check 'cube/a key of its own, from a file' "exit $status" \
+    test $status = 0 -a ! -s "$scratch/errors"
 refuses 'cube/from a pipe' 3 ': a pipe or device; ' cube <(cat "$in/seen.cube")
 
 # --- a node's own arguments ---------------------------------------------------
@@ -498,6 +592,7 @@ node() { # NAME PATTERN ARGUMENT...
     check "$name" "exit $status: $(last "$scratch/errors")" test $status = 2 \
         -a -n "$(grep -E -e "^incode-node: $pattern.*; " "$scratch/errors")"
 }
+node 'no arguments' 'arguments: none is given, and a node has to know its wires'
 node 'unknown argument' '--frob: no such argument' --frob 3
 node 'argument without its value' '--node: wants' --node
 node 'no number' '--window x: not a number' --window x
@@ -544,4 +639,5 @@ ln -s /dev/null "$in/usb:1:1.0"
 node 'a port whose name has colons' '--wire .*1.0:9600:rtscts: does not open' \
     --node 0 --dimension 0 --wire "0=serial:$in/usb:1:1.0:9600:rtscts"
 "$BUILD/incode-node" --help > "$scratch/output" 2> "$scratch/errors"
-check 'node/help' "exit $?" grep -q -e '--wire LINK=WIRE' "$scratch/output"
+status=$?
+check 'node/help' "exit $status" grep -q -e '--wire LINK=WIRE' "$scratch/output"

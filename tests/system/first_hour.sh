@@ -104,6 +104,7 @@ if full; then
         incode flash -q --cube "$lab" "$scratch/part.img"
     refuses 'first_hour/no image' 3 'points.npy: .*; ' \
         incode flash -q --cube "$lab" "$points"
+    # clock: they answer at once, and are waited for no longer than that.
     refuses 'first_hour/no program on them yet' 4 \
         'node 0.*loader.*; .*incode flash' incode run "$points" -q --cube "$lab" \
         --patience 3
@@ -116,6 +117,7 @@ succeeds 'first_hour/flash' incode flash --cube "$lab" "$image" > "$said"
 has 'flash' '0-3: run '
 step 'flashed'
 off 3
+# clock: the others are there already.
 refuses 'first_hour/flash again, a node is off' 4 '^incode: node 3: .*; ' \
     incode flash -q --cube "$lab" --patience 3 "$image"
 nodes 'a node is off' program 3
@@ -201,7 +203,7 @@ wire 1-3
 full || make_points "$points" 500 # enough for what befalls the others
 begin
 off 3
-sleep 1
+sleep 1 # clock: for so long at least
 on 3
 ends 'a node is turned off and on'
 

@@ -85,6 +85,7 @@ for nodes in 3-1 0-99999999 '' ',' 0-1,,1 0x1 0- - 99999999999999999999 '0,'; do
     refuses "flash/nodes that are none: '$nodes'" 2 'not nodes of this cube; ' \
         incode flash --cube "$scratch/none.cube" --nodes "$nodes" "$raw"
 done
+# clock: nobody is waited for for a second.
 refuses 'flash/nobody there' 4 '^incode: nodes? 0.*; ' \
     incode flash --cube "$scratch/nobody.cube" -q --patience 1 --nodes 0 "$raw"
 
@@ -95,6 +96,7 @@ hangs=$BUILD/firmware/tests/image-mps2-an500-hang.img
 need_boards flash mps2-an500
 cube=$scratch/lab.cube
 # Not by within, a function, whose process is not what is to be ended.
+# clock: lib.sh has the time.
 timeout -k 5 "$hang" "$INCODE" emulate --board mps2-an500 --nodes 2 --empty -o "$cube" \
     > "$scratch/boards" 2>&1 &
 boards=$!
@@ -129,18 +131,20 @@ refuses 'flash/an image that hangs' 4 \
 "$INCODE" flash --cube "$cube" "$image" > /dev/null 2> "$scratch/first" &
 flash=$!
 await grep -q 'node 1: takes blocks' "$scratch/first"
-sleep 1
 kill -STOP $flash
 refuses 'flash/two at once' 4 'in use by incode flash .*; ' \
     incode flash --cube "$cube" -q "$image"
 kill -TERM $flash
 kill -CONT $flash
 wait $flash
-check 'flash/interrupted' "exit $?" [ $? != 0 ]
+status=$?
+check 'flash/interrupted' "exit $status" [ $status != 0 ]
 if has_terminals 'flash/a terminal'; then
     script -qec "stty cols 80 rows 24; exec '$INCODE' flash --cube '$cube' \
 '$image'" "$said" > /dev/null 2>&1 < /dev/null
-    check 'flash/a terminal: exit 0' "exit $?: $(last "$said")" [ $? = 0 ]
+    status=$?
+    check 'flash/a terminal: exit 0' "exit $status: $(last "$said")" \
+        [ $status = 0 ]
     check 'flash/a terminal: a row a node' "$(head -c 300 "$said")" \
         grep -qE 'node 1 \[#+ +\] +[0-9]+ % takes blocks' "$said"
     check 'flash/a terminal: all of them' "$(last "$said")" \

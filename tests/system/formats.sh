@@ -60,7 +60,8 @@ awk '{ for (d = 1; d <= 3; d++) {
     } }' "$from" > "$scratch/thousandths.xyz"
 incode run "$scratch/thousandths.xyz" -q -o "$scratch/thousandths.npy"
 incode run "$scratch/a.las" -q -o "$scratch/las.npy" 2> "$scratch/errors"
-check 'formats/.las' "exit $?: $(last "$scratch/errors")" \
+status=$?
+check 'formats/.las' "exit $status: $(last "$scratch/errors")" \
     cmp "$scratch/thousandths.npy" "$scratch/las.npy"
 
 # What has no extension is told by --format: a pipe, a file, a packed one.
@@ -69,6 +70,7 @@ gzip -c "$scratch/a.stl" > "$scratch/packed"
 mkfifo "$scratch/pipe"
 cat "$scratch/a.stl" > "$scratch/pipe" &
 same '--format, a named pipe' "$scratch/pipe" --format stl
+kill $! 2> /dev/null # it would wait for a reader for ever
 same '--format, a packed file' "$scratch/packed" --format .stl.gz
 gzip -cd "$scratch/a.obj.gz" |
     same '--format, standard input' - --format obj --nodes 4

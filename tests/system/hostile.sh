@@ -16,6 +16,7 @@ same() { # NAME OPTION...
     local name=$1 status
     shift
     rm -f "$scratch/stats.json"
+    # clock: no less than that
     incode run "$points" -q --stats "$scratch/stats.json" --host-rate 40000 \
         --host-rate-time 2 "$@" 2> "$scratch/errors"
     status=$?

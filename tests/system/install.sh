@@ -7,6 +7,7 @@ root="$scratch/root"
 make=("${MAKE:-make}" --no-print-directory BUILD="$BUILD" DESTDIR="$root"
     PREFIX=/opt/incode)
 
+mkdir -p "$root/opt/incode/share/man" # of somebody else, and stays
 succeeds 'install/install' "${make[@]}" install > "$scratch/said"
 cat "$scratch/said"
 share=$root/opt/incode/share
@@ -17,6 +18,20 @@ check 'install/the programs' 'they do not run' eval \
 check 'install/one version' "$(cat "$scratch/version" "$scratch/version.node")" \
     test "$(cat "$scratch/version.node")" = "incode-node $(cut -d ' ' -f 2 \
         < "$scratch/version")"
+
+# What help and pages call README.md is there, by its path, with what it links.
+doc=$share/doc/incode
+for arguments in '--help' 'run --help' 'console --help'; do
+    # shellcheck disable=SC2086
+    "$root/opt/incode/bin/incode" $arguments | tr -d '\n ' > "$scratch/help"
+    check "install/$arguments names the document" "$(cat "$scratch/help")" \
+        grep -qF "$(realpath "$doc")/README.md" "$scratch/help"
+done
+lacks=
+while read -r link; do
+    [ -e "$doc/$link" ] || lacks="$lacks $link"
+done < <(grep -oE '\]\([^)#:]+\.(md|svg|cube)' "$doc/README.md" | cut -c 3-)
+check 'install/what README.md links' "$lacks" [ -z "$lacks" ]
 
 # The firmware of boards, where the installed program finds it.
 if [ -e "$BUILD/firmware/mps2-an500.img" ] &&
@@ -95,8 +110,21 @@ for page in incode incode-node; do
 done
 
 "${make[@]}" uninstall > "$scratch/said"
-check 'install/uninstall leaves nothing' "$(find "$root" ! -type d)" \
-    test -z "$(find "$root" ! -type d)"
+# left: what is there but the folder that was there before.
+left() { (cd "$root" && find . -mindepth 1 | sort | tr '\n' ' '); }
+before='./opt ./opt/incode ./opt/incode/share ./opt/incode/share/man '
+check 'install/uninstall leaves what was there' "$(left)" [ "$(left)" = "$before" ]
+"${make[@]}" install > "$scratch/said" 2>&1
+"${make[@]}" install > "$scratch/said" 2>&1
+"${make[@]}" uninstall > "$scratch/said" 2>&1
+check 'install/uninstall after two installs' "$(left)" [ "$(left)" = "$before" ]
+refused=$("${make[@]}" nodes FOR=z80 2>&1)
+check 'install/make nodes FOR=z80' "$refused" grep -qF \
+    'FOR=z80: there is no node program of that; allowed: x86_64 aarch64' \
+    <<< "$refused"
+"${make[@]}" -pq help FOR=armhf > "$scratch/said" 2>&1
+check 'install/make nodes FOR=armhf' "$(grep '^cross:' "$scratch/said")" \
+    grep -qx "cross: $BUILD/nodes/incode-node-armhf" "$scratch/said"
 
 # A variable without a value is one that is not given.
 "${make[@]}" -n V=1 BUILD="$scratch/none" ARCH= "$scratch/none/incode" \

@@ -15,9 +15,12 @@ scratch=$(mktemp -d "${TMPDIR:-/tmp}/incode-test.XXXXXX") || exit 1
 trap 'rm -rf "$scratch"' EXIT
 trap 'exit 130' INT TERM
 
-pass() { printf 'PASS %s\n' "$1"; }
-fail() { printf 'FAIL %s: %s\n' "$1" "$2"; }
-skip() { printf 'SKIP %s: %s\n' "$1" "$2"; }
+# Results go to the script's own output, also from within a redirection: in
+# `succeeds NAME COMMAND > FILE` the file gets what the command prints, alone.
+exec {results_to}>&1
+pass() { printf 'PASS %s\n' "$1" >&"$results_to"; }
+fail() { printf 'FAIL %s: %s\n' "$1" "$2" >&"$results_to"; }
+skip() { printf 'SKIP %s: %s\n' "$1" "$2" >&"$results_to"; }
 
 # check NAME WHY COMMAND...: passes where the command succeeds.
 check() {
@@ -26,16 +29,20 @@ check() {
     if "$@"; then pass "$name"; else fail "$name" "$why"; fi
 }
 
-# succeeds NAME COMMAND...: passes where the command ends with 0.  What it says
-# on standard error goes to $scratch/errors.  (A status cannot be asked of $?
-# behind a $(...) in one command: it is that one's.)
-succeeds() {
-    local name=$1 status
-    shift
+# exits NAME STATUS COMMAND...: passes where the command ends with this status.
+# What it prints on standard error goes to $scratch/errors.  A command whose
+# standard error is wanted elsewhere is followed by status=$?, which a check may
+# then judge.  No argument may hold $? itself (tests/lint refuses it): behind a
+# $(...) in the same command, it is the status of that.
+exits() {
+    local name=$1 wanted=$2 status
+    shift 2
     "$@" 2> "$scratch/errors"
     status=$?
-    check "$name" "exit $status: $(last "$scratch/errors")" [ $status = 0 ]
+    check "$name" "exit $status, not $wanted: $(last "$scratch/errors")" \
+        [ $status = "$wanted" ]
 }
+succeeds() { exits "$1" 0 "${@:2}"; } # NAME COMMAND...
 
 # The last line of a file, for a failure's reason.
 last() { tail -n 1 "$1" 2>/dev/null | tr -d '\r' | cut -c 1-300; }
@@ -98,15 +105,16 @@ list_sets() {
 # A failed run may say more than its last line; the stat of a run by its name.
 stat_of() { jq -r ".$2" "$1"; }
 
-# The program, or a command, ended where it would hang: after so long that no
-# machine is too slow for it.
+# The program, or a command, ended where it would hang.  clock: after so long that
+# no machine is too slow for it.
 hang=${SECONDS_MAX:-900}
 within() { timeout -k 5 "$hang" "$@"; }
 incode() { within "$INCODE" "$@"; }
 
-# await COMMAND...: waits until it succeeds; false after two minutes.
+# await COMMAND...: waits until it succeeds.  clock: false after ten minutes, when
+# no machine is too slow for it.
 await() {
-    local end=$((SECONDS + 120))
+    local end=$((SECONDS + ${AWAIT_SECONDS:-600}))
     until "$@"; do
         [ $SECONDS -lt $end ] || return 1
         sleep 0.01
@@ -122,10 +130,26 @@ lets_look() {
         grep -qFx "$places"
 }
 
-# What needs no waiting is told long before a node's patience of 60 s is over,
-# however slow the machine is.
+# What needs no waiting is told long before a node's patience is over.  clock: with
+# this patience, however slow the machine is.
 # shellcheck disable=SC2034
-soon=45
+patient='--patience 900' soon=600
+
+# amid STEPS [OPTION...]: `slowed SECONDS OPTION...` of the script begins a run,
+# $host, whose host reads slowly for so long, and STEPS are taken, which are true
+# where it was at work still.  clock: on a machine that holds this script up, again
+# with a longer run.
+# shellcheck disable=SC2154
+amid() {
+    local steps=$1 seconds
+    shift
+    for seconds in ${at_first:-} 3 10 30 100 300; do
+        slowed "$seconds" "$@"
+        eval "$steps" && kill -0 "$host" 2> /dev/null && return
+        wait "$host"
+    done
+    return 1
+}
 
 # Whether there are pseudo-terminals here; if not, NAME is skipped.
 has_terminals() {

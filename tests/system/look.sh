@@ -31,6 +31,7 @@ go_on() { kill -CONT "${started[@]}"; }
 # look; $brake.
 mkfifo never
 exec {never}<> never
+# clock: shares of time, whatever else runs.
 nap() { read -r -t "$1" -u "$never"; }
 brake() {
     while :; do
@@ -94,7 +95,8 @@ check 'look/figures grow' "from $first to $second" \
 # shows WORD COMMAND...: of both nodes.
 shows() {
     "${@:2}" > told 2> errors
-    check "look/$1" "exit $?: $(last errors)" [ $? = 0 ]
+    status=$?
+    check "look/$1" "exit $status: $(last errors)" [ $status = 0 ]
     check "look/$1: of both" "$(last told)" grep -qE '^ *(0|0-1)[ :]' told
 }
 for word in stat top links memory nodes log; do

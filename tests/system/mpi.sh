@@ -30,7 +30,8 @@ for nodes in 1 2 8; do
         incode run "$points" -q --link mpi --nodes $nodes \
             --strategy $strategy --stats "$scratch/stats.json" \
             -o "$scratch/out.npy" 2> "$scratch/errors"
-        check "$name" "exit $?: $(last "$scratch/errors")" \
+        status=$?
+        check "$name" "exit $status: $(last "$scratch/errors")" \
             cmp -s "$scratch/first.npy" "$scratch/out.npy"
     done
 done
@@ -43,7 +44,8 @@ check "mpi/a node's map is reported" 'no memory high water' test \
 "$INCODE" run - -q --nodes 1 -o - < "$scratch/points.xyz" > "$scratch/first.ele"
 incode run - -q --link mpi --nodes 2 -o - < "$scratch/points.xyz" \
     > "$scratch/out.ele" 2> "$scratch/errors"
-check 'mpi/standard input and output' "exit $?: $(last "$scratch/errors")" \
+status=$?
+check 'mpi/standard input and output' "exit $status: $(last "$scratch/errors")" \
     cmp -s "$scratch/first.ele" "$scratch/out.ele"
 
 if has_data mpi/digests; then
@@ -69,7 +71,8 @@ echo 'localhost slots=9' > "$scratch/hosts"
 rm -f "$scratch/out.npy"
 by_hand --hostfile "$scratch/hosts" -np 9 "$INCODE" run "$points" -q \
     --link mpi -o "$scratch/out.npy" 2> "$scratch/errors"
-check 'mpi/mpirun with a hostfile' "exit $?: $(last "$scratch/errors")" \
+status=$?
+check 'mpi/mpirun with a hostfile' "exit $status: $(last "$scratch/errors")" \
     cmp -s "$scratch/first.npy" "$scratch/out.npy"
 
 # As on machines that share no memory: ranks look for messages themselves.
@@ -77,7 +80,8 @@ rm -f "$scratch/out.npy"
 INCODE_MPI_APART=1 by_hand -x INCODE_MPI_APART --oversubscribe --mca pml ob1 \
     --mca btl self,tcp -np 9 "$INCODE" run "$points" -q --link mpi \
     -o "$scratch/out.npy" 2> "$scratch/errors"
-check 'mpi/ranks that share no memory' "exit $?: $(last "$scratch/errors")" \
+status=$?
+check 'mpi/ranks that share no memory' "exit $status: $(last "$scratch/errors")" \
     cmp -s "$scratch/first.npy" "$scratch/out.npy"
 
 # rejects NAME STATUS PATTERN OPTION...: said once, by rank 0 alone
@@ -141,11 +145,12 @@ start() {
     shift
     rm -f "$scratch"/out.*
     # A host that reads slowly: the run takes a minute, and no processor.
-    "$@" run "$points" -q --link mpi --nodes "$nodes" \
+    # shellcheck disable=SC2086
+    "$@" run "$points" -q $patient --link mpi --nodes "$nodes" \
         --strategy spatial --host-rate 6000 -o "$scratch/out.npy" > "$scratch/said" 2> "$scratch/errors" &
     run=$!
     await all_there
-    sleep 0.5
+    sleep 0.5 # clock: at work by then, or still beginning
 }
 all_there() {
     all=$(children $run)
@@ -159,6 +164,7 @@ ends() {
     check "$name: exit" "exit $status" test $status = "$expected"
     check "$name: is named" "$(last "$scratch/errors")" \
         grep -qE "$pattern" "$scratch/errors" /dev/stdin <<< ''
+    # clock: minutes
     check "$name: soon" "$((SECONDS - began)) s" \
         test $((SECONDS - began)) -le $soon
     check "$name: no output" "$(ls "$scratch"/out.* 2> /dev/null)" \
@@ -178,7 +184,7 @@ all_gone() {
 pid_of() { echo "$all" | grep " $1" | sed -n "$2p" | cut -d ' ' -f 1; }
 
 start 8 "$INCODE"
-began=$SECONDS
+began=$SECONDS # clock: minutes, as of all that follow
 kill -KILL "$(pid_of incode-node-mpi 4)"
 ends 'mpi/a node killed' 4 '^incode: node [0-7] \(rank [1-8]\): '
 

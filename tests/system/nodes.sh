@@ -63,12 +63,16 @@ nobody() {
         "$INCODE" nodes --json --$name $name > said 2> errors
         jq -e '.command == "nodes" and .status == 4 and
             (.error | contains("'$name'"))' said > /dev/null 2>&1
-        check nodes-json-$name "$(tail -c 300 said)|$(last errors)" [ $? = 0 ]
+        status=$?
+        check nodes-json-$name "$(tail -c 300 said)|$(last errors)" \
+            [ $status = 0 ]
     done
     "$INCODE" console --json < /dev/null > said 2> errors
     jq -e '.status == 2 and (.error | contains("--cube FILE"))' said \
         > /dev/null 2>&1
-    check console-json-nowhere "$(tail -c 300 said)|$(last errors)" [ $? = 0 ]
+    status=$?
+    check console-json-nowhere "$(tail -c 300 said)|$(last errors)" \
+        [ $status = 0 ]
     told nodes-usage 2 'write --cube' four.cube
 }
 
@@ -106,7 +110,8 @@ whole() {
     "$INCODE" gen uniform 2000 -o points.xyz
     "$INCODE" run points.xyz -o tets.ele --cube four.cube -q --verify \
         2> run.log
-    check nodes-run "$(last run.log)" [ $? = 0 ]
+    status=$?
+    check nodes-run "$(last run.log)" [ $status = 0 ]
     told nodes-after-run 0 '^0-3 +linux' --cube four.cube
     # A node that is off: how to start it.
     kill "${started[3]}"
@@ -141,7 +146,6 @@ crossed() {
 }
 
 for case in nobody whole no_wire crossed; do
-    ($case > "$scratch/$case.out") &
+    ($case) &
 done
 wait
-cat "$scratch"/*.out

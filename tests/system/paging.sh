@@ -10,7 +10,8 @@ matches() { [[ $(cat "$1") =~ ^$2$ ]]; }
 says() {
     local name=$1 pattern=$2
     shift 2
-    incode run "$@" --nodes 2 --build faces > "$scratch/output" 2> "$scratch/errors"
+    incode run "$@" --nodes 2 --build faces -o "$scratch/o.npy" \
+        > "$scratch/output" 2> "$scratch/errors"
     check "paging/$name" "it says: $(cat "$scratch/errors")" \
         matches "$scratch/errors" "$pattern"
 }

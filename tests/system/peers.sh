@@ -60,6 +60,7 @@ check peers/wrong "status $status, not 1" [ $status = 1 ]
 check peers/differs 'no word of what differs' \
     grep -q 'few: sha256:.*, where CGAL has sha256:00' "$scratch/errors"
 # And one that has no end.
+# clock: a peer that is still at work when its time is over
 printf '#!/bin/sh\nexec sleep 60\n' > build/peers/cgal
 succeeds peers/endless within bin/incode bench peers --rounds 1 --peers cgal \
     --class small --limit 1 "$scratch/sets/few.xyz" > "$scratch/table"

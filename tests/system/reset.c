@@ -14,7 +14,7 @@
 
 enum { ANSWER_MS = 60000 };
 
-/* Reads until a text has come. */
+/* Reads until a text has come; clock: a minute at most between two bytes. */
 static bool hears(int fd, const char *text)
 {
     static char said[4096];

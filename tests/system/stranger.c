@@ -87,7 +87,7 @@ static uint64_t draw(uint64_t below)
 static uint64_t now_us(void)
 {
     struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    clock_gettime(CLOCK_MONOTONIC, &now); /* clock: when it calls next */
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
@@ -396,7 +396,7 @@ static void run(void)
                 serve(&all.call[i]);
             }
         }
-        (void)poll(NULL, 0, ROUND_MS);
+        (void)poll(NULL, 0, ROUND_MS); /* clock: so often */
     }
 }
 

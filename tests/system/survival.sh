@@ -12,8 +12,7 @@ digest=$(stat_of "$scratch/first.json" digest)
 tetrahedra=$(stat_of "$scratch/first.json" tetrahedra)
 
 # start [OPTION...]: a run on 8 nodes in the background, $host its process.
-# at_work [OPTION...]: one whose host reads slowly for three seconds, so that it
-# is not over before, however slow this script is.
+# slowed SECONDS [OPTION...]: one whose host reads slowly for so long.
 start() {
     rm -f "$scratch/out.npy" "$scratch/stats.json"
     "$INCODE" run "$points" -q --nodes 8 -o "$scratch/out.npy" \
@@ -21,7 +20,13 @@ start() {
     host=$!
 }
 
-at_work() { start --host-rate 100000 --host-rate-time 3 "$@"; }
+slowed() {
+    if [ "$1" = 0 ]; then
+        start "${@:2}"
+    else
+        start --host-rate 100000 --host-rate-time "$@"
+    fi
+}
 
 # The process of node I, once it is there.
 node_of() {
@@ -72,34 +77,25 @@ survives() {
 
 # --- kill -9 -----------------------------------------------------------------
 
-# Where the run was over before, on a machine where this script is slow, once
-# more, with a host that reads slowly.
+# clock: where in the run a signal strikes is left to chance, in what follows.
 for strategy in spatial sequential; do
     for node in 0 1 2 3 4 5 6 7; do
-        for how in start at_work; do
-            $how --strategy $strategy
-            node_of 7 > "$scratch/said"
-            sleep 0.0$((node + 2))
-            strike KILL $node && break
-            wait $host
-        done
+        at_first=0 amid "node_of 7 > '$scratch/said'; sleep 0.0$((node + 2))
+            strike KILL $node" --strategy $strategy
         survives "kill -9 of node $node, $strategy"
     done
     for node in 0 5; do
-        at_work --strategy $strategy --index grid
-        sleep 0.3
-        strike KILL $node
+        amid "sleep 0.3; strike KILL $node" --strategy $strategy --index grid
         survives "kill -9 of node $node, $strategy, grid"
     done
 done
 check 'survival/they were killed in mid-run' "$restarts starts in 20 runs" \
     test $restarts -ge 15
 
+# clock: somewhere in the run
 for strategy in master-slaves hybrid; do
     for node in 0 1 6; do
-        at_work --strategy $strategy
-        sleep 0.1
-        strike KILL $node
+        amid "sleep 0.1; strike KILL $node" --strategy $strategy
         survives "kill -9 of node $node, $strategy"
     done
 done
@@ -109,7 +105,7 @@ for node in 0 3 3 6 0; do strike KILL $node; done
 survives 'five kills during bring-up'
 start --strategy spatial
 for node in 1 0 4 1; do
-    sleep 0.1
+    sleep 0.1 # clock: as all that follow, somewhere in the run
     strike KILL $node
 done
 survives 'four kills, one after the other'
@@ -126,12 +122,9 @@ done
 
 # --- kill -STOP --------------------------------------------------------------
 
+# clock: each is stopped for half a second at least.
 for strategy in spatial sequential; do
-    at_work --strategy $strategy
-    sleep 0.05
-    strike STOP 0
-    sleep 0.5
-    strike STOP 6
+    amid 'strike STOP 0; sleep 0.5; strike STOP 6' --strategy $strategy
     strike CONT 0
     sleep 0.5
     strike CONT 6
@@ -140,10 +133,8 @@ for strategy in spatial sequential; do
         'a stopped node was given up' test \
         "$(stat_of "$scratch/stats.json" node_restarts)" = 0
 done
-at_work --strategy spatial --patience 1
-sleep 0.05
-strike STOP 0
-strike STOP 5
+# clock: until they are given up
+amid 'strike STOP 0 && strike STOP 5' --strategy spatial --patience 3
 survives 'two nodes stopped for longer than --patience'
 check 'survival/they were started again' 'not both' test \
     "$(stat_of "$scratch/stats.json" node_restarts)" -ge 2
@@ -152,9 +143,10 @@ check 'survival/they were started again' 'not both' test \
 
 # hopeless NAME PROGRAM: exit 4 soon, node and link named, no output left.
 hopeless() {
-    local began=$SECONDS
+    local began=$SECONDS # clock: minutes
+    # shellcheck disable=SC2086
     refuses "survival/$1" 4 '^incode: node [0-7] link [0-3]: ' \
-        incode run "$points" -q --nodes 8 --node-program "$2" \
+        incode run "$points" -q --nodes 8 $patient --node-program "$2" \
         -o "$scratch/left/out.npy"
     check "survival/$1: soon" "$((SECONDS - began)) s" \
         test $((SECONDS - began)) -le $soon
@@ -175,7 +167,7 @@ refuses 'survival/a node of a cube file that a signal ends' 4 \
     incode run "$points" -q --cube "$scratch/one.cube" \
     --node-program "$scratch/dies" -o "$scratch/left/out.npy"
 
-# A node that is killed whenever it comes up; the host reads slowly, so that the
+# A node that is killed whenever it comes up, which clock: takes its time; the host reads slowly, so that the
 # run does not end before.
 start --strategy spatial --host-rate 100000
 while kill -0 $host 2> /dev/null; do strike KILL 3; done

@@ -63,6 +63,9 @@ static enum key_file_state read_key(int fd, const char *mark, uint8_t *key)
     if (!S_ISREG(about.st_mode)) {
         return KEY_FILE_NO_KEY;
     }
+    if (about.st_uid != geteuid() && about.st_uid != 0) {
+        return KEY_FILE_FOREIGN;
+    }
     if ((about.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
         return KEY_FILE_WRITABLE;
     }
@@ -109,6 +112,9 @@ struct key_file_text key_file_text(enum key_file_state state)
                            "chmod 600 it"},
         [KEY_FILE_WRITABLE] = {"can be written by others than its owner",
                                "chmod 600 it, and see that it is still yours"},
+        [KEY_FILE_FOREIGN] = {"belongs to another user, who can change it",
+                              "give a file of your own or of root, with a key "
+                              "that you trust"},
         [KEY_FILE_UNREADABLE] = {"cannot be read",
                                  "give the key's file, or make one with: "
                                  "incode key FILE"},

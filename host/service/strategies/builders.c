@@ -91,8 +91,10 @@ int host_builders_check(const char *name, unsigned group,
     if (sharing->builders >= group) {
         return host_fail(error, HOST_USAGE,
                          "--builders %u: %u nodes have %u beside their face "
-                         "manager; give 1 to %u",
-                         sharing->builders, group, group - 1, group - 1);
+                         "manager; give %s%u%s",
+                         sharing->builders, group, group - 1,
+                         group > 2 ? "1 to " : "", group - 1,
+                         group > 2 ? "" : ", or more --nodes");
     }
     return 0;
 }

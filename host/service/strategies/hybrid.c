@@ -37,9 +37,11 @@ static int check(unsigned nodes, const struct host_sharing *sharing,
     if (cluster != 0 &&
         (cluster < 2 || cluster > nodes || (cluster & (cluster - 1)) != 0)) {
         return host_fail(error, HOST_USAGE,
-                         "--cluster %u: %u nodes make no such clusters; give a "
-                         "power of two, 2 to %u",
-                         cluster, nodes, nodes);
+                         "--cluster %u: %u nodes make no such clusters; give "
+                         "%s%u%s",
+                         cluster, nodes,
+                         nodes > 2 ? "a power of two, 2 to " : "", nodes,
+                         nodes > 2 ? "" : ", or more --nodes");
     }
     return host_builders_check("hybrid", cluster_of(nodes, sharing), sharing,
                                rule, error);

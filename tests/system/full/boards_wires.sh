@@ -24,6 +24,7 @@ trouble() {
         *) kill_board $node ;;
         esac
         times=$((times - 1))
+        # clock: chance
         [ "$times" = 0 ] || sleep "$((1 + RANDOM % 3)).$((RANDOM % 10))"
     done
 }

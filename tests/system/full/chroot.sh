@@ -65,6 +65,9 @@ for user in root someone; do
     works $user run
     check "chroot/make run as $user: a result" 'no file in out/' \
         test -s "$root/src/incode/out/uniform20k.vtu"
+    check "chroot/make run as $user: it says what it installs" 'not how many' \
+        grep -qE '^With what they need these are 1[0-9]{2} packages: ' \
+        "$BUILD/results/chroot-$user-run.txt"
     works $user test
     echo "$user: $(last "$BUILD/results/chroot-$user-test.txt")"
 done

@@ -25,7 +25,7 @@ takes() {
     local begun
     emulate mps2-an385 "$1" --empty
     join 19200
-    begun=$(date +%s%N)
+    begun=$(date +%s%N) # clock: a stated time
     "$INCODE" flash --cube "$cube" "$image" > /dev/null 2> "$errors" &
     flash=$!
     await_long verified "$1"
@@ -38,7 +38,7 @@ takes() {
 }
 # await_long WHAT NODES: so many have come to it, within a quarter of an hour.
 await_long() {
-    local end=$((SECONDS + 900))
+    local end=$((SECONDS + 900)) # clock: minutes
     until [ "$(grep -c ": $1\$" "$errors" 2> /dev/null)" = "$2" ]; do
         if [ $SECONDS -ge $end ] || ! kill -0 $flash; then
             fail "full flash/$2" "not all are $1: $(last "$errors")"

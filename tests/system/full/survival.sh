@@ -17,7 +17,7 @@ pick() { shift $((RANDOM % $#)); echo "$1"; }
 strike() {
     local times=$((1 + RANDOM % 5)) pid
     for _ in $(seq $times); do
-        sleep "0.$((RANDOM % 4))$((RANDOM % 10))"
+        sleep "0.$((RANDOM % 4))$((RANDOM % 10))" # clock: chance
         pid=$(pgrep -P "$host" -x incode-node | shuf -n 1)
         [ -z "$pid" ] && return
         case $((RANDOM % 3)) in
@@ -36,7 +36,7 @@ for run in $(seq 100); do
     within "$INCODE" run "$points" -q --stats "$scratch/stats.json" $how \
         2> "$scratch/errors" &
     timer=$!
-    sleep 0.03
+    sleep 0.03 # clock: chance
     host=$(pgrep -P $timer)
     [ -n "$host" ] && strike
     wait $timer

@@ -23,7 +23,7 @@ make_cube /dev/ttyS0 /dev/none > "$disk/line.cube"
 make_cube /dev/ttyS1 /dev/none > "$disk/used.cube"
 make_init <<'END'
 echo "ports: $(ls /dev | grep ttyS | tr '\n' ' ')"
-sleep 1000 < /dev/ttyS1 &
+sleep 1000 < /dev/ttyS1 & # clock: it has the port for longer than the test
 incode run /points.npy -q --cube /used.cube
 echo "used: exit $?"
 incode run /points.npy -q --cube /line.cube --stats /stats.json
@@ -35,7 +35,7 @@ start_vm -chardev pty,id=line -device pci-serial,chardev=line \
 for _ in $(seq 50); do
     line=$(grep -o '/dev/pts/[0-9]*' "$scratch/qemu")
     [ -n "$line" ] && break
-    sleep 0.1
+    sleep 0.1 # clock: looks again
 done
 make_cube /dev/none "$line" > "$scratch/out.cube"
 "$INCODE" cube "$scratch/out.cube" > "$scratch/options"

@@ -14,7 +14,8 @@ done
 "${MAKE:-make}" --no-print-directory -j "$(nproc)" BUILD="$BUILD" \
     "$BUILD/firmware/mps2-an500.img" "$BUILD/firmware/loader/mps2-an500.img" \
     "$BUILD/tests/reset" > "$scratch/said" 2>&1
-check 'lines: the firmware' "$(last "$scratch/said")" [ $? = 0 ]
+status=$?
+check 'lines: the firmware' "$(last "$scratch/said")" [ $status = 0 ]
 need_vm lines incode tests/pulse
 
 # --- what the machine does ----------------------------------------------------
@@ -63,7 +64,7 @@ starts() { tr -d '\0\377' < /said$1 | grep -ac 'after reset from outside'; }
 heard() { # NODE COUNT WHAT
     for _ in $(seq 300); do
         [ $(starts $1) -gt $2 ] && echo "$3: node $1 starts" && return
-        sleep 0.1
+        sleep 0.1 # clock: looks again
     done
 }
 sleep 0.2

@@ -13,6 +13,7 @@ uint64_t chance_draw(uint64_t *random)
     return *random >> 33;
 }
 
+/* clock: wires have their rates, and trouble comes now and then. */
 uint64_t chance_now_us(void)
 {
     struct timespec now;

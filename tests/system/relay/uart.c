@@ -397,7 +397,7 @@ void uart_wires_wait(const struct uart_wires *wires, uint64_t until_us)
         return;
     }
     if (until_us <= now_us + wires->tick_us) {
-        struct timespec until = time_of(until_us);
+        struct timespec until = time_of(until_us); /* clock: a wire's rate */
         (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
         return;
     }

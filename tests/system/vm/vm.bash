@@ -66,7 +66,8 @@ need_vm() {
         ARCH=armv8-a CC="aarch64-linux-gnu-gcc -static -isystem $include \
 -isystem $include/aarch64-linux-gnu -L$vm/lib -L$lib" \
         "${@/#/$vm/build/}" > "$scratch/said" 2>&1
-    check "$name: programs for arm64" "$(last "$scratch/said")" [ $? = 0 ]
+    status=$?
+    check "$name: programs for arm64" "$(last "$scratch/said")" [ $status = 0 ]
     # What else is put into $disk, the machine has as /.
     disk=$scratch/disk
     mkdir -p "$disk/bin" "$disk/proc" "$disk/sys" "$disk/dev"
@@ -91,6 +92,7 @@ make_init() {
 
 # start_vm ARGUMENT...: of the emulator; $machine.
 start_vm() {
+    # clock: half an hour
     timeout 1800 qemu-system-aarch64 -M virt -cpu cortex-a53 -m 256 -nodefaults \
         -nographic -serial "file:$scratch/console" \
         -kernel "$vm"/boot/vmlinuz-* -initrd "$scratch/initrd" \

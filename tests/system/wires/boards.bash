@@ -71,7 +71,7 @@ emulator_of() {
 }
 reset_board() { "$BUILD/tests/reset" "$cube.d/qmp$1.socket"; }
 kill_board() { kill -KILL "$(emulator_of "$1")"; }
-stop_board() { # NODE SECONDS
+stop_board() { # NODE SECONDS; clock: for so long at least
     local pid
     pid=$(emulator_of "$1")
     kill -STOP "$pid"

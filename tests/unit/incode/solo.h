@@ -209,8 +209,11 @@ static inline bool solo_deliver(struct solo *s)
         solo_deliver_page(s, solo_draw(s, s->page_count));
         return true;
     }
-    while (s->page_count > 0)
+    while (s->page_count > 0) {
         solo_deliver_page(s, 0);
+        if (s->pause.look != NULL) /* as a node does between two messages */
+            (void)s->pause.look(s->pause.context);
+    }
     return true;
 }
 

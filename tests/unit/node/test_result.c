@@ -204,12 +204,12 @@ static void test_truncated(void **unused)
 static void test_finders(void **unused)
 {
     (void)unused;
-    static const uint8_t expected[] = {
-        1, 10,  0, 2, 4, 6,          /* of the sender: vertex 5 and 6, 7, 8 */
-        3, 18,  1, 0, 0, 2, 4, 6,    /* of node 9 */
-        1, 2,   0, 2, 4, 6,          /* and of the next vertex */
-        7, 208, 7, 1, 0, 0, 2, 4, 6, /* of node 1000 */
-    };
+    /* Of the sender, vertex 5 and 6, 7, 8; of node 9, the same, and of the next
+     * vertex; of node 1000. */
+    static const uint8_t expected[] = {0x01, 10,  0, 2, 4, 6, /**/
+                                       0x27, 1,   0, 0, 2, 4, 6, 1, 2,
+                                       0,    2,   4, 6, /**/
+                                       0xff, 232, 3, 1, 0, 0, 2, 4, 6};
     static const uint32_t apexes[1][3] = {{6, 7, 8}}, next[1][3] = {{7, 8, 9}};
     uint8_t buffer[100 + NODE_RESULT_SLACK];
     struct node_result_writer writer;
@@ -242,7 +242,7 @@ static void test_finders(void **unused)
     assert_int_equal(node_result_read(&reader, rows, 8, &count),
                      NODE_RESULT_GARBAGE);
     /* None without a tetrahedron behind it. */
-    node_result_begin(&writer, buffer, 21, SENDER);
+    node_result_begin(&writer, buffer, 20, SENDER);
     assert_int_equal(node_result_finder(&writer, 9), 0);
     assert_int_equal(writer.size, 0);
 }

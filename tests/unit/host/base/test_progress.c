@@ -86,7 +86,7 @@ static void obey(char what, unsigned number)
 }
 
 /* Takes what has come.  A terminal delivers in its own time: a bell of ours
- * rings when all before it is here. */
+ * rings when all before it is here.  clock: within a minute. */
 static void look(void)
 {
     static unsigned in, number;
@@ -112,7 +112,8 @@ static void look(void)
     }
 }
 
-/* Shows until a line is drawn, which takes a tenth of a second. */
+/* Shows until a line is drawn, which takes a tenth of a second.  clock: or no
+ * more than minutes. */
 static const char *shown(uint64_t done, uint64_t total, uint64_t amount)
 {
     look();
@@ -211,6 +212,7 @@ static void test_notes(void **unused)
     close_screen();
 }
 
+/* clock: likewise */
 static void draw_rows(double part)
 {
     look();
@@ -277,12 +279,48 @@ static void test_quiet(void **unused)
     (void)close(ends[0]);
 }
 
+/* Without a terminal, where that is asked for: whole lines, and few. */
+static void test_lines(void **unused)
+{
+    int ends[2], before = dup(STDERR_FILENO);
+    char said[256] = "";
+    struct pollfd file;
+    unsigned shown = 0;
+    (void)unused;
+    assert_int_equal(pipe(ends), 0);
+    assert_true(dup2(ends[1], STDERR_FILENO) >= 0);
+    file = (struct pollfd){ends[0], POLLIN, 0};
+    host_progress_begin_anywhere();
+    host_progress_phase("reading", "MB");
+    assert_int_equal(host_progress_rows_max(), 0);
+    for (; shown < 60000 && poll(&file, 1, 0) == 0; shown++) {
+        if (shown % 8 == 0) {
+            host_progress_phase("triangulating", "Mtet");
+        }
+        (void)poll(NULL, 0, 10);
+        host_progress_show(1, 4, 2000000);
+    }
+    host_progress_show(2, 4, 2000000); /* too soon */
+    host_progress_end();
+    assert_true(dup2(before, STDERR_FILENO) >= 0);
+    (void)close(before);
+    (void)close(ends[1]);
+    assert_true(shown > 10);
+    assert_true(read(ends[0], said, sizeof said - 1) > 0);
+    static const char begins[] = "incode: triangulating  25 % 2.0 Mtet ";
+    assert_memory_equal(said, begins, sizeof begins - 1);
+    assert_null(strpbrk(said, "\r\033[#"));
+    assert_string_equal(strchr(said, '\n'), "\n"); /* and no more */
+    (void)close(ends[0]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fits),   cmocka_unit_test(test_follows_the_width),
         cmocka_unit_test(test_counts), cmocka_unit_test(test_notes),
         cmocka_unit_test(test_rows),   cmocka_unit_test(test_quiet),
+        cmocka_unit_test(test_lines),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,14 @@
  * node's memory. */
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/utsname.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -115,7 +118,41 @@ static void test_programs(void **unused)
     error = (struct host_error){0};
     assert_null(host_programs_take(&programs, "armv7l", &error));
     assert_non_null(strstr(error.text, "/nowhere/incode-node-armhf: "));
-    assert_non_null(strstr(error.text, "; make it with: make nodes"));
+    assert_non_null(strstr(error.text, "; make it with: make nodes FOR=armhf"));
+    host_programs_free(&programs);
+}
+
+/* Where the folder lacks it, what make has made for this machine's processor,
+ * and for no other. */
+static void test_own_program(void **unused)
+{
+    (void)unused;
+    static struct host_programs programs;
+    struct host_error error = {0};
+    struct utsname here;
+    char folder[] = "/tmp/incode-programs-XXXXXX",
+         digits[HOST_SHA256_DIGITS + 1];
+    assert_int_equal(uname(&here), 0);
+    assert_non_null(mkdtemp(folder));
+    assert_int_equal(host_programs_open(&programs, NULL, &error), 0);
+    assert_non_null(strstr(programs.own, "/incode-node"));
+    (void)snprintf(programs.folder, sizeof programs.folder, "%s", folder);
+    (void)snprintf(programs.own, sizeof programs.own, "%s/node", folder);
+    FILE *made = fopen(programs.own, "w");
+    assert_non_null(made);
+    assert_true(fputs("abc", made) >= 0);
+    assert_int_equal(fclose(made), 0);
+    const struct host_program *program =
+        host_programs_take(&programs, here.machine, &error);
+    assert_non_null(program);
+    host_digest_bytes("abc", 3, digits);
+    assert_string_equal(program->digest, digits);
+    bool is_riscv = strcmp(here.machine, "riscv64") == 0;
+    assert_null(
+        host_programs_take(&programs, is_riscv ? "x86_64" : "riscv64", &error));
+    assert_non_null(strstr(error.text, "/incode-node-"));
+    assert_int_equal(unlink(programs.own), 0);
+    assert_int_equal(rmdir(folder), 0);
     host_programs_free(&programs);
 }
 
@@ -151,6 +188,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_where),    cmocka_unit_test(test_service),
         cmocka_unit_test(test_start),    cmocka_unit_test(test_command),
-        cmocka_unit_test(test_programs), cmocka_unit_test(test_refused)};
+        cmocka_unit_test(test_programs), cmocka_unit_test(test_own_program),
+        cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, read_cube, free_cube);
 }

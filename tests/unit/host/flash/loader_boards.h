@@ -43,6 +43,7 @@ enum {
 
 struct board {
     struct chip chip;
+    struct loader_budget budget;
     struct loader_rules rules;
     struct loader_slots slots;
     struct node_board as;
@@ -124,6 +125,8 @@ static void start(unsigned i, bool ended_badly)
     struct board *b = &board[i];
     const char *why = NULL;
     plug_in(i);
+    loader_budget_open(&b->budget);
+    assert_true(loader_budget_take(&b->budget, LOADER_STARTS));
     b->loader = NULL;
     b->node = NULL;
     b->confirmed = b->off = false;
@@ -144,6 +147,7 @@ static void lose_power(unsigned i)
     struct board *b = &board[i];
     b->off = true;
     b->stays = false;
+    memset(&b->budget, 0, sizeof b->budget);
     b->cuts++;
     b->chip.until_loss = -1;
     b->busy_us = now_us + 20000 + draw(300000);
@@ -156,6 +160,7 @@ static void make_board(unsigned i)
     b->chip.random = i + 1;
     b->rules = chip_rules;
     b->rules.flash = &b->chip.flash;
+    b->rules.budget = &b->budget;
     b->as = (struct node_board){.context = b,
                                 .now_us = tell_time,
                                 .busy_us = tell_time,

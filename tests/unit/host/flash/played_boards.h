@@ -206,7 +206,8 @@ static void obey(struct board *b, unsigned i, const uint8_t *data)
     if (message.what == LOADER_VERIFY && b->phase == LOADER_WHOLE) {
         b->phase = LOADER_VERIFIED;
         b->verified = true;
-    } else if (message.what == LOADER_NAME) {
+    } else if (message.what == LOADER_NAME && message.transfer == b->transfer &&
+               b->phase >= LOADER_THERE && b->phase <= LOADER_VERIFIED) {
         memcpy(b->serial, message.serial, sizeof b->serial);
     } else if (message.what == LOADER_BOOT) {
         b->boots++;

@@ -157,7 +157,8 @@ static void where_there_is_no_terminal_there_are_lines(void **unused)
                               "incode: flash: node 3: runs it\n");
 }
 
-/* As much as a terminal was sent, up to a bell of ours. */
+/* As much as a terminal was sent, up to a bell of ours.  clock: within a
+ * minute. */
 static void take_all(int master, int slave)
 {
     size_t size = 0;

@@ -175,6 +175,24 @@ static void npy_of_other_shapes(void **unused)
             HOST_INPUT);
         assert_non_null(strstr(error.text, wrong[i].why));
     }
+    for (int i = 0; i < 2; i++) { /* what was meant are its columns */
+        struct host_error error = {0};
+        const char *header = i == 0 ? "{'descr': '<f8', 'fortran_order': "
+                                      "False, 'shape': (3, 7), }\n"
+                                    : "{'descr': '<i8', 'fortran_order': "
+                                      "True, 'shape': (3, 7), }\n";
+        b.n = 0;
+        put_text(&b, "\x93NUMPY\x01");
+        put_word(&b, 0, 1, false);
+        put_word(&b, strlen(header), 2, false);
+        put_text(&b, header);
+        put_values(&b, 21, true, false);
+        assert_int_equal(
+            host_points_parse("a.npy", b.data, b.n, &points, &error),
+            HOST_INPUT);
+        assert_non_null(strstr(error.text, "shape (3, 7), of which"));
+        assert_non_null(strstr(error.text, "; save its transpose: numpy.save"));
+    }
     struct host_error error = {0};
     put_npy(&b, 1, "<f8", false, "4");
     put_values(&b, 20, true, false);

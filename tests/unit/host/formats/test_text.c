@@ -136,6 +136,82 @@ static void text_in_all_its_habits(void **unused)
     expect_rows("a.off", &b, 2);
 }
 
+/* A line of names, // before comments, lines that end in CR alone. */
+static void text_of_other_tools(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *path, *text;
+        bool named;
+    } files[] = {
+        {"a.xyz", "x y z\n-3 -2.5 -2\n-1.5 -1 -.5\n", true},
+        {"a.txt", "Z;Y;X\r\n-2;-2.5;-3\r\n-.5;-1;-1.5\r\n", true},
+        {"-", " east north  height\n  -3\t-2.5  -2\n-1.5\t-1\t-.5", true},
+        {"a.csv", "x,y,z\n-3,-2.5,-2\n-1.5,-1,-.5\n", false},
+        {"a.xyz", "//X Y Z\n-3 -2.5 -2 // one\n // two\n-1.5 -1 -.5\n", false},
+        {"a.csv", "// x\nx,y,z\n-3,-2.5,-2\n//\n-1.5,-1,-.5\n", false},
+        {"a.xyz", "# made\r-3 -2.5 -2\r-1.5 -1 -.5\r", false},
+        {"a.txt", "x y z\r\r-3 -2.5 -2\r-1.5 -1 -.5", true},
+        {"a.xyz", "-3 -2.5 -2\r-1.5 -1 -.5\r\n", false},
+        {"a.xyz", "-3 -2.5 -2\r\r\n-1.5 -1 -.5\r\r\n", false},
+        {"a.csv", "x,y,z\r-3,-2.5,-2\r-1.5,-1,-.5\r", false},
+        {"a.node", "2 3 0 0\r1 -3 -2.5 -2\r2 -1.5 -1 -.5\r", false}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        struct host_points points;
+        struct host_error error = {0};
+        struct bytes b = {.n = 0};
+        put_text(&b, files[i].text);
+        expect_rows(files[i].path, &b, 2);
+        assert_int_equal(
+            host_points_parse(files[i].path, b.data, b.n, &points, &error), 0);
+        assert_memory_equal(b.data, files[i].text, b.n); /* not its to change */
+        assert_int_equal(points.named, files[i].named);
+        assert_false(points.wide);
+        host_points_free(&points);
+    }
+    refused("a.xyz", "1 2 3\r4 5 six\r", "a.xyz:2:5: 'six' is no number; ");
+    refused("a.xyz", "my points\n1 2 3\n", "; name the columns x, y and z, or");
+    refused("a.xyz", "12\nwater\n1 2 3\n", "or, where it counts the points, ");
+    refused("a.xyz", "1 2 3 /4\n5 6 // 7\n", "a.xyz:2:5: 2 columns");
+}
+
+/* Commas that are decimal ones are refused; where they may be columns, that is
+ * noted. */
+static void decimal_commas(void **unused)
+{
+    (void)unused;
+    static const struct {
+        const char *text;
+        bool doubtful;
+    } files[] = {{"0,1,0,2,0,3\n1,1,1,2,1,3\n", true},
+                 {"12,40,7,255,0,0\n-1,2,-3,4\n", true},
+                 {"0,1,0,2,0,3\n1,1,1,2.5,1,3\n", false},
+                 {"1.5,1,0,2,0,3\n1,1,1,2,1,3\n", false},
+                 {"12,40,7,255\n1,2,3\n", false},
+                 {"1,2,3\n12,40,7,255\n", false},
+                 {" 12, 40,  7,255\n100,200,  7,255\n", false},
+                 {"10,20,30,x7\n1,2,3,4\n", false},
+                 {"10;20;30;7,5\n1,2,3,4", false}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        struct host_points points;
+        struct host_error error = {0};
+        assert_int_equal(host_points_parse("a.csv", files[i].text,
+                                           strlen(files[i].text), &points,
+                                           &error),
+                         0);
+        assert_true(points.wide);
+        assert_int_equal(points.doubtful, files[i].doubtful);
+        host_points_free(&points);
+    }
+    static const char *const whole =
+        "more than 3 columns, all of whole numbers";
+    refused("a.csv", "1,5, 2,5, 3,5\n", "a.csv:1:8: more than 3 columns, all");
+    refused("a.csv", "1,5, 2,5, 3\n", whole);
+    refused("a.csv", "0,1,0,2,0,3\n1,05,1,2,3,4\n", "a.csv:2:8: more than 3");
+    refused("a.txt", "1,5,2,05,3,5\n1,5,02,5,3,5 # x\n", whole);
+    refused("a.csv", "x;y;z\n1,5;2,5;3,5\n", "write decimal points where");
+}
+
 /* The first three count, whatever the others hold and however many they are. */
 static void columns_after_the_third(void **unused)
 {
@@ -187,7 +263,9 @@ static void text_faults_have_their_place(void **unused)
     refused("a.xyz", "0x1p3 2 3\n", "a.xyz:1:1: '0x1p3' is no number");
     refused("a.xyz", "1e 2 3\n", "a.xyz:1:1: '1e' is no number");
     refused("a.xyz", "1 2 - 3\n", "a.xyz:1:5: '-' is no number");
-    refused("a.xyz", "x y z\n1 2 3\n", "a.xyz:1:1: 'x' is no number");
+    refused("a.xyz", "1 2 3\nx y z\n",
+            "a.xyz:2:1: 'x' is no number; correct "
+            "it, or put # before");
     refused("a.csv", "x,y,z\n1,2,q\n", "a.csv:2:5: 'q' is no number");
     refused("a.csv", "x,y\n1,2,3\n", "a.csv:1:1: the names of columns are");
     refused("a.csv", "a,b,c,d\n1,2,3\n", "a.csv:1:1: the names of columns");
@@ -301,6 +379,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_correctly_rounded),
         cmocka_unit_test(text_in_all_its_habits),
+        cmocka_unit_test(text_of_other_tools),
+        cmocka_unit_test(decimal_commas),
         cmocka_unit_test(columns_after_the_third),
         cmocka_unit_test(text_faults_have_their_place),
         cmocka_unit_test(binary_is_no_text),

@@ -1,6 +1,7 @@
 /* Tetrahedra in every format: written and read back, converted, and every kind
  * of wrong input refused with its place. */
 #include <dirent.h>
+#include <math.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -74,7 +75,7 @@ static void write_whole(const char *path, const struct host_points *points,
                         const struct host_tetrahedra *tets)
 {
     struct host_error error = {0};
-    assert_int_equal(host_write(path, points, tets, &error), 0);
+    assert_int_equal(host_write(path, NULL, points, tets, &error), 0);
     assert_int_equal(host_output_commit(&error), 0);
 }
 
@@ -93,7 +94,7 @@ static void written_and_read_back(void **unused)
             char path[128];
             points.base = base;
             in_folder(&folder, names[i], path);
-            assert_int_equal(host_write_probe(path, &error), 0);
+            assert_int_equal(host_write_probe(path, NULL, &error), 0);
             write_whole(path, &points, &tets);
             if (host_tetrahedra_read(path, &again, &read, &error) != 0) {
                 fail_msg("%s", error.text);
@@ -190,7 +191,7 @@ static void failures_leave_nothing(void **unused)
     struct host_error errors[3] = {{0}};
     for (int i = 0; i < 3; i++) {
         in_folder(&folder, names[i], path);
-        codes[i] = host_write(path, &points, &tets, &errors[i]);
+        codes[i] = host_write(path, NULL, &points, &tets, &errors[i]);
     }
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &old), 0);
     for (int i = 0; i < 3; i++) {
@@ -198,10 +199,11 @@ static void failures_leave_nothing(void **unused)
         assert_non_null(strstr(errors[i].text, "writing failed"));
     }
     struct host_error error = {0};
-    assert_int_equal(host_write("/nowhere/a.vtu", &points, &tets, &error),
+    assert_int_equal(host_write("/nowhere/a.vtu", NULL, &points, &tets, &error),
                      HOST_INPUT);
     error = (struct host_error){0};
-    assert_int_equal(host_write_probe("/nowhere/a.vtu", &error), HOST_INPUT);
+    assert_int_equal(host_write_probe("/nowhere/a.vtu", NULL, &error),
+                     HOST_INPUT);
     error = (struct host_error){0};
     assert_int_equal(host_write_check("a.stl", &error), HOST_USAGE);
     assert_non_null(strstr(error.text, "use .ele .vtu .vtk .msh .mesh .npy"));
@@ -390,6 +392,187 @@ static void conversion(void **unused)
     assert_int_equal(remove_folder(&folder), 11);
 }
 
+/* --- coordinates as text ------------------------------------------------- */
+
+/* What a point with this x has in an .xyz for it. */
+static const char *printed(const char *path, const double *x, unsigned n,
+                           char *text, size_t size)
+{
+    struct host_points points = {0};
+    struct host_error error = {0};
+    for (unsigned i = 0; i < n; i++) {
+        const double xyz[3] = {x[i], 0, 0};
+        assert_int_equal(host_points_append(&points, xyz, 1, &error), 0);
+    }
+    assert_int_equal(host_points_write(path, &points, &error), 0);
+    assert_int_equal(host_output_commit(&error), 0);
+    host_points_free(&points);
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    size_t used = fread(text, 1, size - 1, file);
+    assert_true(used < size - 1);
+    text[used] = '\0';
+    (void)fclose(file);
+    return text;
+}
+
+/* The digits of a number, but for those that only place its point. */
+static int significant(const char *number, char digits[64])
+{
+    int n = 0;
+    for (; *number != '\0' && *number != 'e'; number++) {
+        if (*number >= (n == 0 ? '1' : '0') && *number <= '9') {
+            digits[n++] = *number;
+        }
+    }
+    while (n > 0 && digits[n - 1] == '0') {
+        n--;
+    }
+    digits[n] = '\0';
+    return n;
+}
+
+/* The number reads back; none with fewer digits does, and with as many none is
+ * nearer. */
+static void check_number(const char *number, double x)
+{
+    char other[64], digits[64], others[64];
+    if (strtod(number, NULL) != x) {
+        fail_msg("%s, and not %.17g", number, x);
+    }
+    int n = significant(number, digits);
+    assert_true(n <= 17);
+    if (n > 1) {
+        (void)snprintf(other, sizeof other, "%.*e", n - 2, x);
+        if (strtod(other, NULL) == x) {
+            fail_msg("%s, where %s does", number, other);
+        }
+    }
+    (void)snprintf(other, sizeof other, "%.*e", n > 0 ? n - 1 : 0, x);
+    (void)significant(other, others);
+    if (strtod(other, NULL) == x && strcmp(digits, others) != 0) {
+        fail_msg("%s, where %s is nearer", number, other);
+    }
+}
+
+/* Of many sizes; some of few digits, some next to powers of two. */
+static void draw_numbers(double *x, int n, uint64_t *state)
+{
+    for (int i = 0; i < n; i++) {
+        *state = *state * 6364136223846793005u + 1442695040888963407u;
+        double part = 1 + (double)(*state >> 12) * 0x1p-52;
+        int exponent = (int)(*state % 71) - 18;
+        if (i % 4 == 1) {
+            double tens = i % 8 == 1 ? 1e3 : 1e7;
+            part = floor(part * tens) / tens;
+            exponent = 0;
+        } else if (i % 64 == 2) {
+            part = i % 128 == 2 ? 1 : 2 - 0x1p-52;
+        } else if (i % 64 == 3) {
+            exponent = (int)(*state >> 8 & 2047) - 1074;
+        }
+        x[i] = ldexp(part, exponent < 1023 ? exponent : 1023);
+    }
+}
+
+static void fewest_digits(void **unused)
+{
+    (void)unused;
+    enum { MANY = 4096, TEXT = 64 * MANY };
+    static const struct {
+        double x;
+        const char *text;
+    } known[] = {{512051.182, "512051.182"},
+                 {0.1, "0.1"},
+                 {-0.1, "-0.1"},
+                 {1.0 / 3, "0.3333333333333333"},
+                 {0.1 + 0.2, "0.30000000000000004"},
+                 {-123.456, "-123.456"},
+                 {0.00001, "0.00001"},
+                 {0.00002345, "0.00002345"},
+                 {0.000001, "1e-06"},
+                 {5e-324, "5e-324"},
+                 {-0.0, "-0"},
+                 {1e15, "1e+15"},
+                 {999999999999999.875, "999999999999999.9"},
+                 {562949953421312.25, "562949953421312.2"},
+                 {562949953421312.75, "562949953421312.8"},
+                 {0.99999999999999989, "0.9999999999999999"},
+                 {1.0000000000000002, "1.0000000000000002"},
+                 {0x1p-10, "0.0009765625"},
+                 {0x1p-16, "0.0000152587890625"},
+                 {7e22, "7e+22"},
+                 {1.7976931348623157e308, "1.7976931348623157e+308"}};
+    struct folder folder = make_folder();
+    char path[128], *text = malloc(TEXT), *line;
+    double *x = malloc(MANY * sizeof *x);
+    assert_true(text != NULL && x != NULL);
+    in_folder(&folder, "a.xyz", path);
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
+        printed(path, &known[i].x, 1, text, TEXT);
+        char expected[64];
+        (void)snprintf(expected, sizeof expected, "%s 0 0\n", known[i].text);
+        assert_string_equal(text, expected);
+    }
+    uint64_t state = 1;
+    for (int round = 0; round < 40; round++) {
+        draw_numbers(x, MANY, &state);
+        line = (char *)printed(path, x, MANY, text, TEXT);
+        for (int i = 0; i < MANY; i++) {
+            char *end = strchr(line, ' ');
+            assert_non_null(end);
+            *end = '\0';
+            check_number(line, x[i]);
+            line = strchr(end + 1, '\n');
+            assert_non_null(line);
+            line++;
+        }
+    }
+    free(x);
+    free(text);
+    assert_int_equal(remove_folder(&folder), 1);
+}
+
+/* The .node of the points stays as it is beside their .ele, whatever it is
+ * called there; others are written. */
+static void input_is_left(void **unused)
+{
+    (void)unused;
+    struct host_points points;
+    struct host_tetrahedra tets;
+    struct host_error error = {0};
+    struct folder folder = make_folder();
+    struct stat before, after;
+    char node[128], ele[128], name[128];
+    triangulate(&points, &tets);
+    in_folder(&folder, "a.node", node);
+    in_folder(&folder, "a.ele", ele);
+    assert_int_equal(host_points_write(node, &points, &error), 0);
+    assert_int_equal(host_output_commit(&error), 0);
+    assert_int_equal(symlink("a.node", in_folder(&folder, "b.node", name)), 0);
+    assert_int_equal(chmod(node, 0444), 0);
+    assert_int_equal(stat(node, &before), 0);
+    for (int i = 0; i < 2; i++) {
+        in_folder(&folder, i == 0 ? "a.ele" : "b.ele", ele);
+        assert_int_equal(host_write_probe(ele, node, &error), 0);
+        assert_int_equal(host_write(ele, node, &points, &tets, &error), 0);
+        assert_int_equal(host_output_commit(&error), 0);
+    }
+    assert_int_equal(stat(node, &after), 0);
+    assert_int_equal(after.st_ino, before.st_ino);
+    assert_int_equal(after.st_mtim.tv_nsec, before.st_mtim.tv_nsec);
+    assert_true(host_write_leaves(node, name));
+    assert_false(host_write_leaves(NULL, name));
+    in_folder(&folder, "a.ele", ele); /* the points come from elsewhere */
+    assert_int_equal(host_write(ele, ele, &points, &tets, &error), 0);
+    assert_int_equal(host_output_commit(&error), 0);
+    assert_int_equal(stat(node, &after), 0);
+    assert_int_not_equal(after.st_ino, before.st_ino);
+    host_points_free(&points);
+    host_tetrahedra_free(&tets);
+    assert_int_equal(remove_folder(&folder), 8);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -400,6 +583,8 @@ int main(void)
         cmocka_unit_test(faults_have_their_place),
         cmocka_unit_test(other_writers_files),
         cmocka_unit_test(conversion),
+        cmocka_unit_test(fewest_digits),
+        cmocka_unit_test(input_is_left),
     };
     return cmocka_run_group_tests_name("write", tests, NULL, NULL);
 }

@@ -61,6 +61,7 @@ int host_gpio_open(struct host_gpio **gpio, const struct host_cube_pin *pin,
     return 0;
 }
 
+/* clock: lines are held no shorter than is stated. */
 int host_gpio_set(struct host_gpio *gpio, bool active)
 {
     unsigned line = gpio->offset;

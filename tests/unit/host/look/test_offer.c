@@ -2,6 +2,7 @@
  * that looks. */
 #include <errno.h>
 #include <fcntl.h>
+#include <netinet/in.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -23,7 +24,7 @@
 enum {
     NODES = 4,
     SILENT = 2, /* the node that does not answer NODE_LINKS */
-    WAIT_US = 60000000,
+    WAIT_US = 600000000,
     SECOND = 1000000
 };
 
@@ -36,7 +37,8 @@ static struct host_node_set all;
 /* --- who has the cube ------------------------------------------------------
  */
 
-/* Its time passes faster than that of who looks. */
+/* Its time passes faster than that of who looks.  clock: both wait for minutes.
+ */
 static uint64_t holder_us(void *context)
 {
     (void)context;
@@ -85,7 +87,7 @@ static _Noreturn void hold(int begun, int ended)
             answer_for(&onlooking, &machine, i);
         }
         progress.tetrahedra++;
-        usleep(1000);
+        usleep(1000); /* clock: looks again */
     }
     host_offer_end(&offer);
     exit(0);
@@ -268,7 +270,8 @@ static void test_killed(void **unused)
     end_holder();
 }
 
-/* Who stands still is waited for no longer than one has patience. */
+/* Who stands still is waited for no longer than one has patience; clock: a
+ * fifth of a second, in which nobody could answer. */
 static void test_stopped(void **unused)
 {
     struct host_look look;
@@ -309,7 +312,7 @@ static void test_queue(void **unused)
     kill(holder, SIGCONT);
     assert_int_equal(host_look_ask(&look, &all, NODE_TOP, WAIT_US, &error), 0);
     while (!host_holder_find(&who, wire) || who.pid != holder) {
-        (void)usleep(SECOND / 100);
+        (void)usleep(SECOND / 100); /* clock: looks again */
     }
     host_look_close(&look);
     end_holder();
@@ -423,6 +426,96 @@ static void test_next(void **unused)
     end_holder();
 }
 
+/* --- what root believes ----------------------------------------------------
+ */
+
+enum { OTHER_USER = 65534 };
+
+/* A process of another user that has taken the place, and has `file` open. */
+static void begin_other(int file)
+{
+    int begun[2], ended[2];
+    char byte;
+    assert_int_equal(pipe(begun), 0);
+    assert_int_equal(pipe2(ended, O_NONBLOCK), 0);
+    (void)fflush(NULL);
+    holder = fork();
+    if (holder == 0) {
+        close(ended[1]);
+        if (setresuid(OTHER_USER, OTHER_USER, OTHER_USER) != 0) {
+            exit(1);
+        }
+        hold(begun[1], ended[0]);
+    }
+    close(begun[1]);
+    close(ended[0]);
+    assert_int_equal(read(begun[0], &byte, 1), 1);
+    close(begun[0]);
+    end = ended[1];
+    close(file); /* that it has alone, from now on */
+}
+
+/* believed: it says so, and root takes its word. */
+static void check_other(int file, bool believed)
+{
+    struct host_look look;
+    struct host_holder who;
+    begin_other(file);
+    assert_int_equal(host_holder_find(&who, wire), believed);
+    assert_int_equal(host_look_open(&look, wire, &error),
+                     believed ? 0 : HOST_CUBE);
+    if (!believed) {
+        assert_non_null(strstr(error.text, "not have its wire open; "));
+    }
+    host_look_close(&look);
+    memset(&error, 0, sizeof error);
+    end_holder();
+}
+
+/* A socket that listens there, and one that has called it. */
+static void make_calls(int family, struct sockaddr *at, socklen_t size,
+                       int *listener, int *call)
+{
+    *listener = socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(*listener, at, size), 0);
+    assert_int_equal(listen(*listener, 4), 0);
+    assert_int_equal(getsockname(*listener, at, &size), 0);
+    *call = socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(connect(*call, at, size), 0);
+}
+
+static void test_other_users(void **unused)
+{
+    struct sockaddr_in in = {.sin_family = AF_INET,
+                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    struct sockaddr_un un = {.sun_family = AF_UNIX};
+    int listener, call, other;
+    (void)unused;
+    if (geteuid() != 0) {
+        skip();
+    }
+    int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+    assert_int_equal(grantpt(terminal) | unlockpt(terminal), 0);
+    snprintf(wire, sizeof wire, "serial:%s", ptsname(terminal));
+    check_other(open(ptsname(terminal), O_RDWR | O_NOCTTY), true);
+    check_other(open("/dev/null", O_RDWR), false);
+    close(terminal);
+    make_calls(AF_INET, (struct sockaddr *)&in, sizeof in, &listener, &call);
+    snprintf(wire, sizeof wire, "tcp:127.0.0.1:%u", ntohs(in.sin_port));
+    check_other(call, true);
+    check_other(open("/dev/null", O_RDWR), false);
+    close(listener);
+    snprintf(un.sun_path, sizeof un.sun_path, "/tmp/test_offer.%ld",
+             (long)getpid());
+    make_calls(AF_UNIX, (struct sockaddr *)&un, sizeof un, &listener, &call);
+    snprintf(wire, sizeof wire, "unix:%s", un.sun_path);
+    check_other(call, true);
+    other = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    check_other(other, false);
+    close(listener);
+    assert_int_equal(unlink(un.sun_path), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -436,6 +529,7 @@ int main(void)
         cmocka_unit_test_setup(test_nonsense, set_up),
         cmocka_unit_test_setup(test_deaf, set_up),
         cmocka_unit_test_setup(test_next, set_up),
+        cmocka_unit_test_setup(test_other_users, set_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -48,7 +48,7 @@ static void test_defaults(void **unused)
     assert_int_equal(o.nodes, 0);
     assert_int_equal(o.outputs, 0);
     assert_int_equal(o.verifying, HOST_VERIFY_WHERE_DUE);
-    assert_false(o.quiet || o.table || o.map);
+    assert_false(o.quiet || o.table || o.map || o.explain || o.anywhere);
     assert_true(o.progress);
 }
 
@@ -165,7 +165,10 @@ static void test_in_vain(void **unused)
                  {"--host-unplug=99", "--cube=lab.cube", "--link=serial"},
                  {"--node-program=node", "--link=mpi", "--cube=lab.cube"},
                  {"--host-rate-time=4", "--nodes=2", "--host-rate=9"},
-                 {"--seed=4", "--nodes=2", "--host-stall=9"}};
+                 {"--seed=4", "--nodes=2", "--host-stall=9"},
+                 {"--progress", "-q", "--nodes=2"},
+                 {"--explain", "-q", "--nodes=2"},
+                 {"--explain", "--strategy=spatial", "--strategy=auto"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct host_run_options o;
         struct host_error error;

@@ -250,6 +250,27 @@ static void test_doubtful_fault(void **unused)
     }
 }
 
+/* What to do about it is said once, also where the node says it itself. */
+static void test_fault_with_its_cure(void **unused)
+{
+    static const char *const texts[] = {
+        "the list is too small; give the nodes more memory",
+        "no memory for the list"};
+    (void)unused;
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        struct host_error error = {0};
+        begin();
+        assert_int_equal(
+            send(1, NODE_FAULT, texts[i], (uint32_t)strlen(texts[i]), &error),
+            HOST_CUBE);
+        const char *cure = strstr(error.text, "; give the nodes more memory");
+        assert_non_null(cure);
+        assert_string_equal(cure, "; give the nodes more memory");
+        assert_memory_equal(error.text, "node 1: ", 8);
+        end();
+    }
+}
+
 enum { NODE_OWN = 100, NODE_UNSOUND };
 
 static unsigned taken;
@@ -443,6 +464,7 @@ int main(void)
         cmocka_unit_test(test_starts),
         cmocka_unit_test(test_fault),
         cmocka_unit_test(test_doubtful_fault),
+        cmocka_unit_test(test_fault_with_its_cure),
         cmocka_unit_test(test_strategy),
         cmocka_unit_test(test_passed),
         cmocka_unit_test(test_wrong_pages),

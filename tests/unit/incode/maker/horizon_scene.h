@@ -210,8 +210,9 @@ static inline const struct incode_frame *frame_of(struct scene *s,
 static inline void forget_pages(struct scene *s)
 {
     const struct incode_page_source source = {s, request};
+    struct incode_pause none = {0};
     incode_pager_init(&s->pager, s->frames, s->order.tree.pages,
-                      s->order.bricks);
+                      s->order.bricks, &none);
     s->pager.source = source;
     s->pages = 0;
 }

@@ -311,7 +311,8 @@ static void trace(uint32_t frames, uint32_t pages, bool shuffled)
     assert_non_null(memory);
     memset(memory, 0xa5, bytes + 64);
     struct incode_pager pager;
-    incode_pager_init(&pager, memory, frames, BRICKS);
+    struct incode_pause none = {0};
+    incode_pager_init(&pager, memory, frames, BRICKS, &none);
     struct model m = {.frames = frames,
                       .loading_max = pager.loading_max,
                       .shuffled = shuffled};
@@ -374,7 +375,8 @@ static void large_numbers(void **unused)
     assert_non_null(memory);
     struct incode_pager pager;
     struct model m = {.credit = true};
-    incode_pager_init(&pager, memory, FRAMES, 0);
+    struct incode_pause none = {0};
+    incode_pager_init(&pager, memory, FRAMES, 0, &none);
     pager.source.request = request;
     pager.source.context = &m;
     for (uint32_t k = 0; k < 1000; k++) {

@@ -62,7 +62,8 @@ static inline void points_forget(struct points_scene *s, uint32_t frames,
     uint32_t all = s->set.order.tree.pages;
     const struct incode_page_source source = {s, points_request};
     incode_pager_init(&s->maker.pager, s->set.frames,
-                      frames < all ? frames : all, s->set.order.bricks);
+                      frames < all ? frames : all, s->set.order.bricks,
+                      &s->maker.counts.tally.pause);
     s->maker.pager.source = source;
     s->pages = 0;
     s->limit = limit;

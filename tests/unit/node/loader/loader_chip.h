@@ -239,7 +239,7 @@ static const uint8_t quick_key[SIGN_PUBLIC_BYTES] = {1, 2, 3};
 
 static const struct loader_rules chip_rules = {
     &chip.flash, &quick,         quick_key, "mps2-an385",
-    0x10000,     CHIP_IMAGE_MAX, NULL};
+    0x10000,     CHIP_IMAGE_MAX, NULL,      NULL};
 
 /* --- images ----------------------------------------------------------------
  */

@@ -68,6 +68,37 @@ static void others_that_can_write_it_are_refused(void **unused)
     }
 }
 
+/* Root's is as good as one's own, another user's is not, whatever its rights.
+ */
+static void another_users_is_refused(void **unused)
+{
+    static const uint8_t none[SECURE_KEY_BYTES];
+    uint8_t key[SECURE_KEY_BYTES] = {7};
+    (void)unused;
+    if (geteuid() != 0) {
+        print_message("only root can give a file away\n");
+        skip();
+    }
+    make_file(digits, 0600);
+    assert_int_equal(chmod(folder, 0755), 0);
+    assert_int_equal(chown(path, 65534, 65534), 0);
+    assert_int_equal(key_file_read(path, key), KEY_FILE_FOREIGN);
+    assert_memory_equal(key, none, sizeof none);
+    assert_non_null(
+        strstr(key_file_text(KEY_FILE_FOREIGN).what, "another user"));
+    assert_int_equal(seteuid(65534), 0);
+    enum key_file_state own = key_file_read(path, key);
+    assert_int_equal(seteuid(0), 0);
+    assert_int_equal(own, KEY_FILE_GOOD);
+    assert_int_equal(chown(path, 0, 0), 0);
+    assert_int_equal(chmod(path, 0644), 0);
+    assert_int_equal(seteuid(65534), 0);
+    enum key_file_state roots = key_file_read(path, key);
+    assert_int_equal(seteuid(0), 0);
+    assert_int_equal(roots, KEY_FILE_SEEN);
+    assert_int_equal(unlink(path), 0);
+}
+
 static void what_is_no_key_is_told(void **unused)
 {
     static const uint8_t none[SECURE_KEY_BYTES];
@@ -132,6 +163,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_key_leaves_no_core_and_no_copy),
         cmocka_unit_test(others_that_can_write_it_are_refused),
+        cmocka_unit_test(another_users_is_refused),
         cmocka_unit_test(what_is_no_key_is_told),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

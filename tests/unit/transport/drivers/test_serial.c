@@ -23,10 +23,11 @@
 #include "tests/unit/emulated.h"
 #include "transport/drivers/serial_port.h"
 
+/* clock: minutes, for what has been sent already. */
 static void wait_for(int fd)
 {
     struct pollfd wait = {fd, POLLIN, 0};
-    assert_int_equal(poll(&wait, 1, 2000), 1);
+    assert_int_equal(poll(&wait, 1, 120000), 1);
 }
 
 /* A pseudo-terminal; where this machine has none, the test is skipped. */
@@ -146,10 +147,10 @@ static void a_port_in_use_says_by_whom(void **unused)
     assert_int_equal(waitpid(child, NULL, 0), child);
     /* It is looked for again while the pipe is used. */
     struct link_pipe pipe = serial_link_pipe(&port.pipe);
-    for (unsigned i = 0; i < 100 && port.pipe.fd < 0; i++) {
+    for (unsigned i = 0; i < 6000 && port.pipe.fd < 0; i++) {
         uint8_t bytes[8];
         (void)pipe.receive(pipe.context, bytes, sizeof bytes);
-        usleep(20000);
+        usleep(20000); /* clock: two minutes at most */
     }
     assert_true(port.pipe.fd >= 0);
     assert_int_equal(port.returned, 1);
@@ -229,9 +230,9 @@ static void a_link_is_followed_each_time(void **unused)
     assert_int_equal(ttyname_r(second[1], path, sizeof path), 0);
     close(second[1]);
     assert_int_equal(symlink(path, settings.name), 0);
-    for (unsigned i = 0; i < 100 && port.returned == 0; i++) {
+    for (unsigned i = 0; i < 6000 && port.returned == 0; i++) {
         (void)pipe.receive(pipe.context, &byte, 1);
-        usleep(20000);
+        usleep(20000); /* clock: two minutes at most */
     }
     assert_int_equal(port.returned, 1);
     assert_int_equal(write(second[0], &byte, 1), 1);

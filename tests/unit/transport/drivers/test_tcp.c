@@ -13,18 +13,18 @@
 #include <poll.h>
 #include <stdlib.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <cmocka.h>
 
+#include "held_clock.h"
 #include "transport/drivers/tcp.h"
 
-static uint64_t clock_us(void)
+/* clock: within minutes. */
+static bool has_input(int fd)
 {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
+    struct pollfd wait = {fd, POLLIN, 0};
+    return poll(&wait, 1, WAIT_MS) == 1;
 }
 
 static void a_pair_is_connected_and_set_up(void **unused)
@@ -46,8 +46,7 @@ static void a_pair_is_connected_and_set_up(void **unused)
         assert_int_equal(bytes[1], 2 * TCP_BUFFER_BYTES);
     }
     assert_int_equal(write(fds[0], "x", 1), 1);
-    struct pollfd wait = {fds[1], POLLIN, 0};
-    assert_int_equal(poll(&wait, 1, 1000), 1);
+    assert_true(has_input(fds[1]));
     assert_int_equal(read(fds[1], &byte, 1), 1);
     assert_int_equal(byte, 'x');
     close(fds[0]);
@@ -76,8 +75,7 @@ static void a_pipe_tells_room_and_end(void **unused)
     assert_int_equal(tcp_events(&a), POLLIN | POLLOUT);
     size_t received = 0;
     while (received < sent) {
-        struct pollfd wait = {fds[1], POLLIN, 0};
-        assert_int_equal(poll(&wait, 1, 1000), 1);
+        assert_true(has_input(fds[1]));
         int got = to.receive(to.context, bytes, sizeof bytes);
         assert_true(got > 0);
         received += (size_t)got;
@@ -85,8 +83,7 @@ static void a_pipe_tells_room_and_end(void **unused)
     assert_int_equal(from.send(from.context, bytes, 1), 1);
     assert_int_equal(tcp_events(&a), POLLIN);
     close(fds[1]);
-    struct pollfd wait = {fds[0], POLLIN, 0};
-    assert_int_equal(poll(&wait, 1, 1000), 1);
+    assert_true(has_input(fds[0]));
     assert_int_equal(from.receive(from.context, bytes, 10), LINK_PIPE_CLOSED);
     assert_int_equal(from.send(from.context, bytes, 10), LINK_PIPE_CLOSED);
     assert_int_equal(tcp_events(&a), 0);
@@ -128,7 +125,7 @@ static void a_link_over_tcp(void **unused)
         open_end(&ends[0], fds[0], 0, window);
         open_end(&ends[1], fds[1], 1, window);
         while (read[0] < MESSAGES || read[1] < MESSAGES) {
-            assert_true(clock_us() - begin < 20000000);
+            assert_true(clock_us() - begin < WAIT_US);
             for (unsigned who = 0; who < 2; who++) {
                 struct link *link = ends[who].link;
                 struct link_message message;
@@ -174,14 +171,13 @@ static void what_was_heard_spares_one_call(void **unused)
     assert_int_equal(poll(&wait, 1, 0), 0);
     tcp_heard(&pipe, wait.revents);
     assert_int_equal(write(fds[0], "x", 1), 1);
-    assert_int_equal(poll(&wait, 1, 1000), 1);
+    assert_true(has_input(fds[1]));
     assert_int_equal(to.receive(to.context, &byte, 1), 0);
     assert_int_equal(to.receive(to.context, &byte, 1), 1);
     assert_int_equal(byte, 'x');
     close(fds[0]);
-    wait.revents = 0;
-    assert_int_equal(poll(&wait, 1, 1000), 1);
-    tcp_heard(&pipe, wait.revents);
+    assert_true(has_input(fds[1]));
+    tcp_heard(&pipe, POLLIN);
     assert_int_equal(to.receive(to.context, &byte, 1), LINK_PIPE_CLOSED);
     tcp_heard(&pipe, 0);
     assert_int_equal(to.receive(to.context, &byte, 1), LINK_PIPE_CLOSED);

@@ -56,7 +56,7 @@ static void wires_that_break_go_on(void **unused)
             open_end(&ends[0], 0, &at, keyed ? key : NULL);
             for (unsigned i = 0; i < 20; i++) {
                 step(&ends[0]);
-                usleep(1000);
+                rest(1000);
             }
             assert_true(ends[0].wire.tcp.fd < 0);
             open_end(&ends[1], 1, &at, keyed ? key : NULL);
@@ -88,7 +88,7 @@ static void another_key_that_is_gone_is_forgotten(void **unused)
         for (uint64_t begin = clock_us(); !left->other_key;) {
             step(&ends[0]);
             step(&ends[1]);
-            assert_true(clock_us() - begin < 5000000);
+            assert_true(clock_us() - begin < WAIT_US);
         }
         close_end(&ends[gone]);
         assert_true(left->other_key);
@@ -112,7 +112,7 @@ static void another_key_never_connects(void **unused)
         /* Until both have seen it, where there is a key, and a while. */
         bool seen = false;
         for (uint64_t begin = clock_us(), now = begin;
-             now - begin < (seen ? 300000 : 5000000); now = clock_us()) {
+             now - begin < (seen ? 300000 : WAIT_US); now = clock_us()) {
             step(&ends[0]);
             step(&ends[1]);
             seen = keyed == 0 ||
@@ -143,7 +143,7 @@ static void a_lone_key_is_told_of(void **unused)
                                           ends[0].wire.pause_us <= 80000;) {
             step(&ends[0]);
             step(&ends[1]);
-            assert_true(clock_us() - begin < 10000000);
+            assert_true(clock_us() - begin < WAIT_US);
         }
         for (unsigned who = 0; who < 2; who++) {
             struct tcp_wire_doubt doubt = tcp_wire_doubt(&ends[who].wire);
@@ -187,7 +187,7 @@ static void one_who_is_led_elsewhere_ends_nothing(void **unused)
                 step(&ends[0]);
             }
             step(&ends[1]);
-            assert_true(clock_us() - begin < 10000000);
+            assert_true(clock_us() - begin < WAIT_US);
         }
         if (round == 0) {
             open_end(&ends[0], 0, &at, key);
@@ -218,7 +218,7 @@ static void with_strangers(const uint8_t *with)
     for (unsigned i = 0; i < STRANGERS; i++) {
         fds[i] = -1;
     }
-    uint64_t looks = 0, held_us = 0;
+    uint64_t looks = 0;
     for (unsigned round = 0; round < 20; round++) {
         uint64_t begin = clock_us(), strangers = ends[1].wire.strangers;
         for (unsigned i = 0; i < STRANGERS; i++) {
@@ -226,11 +226,8 @@ static void with_strangers(const uint8_t *with)
                 close(fds[i]);
             }
             fds[i] = stranger(&at);
-            uint64_t before = clock_us();
             step(&ends[0]);
             step(&ends[1]);
-            uint64_t us = clock_us() - before;
-            held_us = us > held_us ? us : held_us;
             if (i % 3 != 0) {
                 size_t size = i % 3 == 1 ? sizeof noise : 32;
                 (void)!write(fds[i], noise, size);
@@ -238,7 +235,7 @@ static void with_strangers(const uint8_t *with)
         }
         while (ends[1].wire.strangers - strangers < 5) {
             assert_true(exchange(ends, 20));
-            assert_true(clock_us() - begin < 10000000);
+            assert_true(clock_us() - begin < WAIT_US);
         }
         looks = (clock_us() - begin) / TCP_LOOK_US + 2;
         assert_true(ends[1].wire.strangers - strangers <=
@@ -262,12 +259,6 @@ static void with_strangers(const uint8_t *with)
     uint64_t connections = ends[1].wire.connections;
     close_end(&ends[0]);
     close_end(&ends[1]);
-    /* Without a key, somebody silent is taken while the peer is kept away. */
-    if (connections > 10 && held_us > TCP_QUIET_US / 4) {
-        print_message("a step took %u ms: too slow to tell who is silent\n",
-                      (unsigned)(held_us / 1000));
-        skip();
-    }
     assert_true(connections <= 10);
 }
 
@@ -364,13 +355,13 @@ static void a_flood_keeps_nobody_out(void **unused)
         open_end(&ends[1], 1, &at, key);
         flood_on(&f, &at, TCP_QUEUE_MAX / 2);
         for (; looks < 40; looks++) {
-            usleep(TCP_CROWD_US);
+            rest(TCP_CROWD_US);
             flood_on(&f, &at, TCP_ACCEPTS_MAX);
             step(&ends[1]);
         }
         open_end(&ends[0], 0, &at, key);
         for (looks = 0; ends[1].wire.connections == 0; looks++) {
-            usleep(TCP_CROWD_US);
+            rest(TCP_CROWD_US);
             flood_on(&f, &at, 3);
             step(&ends[1]);
             if (looks % 3 == 0) {
@@ -402,7 +393,7 @@ static void a_silent_caller_is_taken_for_want_of_a_better(void **unused)
     uint64_t begin = clock_us();
     while (recv(silent, &byte, 1, MSG_DONTWAIT) != 1) {
         step(&ends[1]);
-        assert_true(clock_us() - begin < 5000000);
+        assert_true(clock_us() - begin < WAIT_US);
     }
     assert_int_equal(ends[1].wire.connections, 1);
     open_end(&ends[0], 0, &at, NULL);
@@ -432,7 +423,7 @@ static void a_lost_proof_is_asked_for_again(void **unused)
         int fd = accept(listener, NULL, NULL);
         calls += fd >= 0; /* left open */
         step(&end);
-        usleep(1000);
+        rest(1000);
         assert_true(clock_us() - begin < TCP_PROVE_US);
     }
     assert_true(clock_us() - begin > 2 * TCP_PROVE_MIN_US);

@@ -37,7 +37,7 @@ static void a_path_is_a_wire(void **unused)
     open_end(&ends[0], 0, &at, NULL); /* the caller is there first */
     for (unsigned i = 0; i < 20; i++) {
         step(&ends[0]);
-        usleep(1000);
+        rest(1000);
     }
     open_end(&ends[1], 1, &at, NULL);
     assert_int_equal(lstat(tcp_address_path(&at), &about), 0);
@@ -115,7 +115,7 @@ static void another_user_is_sent_away(void **unused)
     open_end(&ends[0], 0, &c.address, NULL);
     for (unsigned i = 0; i < 1000 && !ends[0].wire.other_user; i++) {
         step(&ends[0]);
-        usleep(100);
+        rest(100);
     }
     assert_true(ends[0].wire.other_user);
     assert_int_equal(ends[0].wire.connections, 0);

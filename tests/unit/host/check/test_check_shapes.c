@@ -1,0 +1,186 @@
+/* Results that are whole and wrong: a tiling that is not Delaunay, one without
+ * a point, a surface wound twice, two bodies in one place. */
+#include <math.h>
+
+#include "tests/unit/host/check/check_world.h"
+
+/* The triangulation of all points but one is a perfect one, and wrong. */
+static void leave_out(struct fixture *f, const uint32_t vertex[120],
+                      uint32_t row)
+{
+    struct host_tetrahedra tets = {0};
+    struct host_check_report r;
+    uint32_t next = (row + 1) % 120, map[120];
+    double xyz[360];
+    memcpy(xyz, f->points.xyz, sizeof xyz);
+    memcpy(xyz + 3 * row, f->points.xyz + 3 * next, 3 * sizeof *xyz);
+    reference_delaunay(xyz, 120, &tets);
+    memcpy(map, vertex, sizeof map);
+    map[row < next ? row : next] = vertex[next]; /* stands for both */
+    host_tetrahedra_map(&tets, map);
+    host_tetrahedra_cut(&f->tets, 0);
+    for (uint64_t i = 0; i < tets.count; i++) {
+        append(&f->tets, tets.v[i]);
+    }
+    for (int depth = 0; depth < 2; depth++) {
+        assert_int_equal(check(f, (enum host_check_depth)depth, &r),
+                         HOST_UNVERIFIED);
+        assert_non_null(strstr(r.text, "is a vertex of no tetrahedron"));
+        assert_true(f->named[vertex[row]]);
+    }
+    host_tetrahedra_free(&tets);
+}
+
+static void a_left_out_point_is_found(void **unused)
+{
+    (void)unused;
+    struct fixture f;
+    uint32_t vertex[120] = {0};
+    open_set(&f, "uniform", 120, 5);
+    for (uint32_t v = 0; v < f.sites.count; v++) {
+        if (f.order.row[v] != INCODE_NONE) {
+            vertex[f.order.row[v]] = v;
+        }
+    }
+    for (uint32_t row = 0; row < 120; row++) {
+        leave_out(&f, vertex, row);
+    }
+    close_set(&f);
+}
+
+/* --- Tilings that are wrong ------------------------------------------- */
+
+/* Two tetrahedra on a facet to three about the edge of their apexes: false
+ * where their union is not convex. */
+static bool flip(struct fixture *f, uint64_t i, uint64_t j)
+{
+    uint32_t(*v)[4] = f->tets.v;
+    for (uint32_t c = 0; c < 4; c++) {
+        uint32_t p[3], apex = INCODE_NONE, made[3][4];
+        int shared = 0;
+        host_facet_outward(v[i], c, p);
+        for (int k = 0; k < 4; k++) {
+            bool on = v[j][k] == p[0] || v[j][k] == p[1] || v[j][k] == p[2];
+            shared += on;
+            apex = on ? apex : v[j][k];
+        }
+        bool all = shared == 3;
+        for (int k = 0; k < 3 && all; k++) {
+            const uint32_t t[4] = {p[k], p[(k + 1) % 3], v[i][c], apex};
+            memcpy(made[k], t, sizeof t);
+            all = orientation(f, t) > 0;
+        }
+        if (all) {
+            memcpy(v[i], made[0], sizeof made[0]);
+            memcpy(v[j], made[1], sizeof made[1]);
+            append(&f->tets, made[2]);
+            return true;
+        }
+    }
+    return false;
+}
+
+/* A flip leaves a tiling, which the one depth passes and the other does not;
+ * both tetrahedra that are gone had the vertices that are named. */
+static void flips(struct fixture *f)
+{
+    for (uint64_t i = 0; i < f->tets.count && i < 60; i++) {
+        for (uint64_t j = i + 1; j < f->tets.count; j++) {
+            struct host_check_report r;
+            uint32_t gone[4];
+            memcpy(gone, f->tets.v[i], sizeof gone);
+            if (!flip(f, i, j)) {
+                continue;
+            }
+            assert_int_equal(check(f, HOST_CHECK_TILING, &r), 0);
+            assert_int_equal(check(f, HOST_CHECK_DELAUNAY, &r),
+                             HOST_UNVERIFIED);
+            assert_non_null(strstr(r.text, "are not Delaunay"));
+            for (int k = 0; k < 4; k++) {
+                assert_true(f->named[gone[k]]);
+            }
+            restore(f);
+            break;
+        }
+    }
+}
+
+static void only_spheres_tell_a_flip(void **unused)
+{
+    (void)unused;
+    for_each_set(flips);
+}
+
+/* --- Surfaces --------------------------------------------------------- */
+
+/* Five tetrahedra about an axis, from each corner of a pentagon to the next but
+ * one: positive, closed, of Euler characteristic 2 and convex at every edge,
+ * but wound twice. */
+static void a_surface_wound_twice_is_found(void **unused)
+{
+    (void)unused;
+    static const double pi = 3.14159265358979323846;
+    double xyz[21] = {0, 0, -1, 0, 0, 1};
+    struct host_check_report r;
+    struct fixture f;
+    for (int i = 0; i < 5; i++) {
+        xyz[6 + 3 * i] = cos(2 * pi * i / 5);
+        xyz[7 + 3 * i] = sin(2 * pi * i / 5);
+    }
+    open_points(&f, xyz, 7);
+    host_tetrahedra_cut(&f.tets, 0);
+    for (uint32_t i = 0; i < 5; i++) {
+        uint32_t t[4] = {vertex_of(&f, 0), vertex_of(&f, 1),
+                         vertex_of(&f, 2 + i), vertex_of(&f, 2 + (i + 2) % 5)};
+        if (orientation(&f, t) < 0) {
+            uint32_t first = t[0];
+            t[0] = t[1];
+            t[1] = first;
+        }
+        append(&f.tets, t);
+    }
+    assert_int_equal(check(&f, HOST_CHECK_TILING, &r), HOST_UNVERIFIED);
+    assert_non_null(strstr(r.text, "is a hull facet covered by another"));
+    close_set(&f);
+}
+
+/* Odd and even points by themselves: every facet fits, and yet. */
+static void two_bodies_are_found(void **unused)
+{
+    (void)unused;
+    struct fixture f, part[2];
+    double xyz[2][90], all[180];
+    struct host_check_report r;
+    for (int k = 0; k < 2; k++) {
+        open_set(&part[k], "uniform", 30, 12 + (uint64_t)k);
+        memcpy(xyz[k], part[k].points.xyz, sizeof xyz[k]);
+        memcpy(all + 90 * k, xyz[k], sizeof xyz[k]);
+    }
+    open_points(&f, all, 60);
+    host_tetrahedra_cut(&f.tets, 0);
+    for (uint32_t k = 0; k < 2; k++) {
+        for (uint64_t i = 0; i < part[k].right.count; i++) {
+            uint32_t t[4];
+            for (int d = 0; d < 4; d++) {
+                uint32_t row = part[k].order.row[part[k].right.v[i][d]];
+                t[d] = vertex_of(&f, row + 30 * k);
+            }
+            append(&f.tets, t);
+        }
+        close_set(&part[k]);
+    }
+    assert_int_equal(check(&f, HOST_CHECK_TILING, &r), HOST_UNVERIFIED);
+    assert_non_null(strstr(r.text, "its Euler characteristic is not 2"));
+    close_set(&f);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_left_out_point_is_found),
+        cmocka_unit_test(only_spheres_tell_a_flip),
+        cmocka_unit_test(a_surface_wound_twice_is_found),
+        cmocka_unit_test(two_bodies_are_found),
+    };
+    return cmocka_run_group_tests_name("check_shapes", tests, NULL, NULL);
+}
