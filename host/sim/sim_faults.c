@@ -123,7 +123,8 @@ static void draw_bare(struct host_sim_plan *p)
     }
 }
 
-/* What is left of the cube can do the work without it. */
+/* What is left of the cube can do the work without it.  It lies about what it
+ * has to say: where one node computes, others have pages alone. */
 static void draw_liar(struct host_sim_plan *p)
 {
     uint64_t state = sim_seed(p->seed, 91);
@@ -133,10 +134,18 @@ static void draw_liar(struct host_sim_plan *p)
         host_sim_draw(&state, 1, 6) > 1) {
         return;
     }
+    unsigned node = (unsigned)host_sim_draw(&state, 0, p->nodes - 1);
+    enum host_lie way = (enum host_lie)host_sim_draw(&state, 0, HOST_LIES - 1);
+    if (way == HOST_LIE_LOAN && !p->strategy->meshes) {
+        way = HOST_LIE_DROP;
+    }
+    if (p->strategy->nodes_default == 1) {
+        node = way == HOST_LIE_PAGE ? node | 1 : 0;
+    }
     p->wanted[HOST_SIM_LIAR] = true;
-    p->liar.node = (unsigned)host_sim_draw(&state, 0, p->nodes - 1);
-    p->liar.way = (enum host_lie)host_sim_draw(&state, 0, HOST_LIES - 1);
-    p->liar.one_in = (uint32_t)host_sim_draw_log(&state, 1, 1000);
+    p->liar.node = node;
+    p->liar.way = way;
+    p->liar.one_in = (uint32_t)host_sim_draw_log(&state, 1, 100);
 }
 
 /* --- what they do --------------------------------------------------------- */

@@ -7,7 +7,8 @@
 . tests/system/lib.sh
 wide=${LIARS:-}
 lying=$scratch/incode-node
-memory_max_kb=300000 # of a host that is flooded
+host_peak_max=100000000 # bytes of a host that is flooded,
+memory_max_kb=1000000   # and of its address space, threads and all
 
 cp "$BUILD/tests/incode-node-liar" "$lying" || exit 1
 
@@ -25,9 +26,11 @@ run_with() {
     echo "$1" > "$lying.lie"
     shift
     rm -f "$lying.told" "$scratch/stats.json" "$scratch/out.npy"
-    incode run "$points" -q --node-program "$lying" --patience 20 \
-        --stats "$scratch/stats.json" -o "$scratch/out.npy" "$@" \
-        2> "$scratch/errors"
+    (
+        ulimit -v "${limit:-unlimited}"
+        incode run "$points" -q --node-program "$lying" --patience 20 \
+            --stats "$scratch/stats.json" -o "$scratch/out.npy" "$@"
+    ) 2> "$scratch/errors"
     status=$?
     lies=$(awk '{ n += $2 } END { print n + 0 }' "$lying.told" 2> /dev/null)
     lies=${lies:-0} said=$(last "$scratch/errors")
@@ -86,8 +89,8 @@ cases="
 1 $found        : linda --linda spatial --nodes 4
 0 $found loan   : hybrid --nodes 4 --cluster 2
 5 $found        : hybrid --nodes 8 --cluster 4
-1 $found page loan : exchange --nodes 4
-6 $found page loan : exchange --nodes 8"
+1 $found page loan : exchange --nodes 4 --memory 512K
+6 $found loan : exchange --nodes 8"
 
 all() { # ONE-IN
     local node ways options way
@@ -100,18 +103,38 @@ all() { # ONE-IN
     done < <(echo "$cases" | grep .)
 }
 
-incode gen uniform 2000 --seed 3 -o "$scratch/uniform.npy" 2> /dev/null
-points uniform "$scratch/uniform.npy"
-all 40
-
-# floods WAY OPTION...: the host's memory has a bound, and the node is named.
+# floods WAY OPTION...: the host's memory has a bound, and node 1 is named.
 floods() {
-    local way=$1 peak why
+    local way=$1 peak=0 why limit=$memory_max_kb
     shift
     run_with "1 $way 20 1" --strategy "$@"
     why=$(wrong 1 | head -n 1)
     check "liars/$way, $*" "$why ($lies lies)" [ -z "$why" ]
-    check "liars/$way, $*: it was one" "$lies lies" [ "$lies" -gt 0 ]
+    check "liars/$way, $*: it came" "$lies lies" [ "$lies" -gt 1000 ]
     check "liars/$way, $*: node 1 is named" "$said" \
         grep -qE 'node 1([^0-9]|$)' "$scratch/errors"
+    [ $status = 0 ] && peak=$(stat_of "$scratch/stats.json" host_peak_bytes)
+    check "liars/$way, $*: the host stays small" "$peak bytes" \
+        [ "$peak" -lt $host_peak_max ]
 }
+
+incode gen uniform 2000 --seed 3 -o "$scratch/uniform.npy" 2> /dev/null
+points uniform "$scratch/uniform.npy"
+all 40
+for way in flood spill-flood; do
+    floods $way spatial --nodes 4 --build faces
+    floods $way linda --linda spatial --nodes 4 --build points
+    floods $way exchange --nodes 4
+done
+[ -n "$wide" ] || exit 0
+
+all 3
+all 300
+need_data liars
+while read -r name file count _ tetrahedra _; do
+    if [ "$tetrahedra" != 0 ] && [ "$count" -ge 1000 ] &&
+        [ "$count" -le 5000 ] && [ -r "$INCODE_DATA/$file" ]; then
+        points "$name" "$INCODE_DATA/$file"
+        all 40
+    fi
+done < <(list_sets)
