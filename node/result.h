@@ -10,7 +10,7 @@
  *
  * A finder is the node that has found the tetrahedra from there on, up to the
  * next finder or the end of the batch; at the start it is the sender.  Its
- * number stands in bits 2-7 of the head; 63 there: in the two bytes that follow.
+ * number stands in bits 2-7 of the head; 63 there: in two bytes behind it.
  *
  * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
  * read whatever its bytes are, without reading past its end.

@@ -243,15 +243,14 @@ static int take_ready(struct host_service *s,
 /* A page that `sender` gave to the reporter is not as it was made here.  The
  * sender does no more work; where that is the host itself, the page was altered
  * on its way to the reporter, or by it: then the reporter does none. */
-static int host_excluded_page(struct host_service *s, unsigned reporter,
-                              unsigned sender, uint32_t page,
-                              struct host_error *error)
+static void host_excluded_page(struct host_service *s, unsigned reporter,
+                               unsigned sender, uint32_t page)
 {
     char why[120];
     bool by_node = sender != CUBE_HOST;
     unsigned node = by_node ? sender : reporter;
     if (s->work.lost[node] || s->node[node].left) {
-        return 0;
+        return;
     }
     if (page == INCODE_NONE) {
         snprintf(why, sizeof why, "sent node %u a page cut short", reporter);
@@ -263,7 +262,7 @@ static int host_excluded_page(struct host_service *s, unsigned reporter,
                  "got page %u altered from the host, by itself or on the way",
                  page);
     }
-    return host_results_refuse(s, node, why, error);
+    host_idle_exclude(s, node, why);
 }
 
 static int take_wrong_page(struct host_service *s,
@@ -280,8 +279,8 @@ static int take_wrong_page(struct host_service *s,
         (wrong.sender != CUBE_HOST && wrong.sender >= s->machine->nodes)) {
         return unsound(message, error, "a wrong page of node %u", wrong.sender);
     }
-    return host_excluded_page(s, message->source, wrong.sender, wrong.page,
-                              error);
+    host_excluded_page(s, message->source, wrong.sender, wrong.page);
+    return 0;
 }
 
 /* What the strategy's roles have to say.  An error that it has set stays. */

@@ -94,6 +94,19 @@ bool host_idle_leave(struct host_service *service, unsigned node,
     return true;
 }
 
+void host_idle_exclude(struct host_service *service, unsigned node,
+                       const char *why)
+{
+    struct host_service *s = service;
+    if (!host_idle_leave(s, node, why)) {
+        s->node[node].aside = true;
+        s->loss = true;
+        host_notice(s, node,
+                    "%s, for the second time; %s, look after that node", why,
+                    work_of_one_left(s));
+    }
+}
+
 void host_idle_check(struct host_service *service, uint64_t elapsed_us)
 {
     struct host_service *s = service;
@@ -112,12 +125,6 @@ void host_idle_check(struct host_service *service, uint64_t elapsed_us)
         }
         snprintf(why, sizeof why, "answers, but has done nothing for %llu s",
                  (unsigned long long)s->patience_us / 1000000);
-        if (!host_idle_leave(s, who, why)) {
-            s->node[who].aside = true;
-            s->loss = true;
-            host_notice(s, who,
-                        "%s, for the second time; %s, look after that node",
-                        why, work_of_one_left(s));
-        }
+        host_idle_exclude(s, who, why);
     }
 }

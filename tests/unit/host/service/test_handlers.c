@@ -350,7 +350,8 @@ static void test_passed(void **unused)
 }
 
 /* Who has sent a wrong page does no more work; where that is the host, the one
- * that got it.  Who does none any more is not named again. */
+ * that got it.  Who does none any more is not named again, and who had its new
+ * start has none. */
 static void test_wrong_pages(void **unused)
 {
     (void)unused;
@@ -359,29 +360,32 @@ static void test_wrong_pages(void **unused)
         unsigned left;
         const char *text;
     } reports[] = {
-        {{7, 1}, 1, "node 1 link 0: sent node 3 a wrong page 7; "},
-        {{INCODE_NONE, 1}, 1, "node 1 link 0: sent node 3 a page cut short; "},
+        {{7, 1}, 1, "node 1 link 0: sent node 3 a wrong page 7"},
+        {{INCODE_NONE, 1}, 1, "node 1 link 0: sent node 3 a page cut short"},
         {{7, CUBE_HOST},
          3,
          "node 3 link 1: got page 7 altered from the host, by itself or on the "
-         "way; "}};
-    for (size_t i = 0; i < sizeof reports / sizeof reports[0]; i++) {
+         "way"}};
+    const size_t count = sizeof reports / sizeof reports[0];
+    for (size_t k = 0; k < 2 * count; k++) {
+        const size_t i = k / 2;
         struct host_error error = {0};
         begin();
         service.work.living = NODES;
-        for (unsigned k = 0; k < 2; k++) {
+        service.node[reports[i].left].started_anew = k % 2 == 1;
+        for (unsigned time = 0; time < 2; time++) {
             said[0] = '\0';
             assert_int_equal(send(3, NODE_WRONG_PAGE, &reports[i].wrong,
                                   sizeof reports[i].wrong, &error),
                              0);
-            if (k == 0 &&
+            if (time == 0 &&
                 strncmp(said, reports[i].text, strlen(reports[i].text)) != 0) {
                 fail_msg("%s: not %s", said, reports[i].text);
             }
-            assert_int_equal(said[0] == '\0', k);
+            assert_int_equal(said[0] == '\0', time);
         }
-        for (unsigned k = 0; k < NODES; k++) {
-            assert_int_equal(service.node[k].aside, k == reports[i].left);
+        for (unsigned n = 0; n < NODES; n++) {
+            assert_int_equal(service.node[n].aside, n == reports[i].left);
         }
         assert_true(service.loss);
         end();
