@@ -376,8 +376,10 @@ static int begin_unpacking(struct host_source *source, int file,
     }
     source->feed = feed;
     const uint8_t *at = feed->window, *end = at;
-    if (take_packed(feed, source->path)) {
-        (void)move_window(source, &at, &end, WINDOW);
+    /* Full, for headers are taken from it, unless the file is shorter. */
+    for (bool more = take_packed(feed, source->path); more;) {
+        more = (size_t)(end - at) < WINDOW &&
+               move_window(source, &at, &end, WINDOW);
     }
     source->data = at;
     source->bytes = (size_t)(end - at);

@@ -120,11 +120,14 @@ within() { timeout -k 5 "$hang" "$@"; }
 incode() { within "$INCODE" "$@"; }
 
 # await COMMAND...: waits until it succeeds.  clock: false after ten minutes, when
-# no machine is too slow for it.
+# no machine is too slow for it; or where all awaits of the script have tried
+# AWAIT_TRIES times together (tests/planted).
 await() {
-    local end=$((SECONDS + 600)) tries=${AWAIT_TRIES:-1000000}
+    local end=$((SECONDS + 600))
     until "$@"; do
-        [ $((tries--)) -gt 0 ] && [ $SECONDS -lt $end ] || return 1
+        [ $SECONDS -lt $end ] && [ "${AWAIT_TRIES:=1000000000}" -gt 0 ] ||
+            return 1
+        AWAIT_TRIES=$((AWAIT_TRIES - 1))
         sleep 0.01
     done
 }

@@ -11,6 +11,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -155,7 +157,9 @@ static void pieces_are_as_the_whole(void **unused)
     file = gzopen("rows.npy.gz", "wb1");
     char head[128];
     memset(head, ' ', sizeof head);
-    memcpy(head, "\x93NUMPY\x01\x00\x76\x00", 10);
+    static const uint8_t magic[] = {0x93, 'N', 'U', 'M', 'P',
+                                    'Y',  1,   0,   118, 0};
+    memcpy(head, magic, sizeof magic);
     int n = snprintf(head + 10, sizeof head - 10,
                      "{'descr': '<f8', 'fortran_order': False, 'shape': "
                      "(%d, 3), }",
@@ -183,6 +187,37 @@ static void pieces_are_as_the_whole(void **unused)
     assert_non_null(
         strstr(error.text, "7200008 bytes of numbers where 300000"));
     assert_int_equal(unlink("rows.npy.gz"), 0);
+}
+
+/* A header is whole, however little of a pipe comes at a time. */
+static void a_pipe_that_brings_little(void **unused)
+{
+    (void)unused;
+    struct host_points points;
+    struct host_error error = {0};
+    gzFile file = gzopen("packed", "wb1");
+    assert_non_null(file);
+    assert_true(gzputs(file, "ply\nformat binary_little_endian 1.0\nelement "
+                             "vertex 1\nproperty uchar x\nproperty uchar y\n"
+                             "property uchar z\nend_header\nabc") > 0);
+    assert_int_equal(gzclose(file), Z_OK);
+    assert_int_equal(mkfifo("pipe.ply.gz", 0600), 0);
+    pid_t child = fork();
+    if (child == 0) {
+        char byte;
+        int from = open("packed", O_RDONLY), to = open("pipe.ply.gz", O_WRONLY);
+        while (read(from, &byte, 1) == 1 && write(to, &byte, 1) == 1) {
+            (void)usleep(200);
+        }
+        _exit(0);
+    }
+    assert_int_equal(host_points_read("pipe.ply.gz", &points, &error), 0);
+    assert_int_equal(waitpid(child, NULL, 0), child);
+    assert_int_equal(points.count, 1);
+    assert_true(points.xyz[0] == 'a' && points.xyz[2] == 'c');
+    host_points_free(&points);
+    assert_int_equal(unlink("pipe.ply.gz"), 0);
+    assert_int_equal(unlink("packed"), 0);
 }
 
 /* A line that never ends is no text. */
@@ -347,6 +382,7 @@ int main(void)
         cmocka_unit_test(what_is_little),
         cmocka_unit_test(text_beyond_the_memory),
         cmocka_unit_test(pieces_are_as_the_whole),
+        cmocka_unit_test(a_pipe_that_brings_little),
         cmocka_unit_test(a_line_without_an_end),
         cmocka_unit_test(a_plain_file_beyond_the_memory),
         cmocka_unit_test(what_is_longer_than_its_caller_takes),
