@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -139,4 +140,18 @@ int host_child_check(struct host_process *process, unsigned node, unsigned link,
                    process->deaths < HOST_DEATHS_MAX
                ? 0
                : describe(process, node, link, error);
+}
+
+uint64_t host_child_starved_us(const struct host_process *process)
+{
+    char path[64];
+    unsigned long long ran_ns, waited_ns = 0;
+    snprintf(path, sizeof path, "/proc/%ld/schedstat", (long)process->pid);
+    FILE *file = process->pid > 0 ? fopen(path, "re") : NULL;
+    if (file != NULL) {
+        int read = fscanf(file, "%llu %llu", &ran_ns, &waited_ns);
+        waited_ns = read == 2 ? waited_ns : 0;
+        fclose(file);
+    }
+    return waited_ns / 1000;
 }

@@ -59,6 +59,10 @@ int host_child_check(struct host_process *process, unsigned node, unsigned link,
 /* Ends it if it runs, which host_child_died finds; false: it does not. */
 bool host_child_kill(const struct host_process *process);
 
+/* Microseconds that it was kept waiting for a processor since its start; 0: the
+ * kernel does not say. */
+uint64_t host_child_starved_us(const struct host_process *process);
+
 /* Waits for the end of one that was killed. */
 void host_child_wait(struct host_process *process);
 

@@ -274,6 +274,12 @@ static unsigned machine_restarts(void *context)
     return cluster->restarts;
 }
 
+static uint64_t machine_starved_us(void *context, unsigned node)
+{
+    const struct host_cluster *cluster = context;
+    return host_child_starved_us(&cluster->process[node]);
+}
+
 /* As it ends, host_cluster_check finds it. */
 static bool machine_kill(void *context, unsigned node)
 {
@@ -310,6 +316,7 @@ struct host_machine host_cluster_machine(struct host_cluster *cluster)
     machine.idle = machine_idle;
     machine.check = machine_check;
     machine.restarts = machine_restarts;
+    machine.starved_us = machine_starved_us;
     machine.kill = machine_kill;
     machine.ended = machine_ended;
     machine.stop = machine_stop;

@@ -273,6 +273,12 @@ static unsigned machine_restarts(void *context)
     return ((struct host_remote *)context)->restarts;
 }
 
+static uint64_t machine_starved_us(void *context, unsigned node)
+{
+    const struct host_remote *r = context;
+    return host_child_starved_us(&r->process[node]);
+}
+
 static bool machine_kill(void *context, unsigned node)
 {
     const struct host_remote *r = context;
@@ -417,6 +423,7 @@ struct host_machine host_remote_machine(struct host_remote *remote)
         all_here = all_here && remote->file->local[i];
     }
     machine.restarts = all_here ? machine_restarts : NULL;
+    machine.starved_us = machine_starved_us;
     machine.kill = machine_kill;
     machine.where = remote->where;
     machine.keyed = remote->file->has_key;

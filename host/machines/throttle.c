@@ -86,6 +86,12 @@ static unsigned restarts(void *context)
     return t->machine.restarts(t->machine.context);
 }
 
+static uint64_t starved_us(void *context, unsigned node)
+{
+    struct host_throttled *t = context;
+    return t->machine.starved_us(t->machine.context, node);
+}
+
 static bool kill_node(void *context, unsigned node)
 {
     struct host_throttled *t = context;
@@ -152,6 +158,7 @@ struct host_machine host_throttle_machine(struct host_throttled *throttled,
     result.missing = machine->missing != NULL ? missing : NULL;
     result.told = machine->told != NULL ? told : NULL;
     result.restarts = machine->restarts != NULL ? restarts : NULL;
+    result.starved_us = machine->starved_us != NULL ? starved_us : NULL;
     result.kill = machine->kill != NULL ? kill_node : NULL;
     result.doubt = machine->doubt != NULL ? doubt : NULL;
     result.start_line = machine->start_line != NULL ? start_line : NULL;

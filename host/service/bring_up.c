@@ -12,6 +12,7 @@ enum {
     TELL_US = 1500000,
     NEWS_US = 1000000, /* in which who is there answers */
     TELL_AGAIN_US = 1000000,
+    STEP_US = 500000, /* between two looks at who waits for a processor */
     WHY_BYTES = 400,
     START_BYTES = 400 /* of a line that an error has room for */
 };
@@ -188,8 +189,35 @@ static int fail(const struct host_service *s, struct host_error *error)
         m->nodes - missing, m->nodes, next);
 }
 
+/* The longest of the times that a process of a node has waited for a processor
+ * since the last look.  Any of them may be on the way to the missing one. */
+static uint64_t starved_us(struct host_service *s)
+{
+    const struct host_machine *m = s->machine;
+    uint64_t most = 0;
+    for (unsigned i = 0; m->starved_us != NULL && i < m->nodes; i++) {
+        uint64_t all = m->starved_us(m->context, i);
+        uint64_t before = s->node[i].starved_us;
+        uint64_t since = all >= before ? all - before : all; /* a new process */
+        s->node[i].starved_us = all;
+        most = since > most ? since : most;
+    }
+    return most;
+}
+
+static void count_time(struct host_service *s, uint64_t elapsed_us)
+{
+    s->step_us += elapsed_us;
+    if (s->step_us < STEP_US) {
+        return;
+    }
+    uint64_t starved = starved_us(s);
+    s->waited_us += starved < s->step_us ? s->step_us - starved : 0;
+    s->step_us = 0;
+}
+
 int host_bring_up_check(struct host_service *service, uint64_t now_us,
-                        struct host_error *error)
+                        uint64_t elapsed_us, struct host_error *error)
 {
     struct host_service *s = service;
     unsigned first = 0;
@@ -199,11 +227,11 @@ int host_bring_up_check(struct host_service *service, uint64_t now_us,
     unsigned there = s->machine->nodes - count(s, true, &first);
     if (there > s->there) {
         s->there = there;
-        s->came_us = now_us;
+        s->waited_us = s->step_us = 0;
     }
+    count_time(s, elapsed_us);
     tell(s, now_us);
-    return now_us - s->came_us <= host_bring_up_patience(s) ? 0
-                                                            : fail(s, error);
+    return s->waited_us < host_bring_up_patience(s) ? 0 : fail(s, error);
 }
 
 void host_bring_up_done(struct host_service *service)

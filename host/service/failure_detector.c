@@ -411,5 +411,5 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     if (check_wire(s, now_us, error) != 0) {
         return error->code;
     }
-    return host_bring_up_check(s, now_us, error);
+    return host_bring_up_check(s, now_us, elapsed, error);
 }

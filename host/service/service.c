@@ -115,7 +115,7 @@ int host_service_open(struct host_service *service, struct host_error *error)
     }
     s->generations = 1;
     s->check_us = s->wire_down_us = now_of(s);
-    s->opened_us = s->came_us = s->check_us;
+    s->opened_us = s->check_us;
     host_detector_begin(s, s->check_us);
     return 0;
 }

@@ -78,6 +78,9 @@ struct host_node {
     uint64_t silent_us;     /* that it has not answered */
     bool cut_off;           /* no live wire leads to it */
     uint32_t silent;        /* links by which it hears nothing */
+    uint64_t silence_us;    /* the same at the last check, */
+    uint64_t slow_us;       /* and before it answered of late: doubts.h */
+    uint64_t starved_us;    /* that the machine has told of it: bring_up.h */
     bool doubted;           /* the user was told so: doubts.h; */
     uint32_t wires_doubted; /* and of these links, */
     uint64_t wires_us;      /* after so long */
@@ -157,14 +160,16 @@ struct host_service {
     /* Losses in a row without a brick between them that was committed. */
     unsigned fruitless;
     uint32_t committed_before;
+    uint64_t undoubted_us;               /* since a node was doubted */
     bool wire_lost;                      /* the one in use is dead */
     uint64_t wire_frames, wire_quiet_us; /* that have come by it; since then */
     /* Nodes to come: bring_up.h. */
-    unsigned there; /* the most that were, */
-    uint64_t came_us,
-        opened_us;       /* when the last of them came; the first look */
-    char waiting[400];   /* what the user was told, as far as needed, */
-    uint64_t waiting_us; /* and when */
+    unsigned there;              /* the most that were, */
+    uint64_t waited_us, step_us; /* since the last of them came, and of that
+                                    since the last look at the processors */
+    uint64_t opened_us;          /* the first look */
+    char waiting[400];           /* what the user was told, as far as needed, */
+    uint64_t waiting_us;         /* and when */
     /* Wires that never came up are looked for: missing_links.h. */
     bool searching;
     uint64_t search_us;   /* since when, */

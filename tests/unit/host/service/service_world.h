@@ -52,13 +52,16 @@ static struct {
     uint32_t dead_us;
     uint32_t baud; /* that the nodes and the host are told of; 0: none */
     struct event events[EVENTS];
-    uint64_t stop_us;    /* a STOP lasts so long; 0: for ever */
+    uint64_t stop_us;    /* a STOP lasts so long, or its `link` in ms; 0: for
+                            ever */
     double host_fails;   /* when; 0: never */
     bool sequential;     /* how it runs */
     bool sick;           /* node 0 starts again whenever it has work */
     uint64_t patience_s; /* 0: 8 */
     struct host_sharing sharing;
     const struct host_onlookers *onlookers;
+    /* Where the machine has started its nodes: what it says of them. */
+    uint64_t (*starved_us)(void *context, unsigned node);
     uint64_t stopped_us; /* when a run that failed ended its nodes */
     void (*stop)(void *context);
     /* What the user was told, and when. */
@@ -103,7 +106,9 @@ static inline void lacks(unsigned node, unsigned link)
 
 static inline void happen(struct event *event)
 {
-    uint64_t stop_us = world.stop_us > 0 ? world.stop_us : UINT64_MAX / 4;
+    uint64_t stop_us = event->link > 0     ? event->link * UINT64_C(1000)
+                       : world.stop_us > 0 ? world.stop_us
+                                           : UINT64_MAX / 4;
     switch (event->what) {
     case RESTART:
         host_world_crash(&world.sim, event->node, 0, false);
@@ -223,6 +228,12 @@ static inline void machine_stop(void *context)
     world.stop(context);
 }
 
+static inline unsigned machine_restarts(void *context)
+{
+    (void)context;
+    return 0;
+}
+
 static inline bool machine_ended(void *context)
 {
     (void)context;
@@ -239,6 +250,10 @@ static inline struct host_machine make_machine(void)
     machine.check = machine_check;
     machine.ended = machine_ended;
     machine.onlookers = world.onlookers;
+    machine.starved_us = world.starved_us;
+    if (world.starved_us != NULL) {
+        machine.restarts = machine_restarts;
+    }
     return machine;
 }
 

@@ -230,6 +230,41 @@ static void test_never_started(void **unused)
     }
 }
 
+static uint64_t starving_us(void *unused, unsigned node)
+{
+    (void)unused;
+    (void)node;
+    return world.sim.now_us - world.sim.now_us / 20;
+}
+
+static uint64_t well_fed_us(void *unused, unsigned node)
+{
+    (void)unused;
+    (void)node;
+    return 0;
+}
+
+/* Of nodes that this machine has started: on a busy one they may take a minute,
+ * where the processors were what they waited for; a program that says nothing
+ * is found after nine seconds. */
+static void test_started_here(void **unused)
+{
+    (void)unused;
+    prepare();
+    world.starved_us = starving_us;
+    start_world();
+    host_world_late(&world.sim, 7, 60 * SECOND);
+    survives_as(&host_spatial);
+    for (unsigned i = 0; i < NODES; i += 7) {
+        prepare();
+        world.starved_us = well_fed_us;
+        start_world();
+        host_world_late(&world.sim, i, UINT64_MAX / 4);
+        fails_with("no answer for 9 s");
+        assert_in_range(world.stopped_us, 9 * SECOND, 10 * SECOND);
+    }
+}
+
 /* Those who come late are told of, and who is still to come. */
 static void test_late(void **unused)
 {
@@ -281,6 +316,7 @@ int main(void)
         cmocka_unit_test(test_back),
         cmocka_unit_test(test_silent_gateway),
         cmocka_unit_test(test_never_started),
+        cmocka_unit_test(test_started_here),
         cmocka_unit_test(test_late),
         cmocka_unit_test(test_all_idle),
     };
