@@ -215,7 +215,7 @@ static int command_verify(int argc, char **argv, struct host_error *error)
             "Checks exactly that TETS is the Delaunay triangulation of POINTS: "
             "every tetrahedron positive, no vertex inside the sphere of a "
             "neighbour, facets in pairs or on the convex hull, every distinct "
-            "point a vertex, Euler's relation.",
+            "point a vertex.",
             2, &s, error) != 0) {
         return error->code;
     }

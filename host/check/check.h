@@ -89,6 +89,7 @@ struct host_check_report {
     uint64_t points;   /* vertex numbers that stand for points */
     uint64_t distinct; /* vertices that there should be */
     uint64_t tetrahedra, hull_facets, hull_vertices;
+    uint64_t paired; /* tetrahedra whose facets were paired one by one */
     uint64_t faults; /* offences found */
     char text[2048]; /* the first eight of them, a line each */
 };

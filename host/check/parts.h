@@ -1,5 +1,12 @@
 /* What the parts of the check share: the tetrahedra cut into ranges, one a
- * thread, what is known of vertices, and the faults found. */
+ * thread, what is known of vertices, and the faults found.
+ *
+ * Memory: that of the check.  Work: none of its own.
+ *
+ *     while ((i = check_take(c, 64, sites.count)) < sites.count)
+ *         if (!host_site_is_vertex(&sites, (uint32_t)i))
+ *             check_fault(c, "point", "is none", NULL, 0, &vertex, 1);
+ */
 #ifndef HOST_CHECK_PARTS_H
 #define HOST_CHECK_PARTS_H
 

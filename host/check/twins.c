@@ -349,6 +349,7 @@ int check_twins(struct check *c)
     bool enough = true;
     for (unsigned i = 0; i < c->parts; i++) {
         struct check_part *part = &c->part[i];
+        c->report->paired += size_of(part);
         part->end = host_map(bytes);
         part->entry = host_map(2 * (size_t)size_of(part) * sizeof *part->entry);
         enough = enough && part->end != NULL && part->entry != NULL;

@@ -131,6 +131,16 @@ static inline int orientation(const struct fixture *f, const uint32_t t[4])
     return incode_orient3d(&tally, p[0], p[1], p[2], p[3]);
 }
 
+static inline bool is_one_of(const uint32_t *v, int n, uint32_t vertex)
+{
+    for (int i = 0; i < n; i++) {
+        if (v[i] == vertex) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static inline bool is_row(const struct fixture *f, const uint32_t t[4])
 {
     for (int k = 0; k < 4; k++) {
@@ -172,6 +182,29 @@ static inline void for_each_set(void (*function)(struct fixture *f))
         function(&f);
         close_set(&f);
     }
+}
+
+/* Whether some tetrahedron has a facet, in this order seen from outside. */
+static inline bool has_facet(const struct fixture *f, const uint32_t p[3])
+{
+    for (uint64_t i = 0; i < f->tets.count; i++) {
+        const uint32_t *t = f->tets.v[i];
+        if (!is_one_of(t, 4, p[0]) || !is_one_of(t, 4, p[1]) ||
+            !is_one_of(t, 4, p[2]) || !is_row(f, t)) {
+            continue;
+        }
+        for (uint32_t c = 0; c < 4; c++) {
+            uint32_t q[3];
+            host_facet_outward(t, c, q);
+            for (int k = 0; k < 3; k++) {
+                if (p[0] == q[k] && p[1] == q[(k + 1) % 3] &&
+                    p[2] == q[(k + 2) % 3]) {
+                    return true;
+                }
+            }
+        }
+    }
+    return false;
 }
 
 static inline void hear(void *context, const uint64_t *tets, int tet_count,

@@ -111,6 +111,90 @@ static void only_spheres_tell_a_flip(void **unused)
     for_each_set(flips);
 }
 
+/* Five points cut in both ways, besides all that is right: every new facet
+ * belongs to two tetrahedra, both on one side. */
+static void a_body_twice_is_found(void **unused)
+{
+    (void)unused;
+    struct fixture f;
+    int bodies = 0;
+    open_set(&f, "uniform", 300, 8);
+    for (int tries = 0; tries < 200000 && bodies <= 20; tries++) {
+        struct host_check_report r;
+        uint32_t p[5];
+        for (int k = 0; k < 5; k++) {
+            p[k] = (uint32_t)draw(&f, f.sites.count);
+        }
+        const uint32_t made[5][4] = {{p[0], p[1], p[2], p[3]},
+                                     {p[0], p[2], p[1], p[4]},
+                                     {p[0], p[1], p[4], p[3]},
+                                     {p[1], p[2], p[4], p[3]},
+                                     {p[2], p[0], p[4], p[3]}};
+        bool all = true;
+        for (int k = 0; k < 5; k++) {
+            all = all && is_row(&f, made[k]);
+        }
+        if (all) {
+            bodies++;
+            for (int k = 0; k < 5; k++) {
+                append(&f.tets, made[k]);
+            }
+            assert_int_equal(check(&f, HOST_CHECK_TILING, &r), HOST_UNVERIFIED);
+            assert_non_null(strstr(r.text, "has both its tetrahedra on one "
+                                           "side"));
+            assert_true(f.named[p[0]]);
+            restore(&f);
+        }
+    }
+    assert_true(bodies > 20);
+    close_set(&f);
+}
+
+/* A flat tetrahedron on a face of the cube, over two facets of the hull: all
+ * facets fit, and the surface is as convex as it was. */
+static bool cover(struct fixture *f, const uint32_t p[3])
+{
+    struct host_check_report r;
+    for (uint32_t v = 0; v < f->sites.count; v++) {
+        const uint32_t t[4] = {p[0], p[2], p[1], v};
+        for (int k = 0; k < 3 && host_site_is_vertex(&f->sites, v) &&
+                        orientation(f, t) == 0;
+             k++) { /* the hull's other facet at edge k, from outside */
+            const uint32_t q[3] = {p[(k + 1) % 3], p[k], v};
+            if (!is_one_of(p, 3, v) && has_facet(f, q)) {
+                append(&f->tets, t);
+                assert_int_equal(check(f, HOST_CHECK_DELAUNAY, &r),
+                                 HOST_UNVERIFIED);
+                assert_int_equal(r.faults, 1);
+                assert_non_null(strstr(r.text, "has no volume"));
+                restore(f);
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static void flat_ones_are_found(void **unused)
+{
+    (void)unused;
+    struct fixture f;
+    int covered = 0;
+    open_set(&f, "grid", 64, 1);
+    for (uint64_t i = 0; i < f.right.count; i++) {
+        for (uint32_t c = 0; c < 4; c++) {
+            uint32_t p[3];
+            host_facet_outward(f.right.v[i], c, p);
+            const uint32_t other[3] = {p[0], p[2], p[1]};
+            if (!has_facet(&f, other)) { /* a facet of the hull */
+                covered += cover(&f, p);
+            }
+        }
+    }
+    assert_true(covered > 20);
+    close_set(&f);
+}
+
 /* --- Surfaces --------------------------------------------------------- */
 
 /* Five tetrahedra about an axis, from each corner of a pentagon to the next but
@@ -174,13 +258,45 @@ static void two_bodies_are_found(void **unused)
     close_set(&f);
 }
 
+/* Sums at vertices leave little to be paired one by one: what touches the hull
+ * with a facet. */
+static void sums_leave_little_to_pair(void **unused)
+{
+    (void)unused;
+    struct fixture f;
+    struct host_check_report r;
+    open_set(&f, "grid", 512, 1);
+    assert_int_equal(check(&f, HOST_CHECK_DELAUNAY, &r), 0);
+    assert_int_equal(r.paired, r.tetrahedra);
+    assert_int_equal(check(&f, HOST_CHECK_TILING, &r), 0);
+    uint64_t touching = 0;
+    for (uint64_t i = 0; i < f.tets.count; i++) {
+        int on = 0;
+        for (int k = 0; k < 4; k++) {
+            double p[3];
+            host_site(&f.sites, f.tets.v[i][k], p);
+            bool face = false;
+            for (int d = 0; d < 3; d++) {
+                face = face || p[d] <= f.order.lo[d] || p[d] >= f.order.hi[d];
+            }
+            on += face;
+        }
+        touching += on >= 3;
+    }
+    assert_int_equal(r.paired, touching);
+    close_set(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_left_out_point_is_found),
         cmocka_unit_test(only_spheres_tell_a_flip),
+        cmocka_unit_test(a_body_twice_is_found),
+        cmocka_unit_test(flat_ones_are_found),
         cmocka_unit_test(a_surface_wound_twice_is_found),
         cmocka_unit_test(two_bodies_are_found),
+        cmocka_unit_test(sums_leave_little_to_pair),
     };
     return cmocka_run_group_tests_name("check_shapes", tests, NULL, NULL);
 }

@@ -6,16 +6,6 @@
 #include "host/check/judge.h"
 #include "tests/unit/host/check/check_world.h"
 
-static bool is_one_of(const uint32_t *v, int n, uint32_t vertex)
-{
-    for (int i = 0; i < n; i++) {
-        if (v[i] == vertex) {
-            return true;
-        }
-    }
-    return false;
-}
-
 static bool inside(const struct fixture *f, const uint32_t t[4], uint32_t v)
 {
     struct incode_tally tally = {0};
