@@ -136,10 +136,14 @@ static void draw_liar(struct host_sim_plan *p)
     }
     unsigned node = (unsigned)host_sim_draw(&state, 0, p->nodes - 1);
     enum host_lie way = (enum host_lie)host_sim_draw(&state, 0, HOST_LIES - 1);
-    if (way == HOST_LIE_LOAN && !p->strategy->meshes) {
+    bool alone = p->strategy->nodes_default == 1;
+    if (!p->strategy->meshes && way == HOST_LIE_LOAN) {
         way = HOST_LIE_DROP;
     }
-    if (p->strategy->nodes_default == 1) {
+    if (!p->strategy->meshes && way == HOST_LIE_PAGE && !alone) {
+        way = HOST_LIE_EXCHANGE;
+    }
+    if (alone) {
         node = way == HOST_LIE_PAGE ? node | 1 : 0;
     }
     p->wanted[HOST_SIM_LIAR] = true;
