@@ -123,7 +123,7 @@ struct host_service {
     unsigned window;                 /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     enum host_verifying verifying;
-    bool foreign; /* its nodes are not processes that this program started */
+    bool foreign; /* its nodes are not this program's processes */
     /* Of a node, and the cube file that says so (NULL: an option does), for
      * what paging.h tells; 0: it tells nothing. */
     uint64_t memory;
@@ -145,13 +145,11 @@ struct host_service {
     struct host_work work; /* what the strategy sees; who is lost */
     struct host_ledger ledger;
     struct host_spill spill;
-    bool started, finished;
+    bool started, finished, paging_told;
     uint64_t pages_sent;
-    bool paging_told;
-    bool reporting; /* statistics are asked for: nothing else is left */
-    bool dealt;     /* the first jobs of this generation are out */
-    bool over;      /* all is here that is needed */
-    bool late;      /* a loss came after the last commit */
+    bool reporting;  /* statistics are asked for: nothing else is left */
+    bool dealt;      /* the first jobs of this generation are out */
+    bool over, late; /* all is here that is needed; a loss came after that */
     struct host_audit audit;
     uint32_t generation; /* of the wiring that is followed */
     bool loss;           /* a new generation is due */

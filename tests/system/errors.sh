@@ -509,9 +509,10 @@ check 'the choice is explained with --explain' "$(cat "$scratch/output")" \
 # is said once.
 reads() { # NAME EXTENSION NOTE: of four.xyz, as standard input has it
     cat > "$in/other.$2"
-    incode run "$in/other.$2" -o "$scratch/other.npy" > "$scratch/output" \
-        2> "$scratch/errors"
-    check "$1" "exit $?, $(last "$scratch/errors")" \
+    rm -f "$scratch/other.npy"
+    succeeds "$1: exit 0" incode run "$in/other.$2" -o "$scratch/other.npy" \
+        > "$scratch/output"
+    check "$1" "$(last "$scratch/errors")" \
         cmp "$scratch/other.npy" "$scratch/four.npy"
     check "$1: what is said" "$(cat "$scratch/errors")" [ "$(sed "s,.*/,," \
         "$scratch/errors")" = "${3:+other.$2: $3}" ]

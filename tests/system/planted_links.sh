@@ -33,9 +33,9 @@ for to in victim new; do
     refuses "planted_links/cube --new to $to" 3 'd.cube: is there already' \
         incode cube --new 2 -o "$here/d.cube"
     refuses "planted_links/a table to $to" 3 'e.csv: .*symbolic links' \
-        timeout 20 "$INCODE" bench scaling --quick --csv "$here/e.csv"
+        within "$INCODE" bench scaling --quick --csv "$here/e.csv"
     ln -sfn "$scratch/$to" "$here/f.socket"
-    exits "planted_links/a socket to $to" 2 timeout 20 "$BUILD/incode-node" \
+    exits "planted_links/a socket to $to" 2 within "$BUILD/incode-node" \
         --node 0 --dimension 0 --wire "0=unix-listen:$here/f.socket"
     check "planted_links/a socket to $to: why" "$(last "$scratch/errors")" \
         grep -q 'cannot listen there: .*; that file is no socket; ' \
@@ -105,7 +105,7 @@ fi
 
 # emulates NAME PATTERN: boards are not started with what is at lab.cube.d.
 emulates() {
-    refuses "planted_links/$1" 3 "$2" timeout 20 "$INCODE" emulate \
+    refuses "planted_links/$1" 3 "$2" within "$INCODE" emulate \
         --board mps2-an500 --nodes 2 -o "$here/lab.cube"
     is_whole "$1"
     check "planted_links/$1: no cube file" "$(ls "$here")" \
@@ -133,7 +133,7 @@ for file in flash0 console1.log; do
 done
 ln -s "$victim" "$here/lab.cube"
 refuses 'planted_links/a link for the cube file' 3 'lab.cube: not a file that' \
-    timeout 20 "$INCODE" emulate --board mps2-an500 --nodes 2 -o "$here/lab.cube"
+    within "$INCODE" emulate --board mps2-an500 --nodes 2 -o "$here/lab.cube"
 is_whole 'a link for the cube file'
 rm -f "$here/lab.cube"
 

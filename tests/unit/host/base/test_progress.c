@@ -120,7 +120,7 @@ static const char *shown(uint64_t done, uint64_t total, uint64_t amount)
     unsigned before = screen.drawn;
     for (int i = 0; i < 6000 && screen.drawn == before; i++) {
         host_progress_show(done, total, amount);
-        (void)poll(NULL, 0, 10);
+        (void)poll(NULL, 0, 10); /* clock: a line comes every three seconds */
         look();
     }
     assert_true(screen.drawn > before);
