@@ -147,12 +147,11 @@ struct host_service {
     struct host_spill spill;
     bool started, finished, paging_told;
     uint64_t pages_sent;
-    bool reporting;  /* statistics are asked for: nothing else is left */
-    bool dealt;      /* the first jobs of this generation are out */
+    bool reporting, dealt; /* statistics are asked for; first jobs are out */
     bool over, late; /* all is here that is needed; a loss came after that */
     struct host_audit audit;
-    uint32_t generation; /* of the wiring that is followed */
-    bool loss;           /* a new generation is due */
+    uint32_t generation; /* of the wiring that is followed; */
+    bool loss;           /* a new one is due */
     unsigned blamed;     /* the node of the last loss, as far as is known */
     struct host_fault fault;
     /* Losses in a row without a brick between them that was committed. */
@@ -166,8 +165,8 @@ struct host_service {
     uint64_t waited_us, step_us; /* since the last of them came, and of that
                                     since the last look at the processors */
     uint64_t opened_us;          /* the first look */
-    char waiting[400];           /* what the user was told, as far as needed, */
-    uint64_t waiting_us;         /* and when */
+    char waiting[400];           /* what the user was told, as far as needed */
+    uint64_t waiting_us;
     /* Wires that never came up are looked for: missing_links.h. */
     bool searching;
     uint64_t search_us;   /* since when, */
@@ -178,8 +177,7 @@ struct host_service {
                             now, until all have answered */
     unsigned up, ready;  /* living nodes that are up; that have their setup */
     unsigned working;    /* that have a job */
-    unsigned turn;       /* the node to be served next */
-    unsigned ping_turn;  /* to be pinged next */
+    unsigned turn, ping_turn; /* the node to be served, and pinged, next */
     struct host_onlooking onlooking;
     uint64_t ping_us, check_us, began_us, wire_down_us;
     struct host_in_use in_use;

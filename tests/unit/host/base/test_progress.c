@@ -297,7 +297,7 @@ static void test_lines(void **unused)
         if (shown % 8 == 0) {
             host_progress_phase("triangulating", "Mtet");
         }
-        (void)poll(NULL, 0, 10);
+        (void)poll(NULL, 0, 10); /* clock: a line comes every three seconds */
         host_progress_show(1, 4, 2000000);
     }
     host_progress_show(2, 4, 2000000); /* too soon */

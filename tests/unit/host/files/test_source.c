@@ -207,7 +207,7 @@ static void a_pipe_that_brings_little(void **unused)
         char byte;
         int from = open("packed", O_RDONLY), to = open("pipe.ply.gz", O_WRONLY);
         while (read(from, &byte, 1) == 1 && write(to, &byte, 1) == 1) {
-            (void)usleep(200);
+            (void)usleep(200); /* clock: so that the reader comes to wait */
         }
         _exit(0);
     }
