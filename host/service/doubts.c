@@ -9,7 +9,10 @@
 enum {
     DOUBT_US = 1300000,
     SLOW_US = 10000000, /* of nodes that this machine may keep waiting */
-    WIRE_US = 1200000
+    WIRE_US = 1200000,
+    TIMES = 2,         /* as long as silences that ended of late */
+    FADES = 16,        /* what was a second is none so many seconds later */
+    QUIET_US = 1000000 /* after a doubt silences end that it was the cause of */
 };
 
 /* What may be on the way before an answer: a window each way of the slowest
@@ -26,6 +29,38 @@ static uint64_t doubt_us(const struct host_service *s)
 {
     uint64_t us = DOUBT_US + wire_us(s);
     return s->machine->slow && us < SLOW_US ? SLOW_US : us;
+}
+
+/* The silences that have ended since the last check. */
+static void note_silences(struct host_service *s, uint64_t elapsed_us)
+{
+    bool doubted = false;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        doubted = doubted || (s->node[i].doubted && !s->work.lost[i]);
+    }
+    s->undoubted_us = doubted ? 0 : s->undoubted_us + elapsed_us;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct host_node *n = &s->node[i];
+        uint64_t fades_us = elapsed_us / FADES;
+        bool ended = n->silent_us < n->silence_us && n->silent == 0;
+        n->slow_us -= fades_us < n->slow_us ? fades_us : n->slow_us;
+        if (ended && s->undoubted_us >= QUIET_US &&
+            n->silence_us > n->slow_us) {
+            n->slow_us = n->silence_us;
+        }
+        n->silence_us = n->silent_us;
+    }
+}
+
+/* Below which silence is what the node and its neighbours are used to. */
+static uint64_t usual_us(const struct host_service *s, unsigned i)
+{
+    uint64_t most = s->node[i].slow_us;
+    for (unsigned d = 0; d < s->machine->dimension; d++) {
+        uint64_t other = s->node[i ^ 1u << d].slow_us;
+        most = other > most ? other : most;
+    }
+    return TIMES * most;
 }
 
 static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
@@ -108,6 +143,7 @@ static void look_at_links(struct host_service *s, unsigned i,
         wires &= both ? ~(uint32_t)0 : ~(1u << d);
     }
     uint64_t limit = s->machine->slow ? SLOW_US : WIRE_US / 2 + wire_us(s);
+    limit = limit < usual_us(s, i) ? usual_us(s, i) : limit;
     wires &= (1u << s->machine->dimension) - 1;
     node->wires_us = wires != 0 ? node->wires_us + elapsed_us : 0;
     for (unsigned d = 0; wires >> d != 0 && node->wires_us > limit; d++) {
@@ -122,8 +158,10 @@ void host_doubts_check(struct host_service *service, uint64_t elapsed_us)
     struct host_service *s = service;
     unsigned others;
     look_at_wire(s, elapsed_us);
+    note_silences(s, elapsed_us);
     for (unsigned i = 0; i < s->machine->nodes && s->started; i++) {
         uint64_t limit = doubt_us(s);
+        limit = limit < usual_us(s, i) ? usual_us(s, i) : limit;
         limit = s->patience_us / 2 < limit ? s->patience_us / 2 : limit;
         if (s->work.lost[i] || s->node[i].doubted) {
             continue;

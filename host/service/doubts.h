@@ -7,6 +7,13 @@
  * and is silent to a neighbour who is heard, or to the host, and to none is
  * not; where others hear it, it is the wire that is.
  *
+ * Where there are more nodes than processors, or the machine is busy, all of
+ * them may be silent for seconds, and answer.  So a node is doubted only when
+ * it has been silent for twice as long as it, or any of its neighbours,
+ * was of late before it answered.  Silences in which a node was doubted, or
+ * after which a node says that a neighbour is silent, do not count: one that
+ * stands still holds up what is for others.
+ *
  * Memory: none of its own.  Work: a pass over the nodes a check, and over links
  * where some are silent.
  *

@@ -52,8 +52,7 @@ static struct {
     uint32_t dead_us;
     uint32_t baud; /* that the nodes and the host are told of; 0: none */
     struct event events[EVENTS];
-    uint64_t stop_us;    /* a STOP lasts so long, or its `link` in ms; 0: for
-                            ever */
+    uint64_t stop_us;    /* a STOP lasts so long; 0: for ever */
     double host_fails;   /* when; 0: never */
     bool sequential;     /* how it runs */
     bool sick;           /* node 0 starts again whenever it has work */
@@ -106,9 +105,7 @@ static inline void lacks(unsigned node, unsigned link)
 
 static inline void happen(struct event *event)
 {
-    uint64_t stop_us = event->link > 0     ? event->link * UINT64_C(1000)
-                       : world.stop_us > 0 ? world.stop_us
-                                           : UINT64_MAX / 4;
+    uint64_t stop_us = world.stop_us > 0 ? world.stop_us : UINT64_MAX / 4;
     switch (event->what) {
     case RESTART:
         host_world_crash(&world.sim, event->node, 0, false);
