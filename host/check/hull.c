@@ -102,10 +102,11 @@ static int side_of_vertex(const struct check *c, const uint32_t v[3],
     return side(c, v, p);
 }
 
-/* Calls function(c, facet or vertex) for all of them, on all threads. */
+/* Calls function(c, first, last) for ranges of facets or vertices that together
+ * are all, on all threads. */
 struct all {
     struct check *c;
-    void (*function)(struct check *c, size_t i);
+    void (*function)(struct check *c, size_t first, size_t last);
     uint64_t count;
 };
 
@@ -116,14 +117,14 @@ static void run_some(void *context, unsigned part)
     uint64_t i;
     while ((i = __atomic_fetch_add(&all->c->next, TURN, __ATOMIC_RELAXED)) <
            all->count) {
-        for (uint64_t k = i; k < all->count && k < i + TURN; k++) {
-            all->function(all->c, (size_t)k);
-        }
+        uint64_t last = all->count - i < TURN ? all->count : i + TURN;
+        all->function(all->c, (size_t)i, (size_t)last);
     }
 }
 
 static void for_all(struct check *c, uint64_t count,
-                    void (*function)(struct check *c, size_t i))
+                    void (*function)(struct check *c, size_t first,
+                                     size_t last))
 {
     struct all all = {c, function, count};
     c->next = 0;
@@ -205,9 +206,18 @@ static void check_vertex(struct check *c, size_t v)
         }
         check_edge(c, (uint32_t)v, edge + i, j - i);
     }
-    if (c->on[v] != 0) {
-        (void)__atomic_fetch_add(&c->hull->vertices, 1, __ATOMIC_RELAXED);
+}
+
+static void check_vertices(struct check *c, size_t first, size_t last)
+{
+    uint64_t vertices = 0;
+    for (size_t v = first; v < last; v++) {
+        if (c->on[v] != 0) {
+            check_vertex(c, v);
+            vertices++;
+        }
     }
+    (void)__atomic_fetch_add(&c->hull->vertices, vertices, __ATOMIC_RELAXED);
 }
 
 /* Counts, then fills: afterwards end[v] is where the edges of v begin. */
@@ -253,7 +263,7 @@ static int check_edges(struct check *c, struct host_error *error)
     c->edge = host_map(n * sizeof *c->edge);
     if (c->end != NULL && c->on != NULL && c->edge != NULL) {
         list_edges(c);
-        for_all(c, sites, check_vertex);
+        for_all(c, sites, check_vertices);
         check_euler(c);
     } else {
         host_fail_memory(error, "the edges of the hull");
@@ -331,17 +341,20 @@ static void facet_fault(struct check *c, size_t facet, const char *what)
     fault(c, &c->hull->facet[facet].tet, 1, v, 3, what);
 }
 
-static void check_facing(struct check *c, size_t facet)
+static void check_facing(struct check *c, size_t first, size_t last)
 {
-    uint32_t v[3];
-    outward(c, facet, v);
-    if (side(c, v, c->inside) >= 0) {
-        facet_fault(c, facet, "is a hull facet that faces inward");
+    for (size_t facet = first; facet < last; facet++) {
+        uint32_t v[3];
+        outward(c, facet, v);
+        if (side(c, v, c->inside) >= 0) {
+            facet_fault(c, facet, "is a hull facet that faces inward");
+        }
     }
 }
 
-/* Whether the ray crosses a facet; all of them face away from its start. */
-static void cross(struct check *c, size_t facet)
+/* Whether the ray crosses a facet: 1, 0, or -1 where it meets its edge.  All
+ * facets face away from its start. */
+static int crosses(const struct check *c, size_t facet)
 {
     struct incode_tally tally = {0};
     uint32_t v[3];
@@ -357,10 +370,18 @@ static void cross(struct check *c, size_t facet)
             incode_orient3d(&tally, c->inside, p[k], p[(k + 1) % 3], c->beyond);
         lowest = s < lowest ? s : lowest;
     }
-    if (lowest == 0) {
-        __atomic_store_n(&c->grazed, true, __ATOMIC_RELAXED);
-    } else if (lowest > 0) {
-        (void)__atomic_fetch_add(&c->crossed, 1, __ATOMIC_RELAXED);
+    return lowest > 0 ? 1 : lowest == 0 ? -1 : 0;
+}
+
+static void count_crossed(struct check *c, size_t first, size_t last)
+{
+    for (size_t facet = first; facet < last; facet++) {
+        int crossed = crosses(c, facet);
+        if (crossed < 0) {
+            __atomic_store_n(&c->grazed, true, __ATOMIC_RELAXED);
+        } else if (crossed > 0) {
+            (void)__atomic_fetch_add(&c->crossed, 1, __ATOMIC_RELAXED);
+        }
     }
 }
 
@@ -369,7 +390,7 @@ static void cross(struct check *c, size_t facet)
  * lie above any facet.  So each sheet of the surface covers the boundary of one
  * convex body, and with all its extreme vertices; two sheets would have an
  * Euler characteristic beyond 2 for the vertices that they share. */
-static void check_thin(struct check *c, size_t facet)
+static void check_thin_facet(struct check *c, size_t facet)
 {
     uint32_t v[3], w[3];
     outward(c, facet, v);
@@ -384,6 +405,13 @@ static void check_thin(struct check *c, size_t facet)
     }
 }
 
+static void check_thin(struct check *c, size_t first, size_t last)
+{
+    for (size_t facet = first; facet < last; facet++) {
+        check_thin_facet(c, facet);
+    }
+}
+
 static void check_rays(struct check *c)
 {
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
@@ -393,7 +421,7 @@ static void check_rays(struct check *c)
         blend(c, v, 3, i, c->beyond);
         c->crossed = 0;
         c->grazed = false;
-        for_all(c, c->hull->count, cross);
+        for_all(c, c->hull->count, count_crossed);
         if (!c->grazed) {
             if (c->crossed > 1) {
                 facet_fault(c, facet, "is a hull facet covered by another");

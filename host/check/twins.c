@@ -253,7 +253,7 @@ static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet)
                                            {{1, 3}, {3, 0}, {0, 0}, {0, 1}},
                                            {{2, 1}, {0, 2}, {1, 0}, {0, 0}}};
     const uint32_t *t = w->c->tets->v[tet];
-    const uint8_t *hot = w->c->part[0].list == NULL ? NULL : w->c->hot;
+    const uint8_t *hot = w->c->depth == HOST_CHECK_TILING ? w->c->hot : NULL;
     int place = 0, least = -1;
     for (int k = 0; k < 4; k++) {
         place = t[k] == p ? k : place;
@@ -309,6 +309,9 @@ static void walk_vertex(struct walk *w, uint32_t p)
 {
     struct check *c = w->c;
     size_t tets = 0;
+    if (c->depth == HOST_CHECK_TILING && c->hot[p] == 0) {
+        return; /* most */
+    }
     for (unsigned i = 0; i < c->parts; i++) {
         tets += c->part[i].end[(size_t)p + 1] - c->part[i].end[p];
     }

@@ -46,8 +46,8 @@ int host_adjacency_make(struct host_adjacency *a,
         return host_fail(
             error, HOST_BROKEN,
             "host: the neighbours of 2^32 - 1 tetrahedra or more "
-            "cannot be numbered for a file of them; do without, or take fewer "
-            "points");
+            "cannot be numbered for a file of them; do without these, or take "
+            "fewer points");
     }
     size_t first = ((size_t)vertices + 1) * sizeof(uint32_t);
     size_t order = (size_t)tets->count * sizeof(uint32_t);

@@ -114,6 +114,27 @@ static void judged_as_by_trying_all(void **unused)
     }
 }
 
+/* Lattices whose steps no double has: points at, or a rounding beside, spheres
+ * and the corners of boxes. */
+static void judged_on_lattices(void **unused)
+{
+    (void)unused;
+    static const double parts[][3] = {{10, 10, 10}, {3, 7, 11}};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        enum { SIDE = 8, POINTS = SIDE * SIDE * SIDE };
+        struct fixture f;
+        double xyz[3 * POINTS];
+        for (int k = 0; k < POINTS; k++) {
+            xyz[3 * k] = k % SIDE / parts[i][0];
+            xyz[3 * k + 1] = k / SIDE % SIDE / parts[i][1];
+            xyz[3 * k + 2] = k / SIDE / SIDE / parts[i][2];
+        }
+        open_points(&f, xyz, POINTS);
+        judge_all(&f, UINT64_MAX);
+        close_set(&f);
+    }
+}
+
 /* Axes far apart in size; products that overflow, and such that vanish. */
 static void judged_at_the_ends_of_the_range(void **unused)
 {
@@ -170,6 +191,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(judged_as_by_trying_all),
+        cmocka_unit_test(judged_on_lattices),
         cmocka_unit_test(judged_at_the_ends_of_the_range),
         cmocka_unit_test(judged_among_many),
     };
