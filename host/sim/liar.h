@@ -9,7 +9,7 @@
  *
  *     struct host_liar liar = {.way = HOST_LIE_DROP, .one_in = 500};
  *     liar.random = sim_seed(17, 3);
- *     int status = host_liar_write(&liar, &counted, dest, type, data, size);
+ *     int status = host_liar_write(&liar, counted, dest, type, data, size);
  */
 #ifndef HOST_SIM_LIAR_H
 #define HOST_SIM_LIAR_H
