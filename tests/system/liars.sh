@@ -28,8 +28,7 @@ run_with() {
     rm -f "$lying.told" "$scratch/stats.json" "$scratch/out.npy"
     (
         ulimit -v "${limit:-unlimited}"
-        # clock: what a lie makes a node wait for is given up after so long
-        incode run "$points" -q --node-program "$lying" --patience 20 \
+        incode run "$points" -q --node-program "$lying" \
             --stats "$scratch/stats.json" -o "$scratch/out.npy" "$@"
     ) 2> "$scratch/errors"
     status=$?
