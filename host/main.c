@@ -525,7 +525,7 @@ int main(int argc, char **argv)
 {
     static char name[] = "incode";
     struct host_error error = {0};
-    host_begin();
+    host_begin("incode");
     (void)atexit(finish_stdout);
     argv[0] = name;
     int status = run(argc, argv, &error);

@@ -59,7 +59,7 @@ int main(int argc, char **argv)
 {
     struct host_error error = {0};
     static char name[] = "incode run";
-    host_begin();
+    host_begin("incode-mpi");
     prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
     mpi_environment();
     MPI_Init(&argc, &argv);

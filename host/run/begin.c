@@ -19,9 +19,9 @@ static void open_standard(void)
     }
 }
 
-void host_begin(void)
+void host_begin(const char *name)
 {
-    (void)prctl(PR_SET_NAME, "incode"); /* if started as /proc/self/exe */
+    (void)prctl(PR_SET_NAME, name);
     open_standard();
     (void)signal(SIGCHLD, SIG_DFL);
     host_output_guard();

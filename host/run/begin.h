@@ -5,12 +5,13 @@
  *
  * Memory: none.  Work: a few system calls.
  *
- *     host_begin(); // first of all in main
+ *     host_begin("incode"); // first of all in main
  */
 #ifndef HOST_BEGIN_H
 #define HOST_BEGIN_H
 
-/* First of all. */
-void host_begin(void);
+/* First of all.  name: the process is listed by it, also where it was started as
+ * /proc/self/exe. */
+void host_begin(const char *name);
 
 #endif

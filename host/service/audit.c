@@ -10,8 +10,10 @@
 #include "notices.h"
 #include "service.h"
 
-/* So many tetrahedra are checked at once: in some milliseconds. */
-enum { SMALL = 1 << 19 };
+enum {
+    SMALL = 1 << 19,     /* tetrahedra that are checked at once: in some ms */
+    FAULTS_MAX = 1 << 20 /* that the check locates: facets come last */
+};
 
 /* --- the check, on a thread of its own ------------------------------------ */
 
@@ -28,7 +30,9 @@ static void note_place(void *context, const uint64_t *tets, int tet_count,
 {
     struct host_audit *a = context;
     (void)what;
-    if (a->places == HOST_AUDIT_PLACES) {
+    /* Points without a tetrahedron prove nothing against a node: facets do. */
+    unsigned most = HOST_AUDIT_PLACES / (tet_count == 0 ? 2u : 1u);
+    if (a->places >= most) {
         return;
     }
     struct host_audit_place *place = &a->place[a->places++];
@@ -85,7 +89,7 @@ static void doubt_brick(struct inquiry *q, uint32_t brick, const char *what,
 {
     uint16_t by = q->s->ledger.by[brick];
     if ((by & HOST_LEDGER_ALONE) != 0) {
-        accuse(q, by & (HOST_LEDGER_ALONE - 1u), what, v);
+        accuse(q, host_ledger_by(&q->s->ledger, brick), what, v);
     }
     q->audit->redo[brick] = 1;
 }
@@ -153,7 +157,7 @@ static uint32_t hash_of(const uint32_t v[4])
 static void add_missing(struct missing *m, const uint32_t v[4])
 {
     uint32_t at = hash_of(v);
-    for (uint16_t i = m->head[at]; i < MISSING_MAX; i = m->next[i]) {
+    for (unsigned i = m->head[at]; i < MISSING_MAX; i = m->next[i]) {
         if (same_vertices(m->v[i], v)) {
             return;
         }
@@ -188,7 +192,7 @@ static void judge_missing(struct inquiry *q, struct missing *m)
 {
     const struct host_tetrahedra *all = q->s->tets;
     for (uint64_t k = 0; m->count > 0 && k < all->count; k++) {
-        for (uint16_t i = m->head[hash_of(all->v[k])]; i < MISSING_MAX;
+        for (unsigned i = m->head[hash_of(all->v[k])]; i < MISSING_MAX;
              i = m->next[i]) {
             m->there[i] |= same_vertices(m->v[i], all->v[k]);
         }
@@ -256,8 +260,7 @@ static void redo_guilty(struct inquiry *q)
     const struct host_service *s = q->s;
     const struct host_ledger *ledger = &s->ledger;
     for (uint32_t b = 0; b < ledger->bricks; b++) {
-        q->audit->redo[b] |=
-            q->audit->guilty[ledger->by[b] & (HOST_LEDGER_ALONE - 1u)];
+        q->audit->redo[b] |= q->audit->guilty[host_ledger_by(ledger, b)];
     }
     uint64_t i = 0;
     for (size_t r = 0; r < ledger->runs; r++) {
@@ -320,8 +323,7 @@ static void check(void *argument)
     struct host_service *s = argument;
     struct host_audit *a = &s->audit;
     const struct host_sites sites = host_sites_of_order(s->order);
-    const struct host_check_listener listener = {a, HOST_AUDIT_PLACES,
-                                                 note_place};
+    const struct host_check_listener listener = {a, FAULTS_MAX, note_place};
     struct host_error failed = {0};
     (void)host_check(&sites, s->tets,
                      a->exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING,

@@ -11,13 +11,14 @@ int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
     ledger->nodes = nodes;
     ledger->piece_max = bricks;
     ledger->open = malloc((size_t)bricks + 1);
-    ledger->by = calloc((size_t)bricks + 1, sizeof *ledger->by);
+    ledger->by = malloc(((size_t)bricks + 1) * sizeof *ledger->by);
     ledger->job = calloc(nodes, sizeof *ledger->job);
     if (ledger->open == NULL || ledger->by == NULL || ledger->job == NULL) {
         host_ledger_free(ledger);
         return host_fail_memory(error, "the list of bricks");
     }
     memset(ledger->open, 0xff, bricks);
+    memset(ledger->by, 0xff, (size_t)bricks * sizeof *ledger->by);
     return 0;
 }
 

@@ -60,13 +60,22 @@ struct host_ledger {
     uint8_t *open; /* [bricks] all bits set, or none where it is committed */
     bool alone;    /* nodes hear nothing of each other: a brick is the
                       work of the node that commits it */
-    uint16_t *by;  /* [bricks] who has committed it, and ALONE */
+    uint16_t *by;  /* [bricks] the node that committed it last, and ALONE; all
+                      bits set: none has yet */
     struct host_job *job;     /* [nodes] */
     struct host_found *found; /* [runs] */
     size_t runs, runs_max;
 };
 
 #define HOST_LEDGER_ALONE UINT16_C(0x8000)
+
+/* The node that committed a brick last; the number of no node where none has.
+ */
+static inline uint32_t host_ledger_by(const struct host_ledger *ledger,
+                                      uint32_t brick)
+{
+    return ledger->by[brick] & (HOST_LEDGER_ALONE - 1u);
+}
 
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error);

@@ -1,6 +1,7 @@
 /* What is left after nodes were found at fault: ranges of bricks, each done by
  * one node alone with pages from the host, so that a wrong brick names its
- * node.  No user chooses this strategy; audit.h does. */
+ * node.  As long as there are two, a brick is not given to the node that
+ * committed it last.  No user chooses this strategy; audit.h does. */
 #include "regions.h"
 
 static void set_up(const struct host_work *work, unsigned node,
@@ -14,14 +15,34 @@ static void set_up(const struct host_work *work, unsigned node,
     }
 }
 
+/* The next range as far as it is for this node. */
+static bool next(struct host_work *work, unsigned node, struct incode_job *job)
+{
+    struct host_ledger *ledger = work->ledger;
+    uint32_t first, last, end;
+    if (!host_ledger_next(ledger, work->order, &first, &last)) {
+        return false;
+    }
+    end = first;
+    while (end < last &&
+           (work->living == 1 || host_ledger_by(ledger, end) != node)) {
+        end++;
+    }
+    ledger->cursor = end;
+    if (end > first) {
+        *job = host_regions_job(work->order, first, end);
+    }
+    return end > first;
+}
+
 const struct host_strategy host_redo = {
     .name = "redo",
     .title = "Bricks done again",
     .help = "each range of bricks by one node alone",
     .regions = host_regions_one,
     .set_up = set_up,
-    .first = host_regions_next,
-    .next = host_regions_next,
+    .first = next,
+    .next = next,
     .commit = host_regions_commit,
     .lose = host_regions_lose,
 };

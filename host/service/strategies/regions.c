@@ -70,9 +70,8 @@ bool host_regions_first(struct host_work *work, unsigned node,
     return true;
 }
 
-/* Bricks [first, last), and the box of their points. */
-static struct incode_job job_of(const struct host_order *order, uint32_t first,
-                                uint32_t last)
+struct incode_job host_regions_job(const struct host_order *order,
+                                   uint32_t first, uint32_t last)
 {
     struct incode_job job = {.first = first, .last = last};
     for (int k = 0; k < 3; k++) {
@@ -99,7 +98,7 @@ bool host_regions_next(struct host_work *work, unsigned node,
     if (!host_ledger_next(work->ledger, work->order, &first, &last)) {
         return false;
     }
-    *job = job_of(work->order, first, last);
+    *job = host_regions_job(work->order, first, last);
     return true;
 }
 

@@ -29,6 +29,10 @@ unsigned host_regions_one(unsigned nodes);
 bool host_regions_first(struct host_work *work, unsigned node,
                         struct incode_job *job);
 
+/* The job of bricks [first, last), with the box of their points. */
+struct incode_job host_regions_job(const struct host_order *order,
+                                   uint32_t first, uint32_t last);
+
 /* The next range of bricks that nobody has. */
 bool host_regions_next(struct host_work *work, unsigned node,
                        struct incode_job *job);
