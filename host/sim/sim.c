@@ -148,6 +148,21 @@ static int check_wires(const struct host_sim_run *r, struct host_error *error)
     return 0;
 }
 
+/* What the service mends is a fault all the same, where no node lies: a result
+ * that was wrong at first, or a node at fault. */
+static int check_mended(const struct host_sim_run *r, struct host_error *error)
+{
+    const struct host_service *s = &r->service;
+    bool mended =
+        s->audit.failed > 0 || s->excluded > 0 || s->strategy == &host_redo;
+    return !mended || r->plan->wanted[HOST_SIM_LIAR]
+               ? 0
+               : host_fail(error, HOST_UNVERIFIED,
+                           "host: %u checks of the result failed and %u nodes "
+                           "were excluded, although no node lies; replay it",
+                           s->audit.failed, s->excluded);
+}
+
 static int serve(struct host_sim_run *r, struct host_machine *machine,
                  struct host_error *error)
 {
@@ -178,6 +193,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
         r->outcome->work_us = r->world.now_us - start_us;
     }
     status = status != 0 ? status : check_queues(r, error);
+    status = status != 0 ? status : check_mended(r, error);
     status = status != 0 ? status : check_second_host(r, error);
     status = status != 0 ? status : host_service_wires(s, error);
     status = status != 0 ? status : check_wires(r, error);
