@@ -123,14 +123,16 @@ static void draw_bare(struct host_sim_plan *p)
     }
 }
 
-/* What is left of the cube can do the work without it.  It lies about what it
- * has to say: where one node computes, others have pages alone. */
+/* What is left of the cube can do the work without it, once more: that slow
+ * nodes with tiny memories take half an hour for.  It lies about what it has to
+ * say: where one node computes, others have pages alone. */
 static void draw_liar(struct host_sim_plan *p)
 {
     uint64_t state = sim_seed(p->seed, 91);
     unsigned others = 1u + p->wanted[HOST_SIM_DEAD_NODE] +
                       p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_IDLER];
-    if (p->nodes <= others || p->nodes > 64 ||
+    bool slow = p->wanted[HOST_SIM_TINY] && p->wanted[HOST_SIM_SLOW_NODE];
+    if (p->nodes <= others || p->nodes > 64 || slow ||
         host_sim_draw(&state, 1, 6) > 1) {
         return;
     }
