@@ -2,8 +2,9 @@
  * of what judges tetrahedra.
  *
  *     struct fixture f;
+ *     struct host_check_report r;
  *     open_set(&f, "uniform", 400, 1);
- *     assert_int_equal(check(&f, HOST_CHECK_TILING, &report), 0);
+ *     assert_int_equal(check(&f, HOST_CHECK_TILING, &r), 0);
  *     close_set(&f);
  */
 #ifndef TESTS_CHECK_WORLD_H
