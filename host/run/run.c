@@ -198,6 +198,7 @@ static void take_check(const struct host_service *service,
     result->check = audit->report;
     result->hull_facets = audit->report.hull_facets;
     result->excluded = service->excluded;
+    result->checks_failed = audit->failed;
     result->verified = status == 0 && audit->exact;
     result->time_verify_s += spent;
     result->time_triangulation_s -= spent;

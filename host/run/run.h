@@ -94,6 +94,7 @@ struct host_run_result {
     unsigned restarts, generations; /* of nodes; of the cube's wiring */
     unsigned missing_wires;         /* that were named */
     unsigned excluded;              /* nodes, as their work was wrong */
+    unsigned checks_failed;         /* of the result, which was done again */
     uint64_t candidates, candidates_histogram[24];
     uint64_t vertices, vertices_waited;
     uint64_t stars_lent, stars_borrowed,

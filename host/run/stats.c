@@ -189,6 +189,7 @@ static json_t *run_object(const struct host_run_result *r)
     put(o, "retransmitted_frames", r->retransmitted);
     put(o, "nodes_lost", r->lost);
     put(o, "nodes_excluded", r->excluded);
+    put(o, "checks_failed", r->checks_failed);
     put(o, "node_restarts", r->restarts);
     put(o, "generations", r->generations);
     put(o, "missing_wires", r->missing_wires);

@@ -219,6 +219,8 @@ triangulates() {
     found=$(stat_of "$stats" digest)
     if [ "$found" != "sha256:$digest" ]; then
         fail "$name" "digest $found, not $digest"
+    elif [ "$(stat_of "$stats" checks_failed)" != 0 ]; then
+        fail "$name" "right only when done again: $(last "$errors")"
     elif [ ! -f "$first" ]; then
         mv "$out" "$first"
         pass "$name"
