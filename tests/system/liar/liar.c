@@ -32,7 +32,7 @@ static int lie(void *context, struct node_counted *counted, uint16_t dest,
     return status;
 }
 
-static void give_up(const char *what)
+static _Noreturn void give_up(const char *what)
 {
     (void)!write(STDERR_FILENO, what, strlen(what));
     _exit(2);
