@@ -60,7 +60,9 @@ void check_fault(struct check *c, const char *subject, const char *what,
     }
     (void)pthread_mutex_lock(&c->lock);
     c->report->faults++;
-    if (c->faults_kept < c->faults_max &&
+    /* Points without a tetrahedron leave room for facets, which say more. */
+    uint64_t most = tet_count == 0 ? (c->faults_max + 1) / 2 : c->faults_max;
+    if (c->faults_kept < most &&
         (c->faults_kept < c->faults_room || make_fault_room(c))) {
         c->fault[c->faults_kept++] = f;
     }

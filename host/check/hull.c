@@ -51,8 +51,9 @@ struct check {
     struct host_hull *hull;
     const struct host_hull_listener *listener;
     bool scaled;
-    int power[3];  /* by which coordinates are scaled */
-    uint32_t *end; /* [sites + 1] of the edges of a vertex */
+    double shift[3]; /* coordinates are moved by it, */
+    int power[3];    /* then scaled */
+    uint32_t *end;   /* [sites + 1] of the edges of a vertex */
     struct edge *edge;
     uint8_t *on; /* [sites] 1: a vertex of the hull */
     uint64_t next;
@@ -73,7 +74,7 @@ static void at(const struct check *c, uint32_t vertex, double p[3])
 {
     host_site(c->hull->sites, vertex, p);
     for (int d = 0; d < 3 && c->scaled; d++) {
-        p[d] = scalbn(p[d], c->power[d]);
+        p[d] = scalbn(p[d] - c->shift[d], c->power[d]);
     }
 }
 
@@ -432,16 +433,48 @@ static void check_rays(struct check *c)
     for_all(c, c->hull->count, check_thin);
 }
 
-/* The points as large as they may be, axis by axis: exact, and no orientation
- * changes, but a body of denormals gets an inside. */
+/* Whether a - b is a double: the error of the difference is 0 (Knuth, The Art
+ * of Computer Programming 2, 4.2.2). */
+static bool is_exact_difference(double a, double b)
+{
+    double d = a - b, bb = a - d;
+    return isfinite(d) && (a - (d + bb)) + (bb - b) == 0.0;
+}
+
+/* The lowest coordinate of each axis on which all points can be moved by it
+ * exactly; else 0. */
+static void find_shift(struct check *c)
+{
+    const struct host_sites *sites = c->hull->sites;
+    double lowest[3] = {INFINITY, INFINITY, INFINITY}, p[3];
+    bool exact[3] = {true, true, true};
+    for (int pass = 0; pass < 2; pass++) {
+        for (uint64_t i = 0; i < sites->count; i++) {
+            host_site(sites, (uint32_t)i, p);
+            for (int d = 0; d < 3; d++) {
+                lowest[d] = fmin(lowest[d], p[d]);
+                exact[d] = pass == 0 ||
+                           (exact[d] && is_exact_difference(p[d], lowest[d]));
+            }
+        }
+    }
+    for (int d = 0; d < 3; d++) {
+        c->shift[d] = exact[d] && isfinite(lowest[d]) ? lowest[d] : 0.0;
+    }
+}
+
+/* The points at the origin and as large as they may be, axis by axis: exact,
+ * and no orientation changes, but a body of denormals, or one that is a few ulp
+ * thick, gets an inside. */
 static void magnify(struct check *c)
 {
     const struct host_sites *sites = c->hull->sites;
     double most[3] = {0}, p[3];
+    find_shift(c);
     for (uint64_t i = 0; i < sites->count; i++) {
         host_site(sites, (uint32_t)i, p);
         for (int d = 0; d < 3; d++) {
-            most[d] = fmax(most[d], fabs(p[d]));
+            most[d] = fmax(most[d], fabs(p[d] - c->shift[d]));
         }
     }
     for (int d = 0; d < 3; d++) {

@@ -137,6 +137,7 @@ static int run_service(const struct host_run_options *options,
     service->setup.setup.build = (uint8_t)result->build;
     service->setup.setup.shuffle_seed = options->shuffle_seed;
     service->setup.page_key = draw_key();
+    service->audit.secret = draw_key();
     int status = host_service_run(service, error);
     host_run_sum(service, result);
     /* A tetrahedron builder that was lost has taken its counts with it. */
@@ -190,10 +191,11 @@ static int order_points(const struct host_run_options *options,
 }
 
 /* What the check has found, and its time, which is not the triangulation's. */
-static void take_check(const struct host_service *service,
+static void take_check(struct host_service *service,
                        struct host_run_result *result, int status)
 {
-    const struct host_audit *audit = &service->audit;
+    struct host_audit *audit = &service->audit;
+    host_audit_free(audit); /* it may still run where the run has failed */
     double spent = 1e-6 * (double)audit->spent_us;
     result->check = audit->report;
     result->hull_facets = audit->report.hull_facets;
@@ -233,7 +235,7 @@ static int on_nodes(const struct host_run_options *options,
     service.memory_of = options->cube;
     service.patience_us = options->patience_s * UINT64_C(1000000);
     service.verifying = options->verifying;
-    service.foreign = options->cube != NULL;
+    service.foreign = options->begin != NULL; /* a cube file's, or ranks */
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);
     struct stretch stretch = begin_stretch();

@@ -1,18 +1,20 @@
 #include "audit.h"
 
 #include <limits.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/progress.h"
 #include "host/check/judge.h"
 #include "host/service/strategies/strategies.h"
 #include "notices.h"
 #include "service.h"
 
 enum {
-    SMALL = 1 << 19,     /* tetrahedra that are checked at once: in some ms */
-    FAULTS_MAX = 1 << 20 /* that the check locates: facets come last */
+    SMALL = 1 << 19,  /* tetrahedra that are checked at once: in some ms */
+    FAULTS_MAX = 4096 /* that the check locates */
 };
 
 /* --- the check, on a thread of its own ------------------------------------ */
@@ -59,22 +61,31 @@ static void redo(struct inquiry *q, uint32_t vertex)
     }
 }
 
-/* The node is at fault; what: about a tetrahedron of these vertices. */
-static void accuse(struct inquiry *q, uint32_t node, const char *what,
-                   const uint32_t v[4])
+/* The node is at fault, as printf says. */
+__attribute__((format(printf, 3, 4))) static void
+accuse_of(struct inquiry *q, uint32_t node, const char *format, ...)
 {
     struct host_audit *a = q->audit;
-    const uint32_t *row = q->s->order->row;
     if (a->guilty[node] != 0) {
         return;
     }
     a->guilty[node] = 1;
     if (q->named++ == 0) {
+        va_list arguments;
         a->first = node;
-        (void)snprintf(a->why, sizeof a->why,
-                       "%s the tetrahedron of rows %u, %u, %u and %u", what,
-                       row[v[0]], row[v[1]], row[v[2]], row[v[3]]);
+        va_start(arguments, format);
+        (void)vsnprintf(a->why, sizeof a->why, format, arguments);
+        va_end(arguments);
     }
+}
+
+/* what: about a tetrahedron of these vertices. */
+static void accuse(struct inquiry *q, uint32_t node, const char *what,
+                   const uint32_t v[4])
+{
+    const uint32_t *row = q->s->order->row;
+    accuse_of(q, node, "%s the tetrahedron of rows %u, %u, %u and %u", what,
+              row[v[0]], row[v[1]], row[v[2]], row[v[3]]);
 }
 
 static uint32_t owner(const struct inquiry *q, const uint32_t v[4])
@@ -215,15 +226,31 @@ static bool is_judged(const struct inquiry *q, const uint32_t t[4])
     return points && host_judge_tetrahedron(&q->judge, t);
 }
 
+/* A tetrahedron that is not Delaunay proves its sender wrong where that worked
+ * alone.  Else the node that found it, or the node that passed it on, is. */
+static void judge_wrong(struct inquiry *q, uint64_t tet)
+{
+    const struct host_service *s = q->s;
+    struct host_audit *a = q->audit;
+    const uint32_t *t = s->tets->v[tet];
+    uint32_t brick = owner(q, t), finder = host_ledger_finder(&s->ledger, tet);
+    doubt_brick(q, brick, "it sent, and that is not Delaunay,", t);
+    if (a->suspects[0] == '\0' &&
+        (s->ledger.by[brick] & HOST_LEDGER_ALONE) == 0) {
+        uint32_t sender = host_ledger_by(&s->ledger, brick);
+        (void)snprintf(a->suspects, sizeof a->suspects,
+                       sender == finder ? "node %u" : "node %u or node %u",
+                       finder, sender);
+    }
+}
+
 /* Tetrahedron i of those at faults. */
 static void judge_tet(struct inquiry *q, struct missing *m,
                       const uint64_t *tets, unsigned i)
 {
     const uint32_t *t = q->s->tets->v[tets[i]];
     if (!is_judged(q, t)) {
-        accuse(q, host_ledger_finder(&q->s->ledger, tets[i]),
-               "it sent, and that is not Delaunay,", t);
-        q->audit->redo[owner(q, t)] = 1;
+        judge_wrong(q, tets[i]);
         return;
     }
     for (unsigned k = 0; k < i; k++) {
@@ -232,6 +259,30 @@ static void judge_tet(struct inquiry *q, struct missing *m,
         }
     }
     look_beyond(q, m, t);
+}
+
+/* Where points have no tetrahedron at all, and one node has committed all of
+ * their bricks, it has left out their tetrahedra, or those around them. */
+static void judge_points(struct inquiry *q)
+{
+    const struct host_ledger *ledger = &q->s->ledger;
+    uint32_t by = UINT32_MAX, vertex = 0;
+    bool one = true;
+    for (unsigned p = 0; p < q->audit->places; p++) {
+        const struct host_audit_place *place = &q->audit->place[p];
+        if (place->tets > 0 || place->vertices != 1) {
+            continue;
+        }
+        vertex = place->vertex[0];
+        uint32_t brick = vertex / INCODE_BRICK_POINTS;
+        one = one && (ledger->by[brick] & HOST_LEDGER_ALONE) != 0 &&
+              (by == UINT32_MAX || by == host_ledger_by(ledger, brick));
+        by = host_ledger_by(ledger, brick);
+    }
+    if (one && by != UINT32_MAX && q->named == 0) {
+        accuse_of(q, by, "it left out all tetrahedra of row %u",
+                  q->s->order->row[vertex]);
+    }
 }
 
 static void judge_places(struct inquiry *q, struct missing *m)
@@ -250,6 +301,7 @@ static void judge_places(struct inquiry *q, struct missing *m)
         }
     }
     judge_missing(q, m);
+    judge_points(q);
 }
 
 /* --- what is to be done again --------------------------------------------- */
@@ -339,17 +391,24 @@ static void check(void *argument)
 
 /* --- what follows --------------------------------------------------------- */
 
+static bool is_exact_due(const struct host_service *s)
+{
+    return s->verifying == HOST_VERIFY_ALWAYS ||
+           (s->verifying == HOST_VERIFY_WHERE_DUE &&
+            (s->foreign || s->audit.lost_work));
+}
+
 static void begin(struct host_service *s)
 {
     struct host_audit *a = &s->audit;
-    a->exact =
-        s->verifying == HOST_VERIFY_ALWAYS ||
-        (s->verifying == HOST_VERIFY_WHERE_DUE && (s->foreign || a->lost_work));
+    a->exact = is_exact_due(s);
     a->places = 0;
+    a->suspects[0] = '\0';
     a->ended = false;
     a->why[0] = '\0';
     a->state = HOST_AUDIT_RUNS;
     a->begun_us = s->machine->now_us(s->machine->context);
+    host_progress_phase("checking", "Mtet");
     if (s->machine->virtual_time || (!a->exact && s->tets->count < SMALL)) {
         check(s);
     } else {
@@ -367,10 +426,10 @@ void host_audit_exclude(struct host_service *service, unsigned node,
                         const char *what)
 {
     struct host_service *s = service;
+    s->excluded += !s->node[node].aside;
     s->node[node].left = s->node[node].aside = true;
     s->audit.lost_work = true;
     s->blamed = node;
-    s->excluded++;
     s->loss = true;
     host_notice(s, node,
                 "%s; it is excluded, and other nodes do its work again; look "
@@ -385,7 +444,7 @@ bool host_audit_is_other(const struct host_service *service, unsigned node)
     bool other = false;
     for (unsigned i = 0; i < s->machine->nodes && !other; i++) {
         other = i != node && !s->work.lost[i] && !s->node[i].aside &&
-                (guilty == NULL || guilty[i] == 0);
+                !s->node[i].given_up && (guilty == NULL || guilty[i] == 0);
     }
     return other;
 }
@@ -401,10 +460,10 @@ static int give_up(struct host_service *s, struct host_error *error)
                          a->first, a->why);
     }
     return host_fail(error, HOST_UNVERIFIED,
-                     "check: %s; doing it again did not help, and no node "
+                     "check: %.*s; doing it again did not help, and no node "
                      "could be found at fault; please report this with the "
                      "points",
-                     a->report.text);
+                     (int)strcspn(a->report.text, "\n"), a->report.text);
 }
 
 static int begin_again(struct host_service *s, struct host_error *error)
@@ -424,9 +483,18 @@ static int begin_again(struct host_service *s, struct host_error *error)
         }
     }
     if (a->why[0] == '\0') {
-        host_notice_line(s, "the check of the result failed, and the bricks "
-                            "concerned are done again, each by one node");
+        char line[HOST_AUDIT_WHY_BYTES];
+        snprintf(line, sizeof line,
+                 "the check of the result failed%s%s; the bricks concerned are "
+                 "done again, each by one node",
+                 a->suspects[0] == '\0' ? "" : " at work of ", a->suspects);
+        host_notice_line(s, line);
     }
+    a->report.text[0] = '\0'; /* it is mended */
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        s->ledger.job[i].epoch = 0; /* nothing that comes now counts */
+    }
+    host_progress_phase("triangulating", "Mtet");
     for (uint32_t b = 0; b < s->ledger.bricks; b++) {
         if (a->redo[b] != 0) {
             host_ledger_reopen(&s->ledger, b);
@@ -462,7 +530,9 @@ int host_audit_step(struct host_service *service, bool *passed,
     }
     host_fork_join(&a->fork);
     a->spent_us += s->machine->now_us(s->machine->context) - a->begun_us;
-    if (a->error.code == 0) {
+    if (a->error.code == 0 && is_exact_due(s) && !a->exact) {
+        a->state = HOST_AUDIT_DUE; /* a node was lost meanwhile */
+    } else if (a->error.code == 0) {
         a->state = HOST_AUDIT_PASSED;
         *passed = true;
     } else if (a->error.code == HOST_UNVERIFIED) {

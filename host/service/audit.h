@@ -4,22 +4,24 @@
  * When every brick is committed, host_check (host/check/check.h) judges the
  * whole result on threads of its own, while the service goes on answering
  * links.  If the check fails, the judge says of the tetrahedra at the faults
- * which ones are wrong and which ones are missing.  A tetrahedron that is not
- * Delaunay was found by a node that the ledger knows; a missing one, or one
- * that came twice, belongs to a brick that a node committed.  That node is at
- * fault if it worked alone, or if it found the tetrahedron itself; it is
- * excluded, and every brick that it committed or has a hand in is done again by
- * others.  What nodes did together and proves nothing against one of them is
- * done again as well.  All of this goes by the strategy host_redo: each range
- * of bricks by one node alone, so that the next check can name the node.
+ * which ones are wrong, which came twice and which are missing, and the ledger
+ * says which node committed their bricks.  A node that worked alone is at
+ * fault: it is excluded, and every brick that it committed is done again by
+ * others. Where nodes worked together, a wrong brick proves nothing against one
+ * of them: the bricks concerned are done again by the strategy host_redo, each
+ * range of bricks by one node alone, so that the next check can name the node.
+ *
+ * A node is named by the source of its messages.  A node on the way that alters
+ * frames of another, and renews the link's checksum, has the other one blamed;
+ * the result is right all the same.
  *
  * A run gives up, with HOST_UNVERIFIED, when no other node is left, or when a
  * check fails although everything has been done again and no node is at fault.
  *
- * Memory: that of the check, a byte a brick and a few KB; while faults are
+ * Memory: that of the check, a byte a brick and 300 KB; while faults are
  * analysed 48 bytes a brick.  Work: that of the check; to analyse a failure,
- * one pass over the boxes of bricks for each of at most 768 tetrahedra and
- * facets.
+ * that of the judge for at most 512 tetrahedra, their facets and those beyond,
+ * and a pass over the result.
  *
  *     bool passed = false;
  *     if (host_audit_step(&service, &passed, &error) != 0)
@@ -56,6 +58,7 @@ struct host_audit_place {
 };
 
 struct host_audit {
+    uint64_t secret; /* given by the caller: random, nodes do not know it */
     enum { HOST_AUDIT_DUE, HOST_AUDIT_RUNS, HOST_AUDIT_PASSED } state;
     bool ended;       /* the thread has: atomic */
     bool exact;       /* this one checks the Delaunay property, too */
@@ -73,6 +76,7 @@ struct host_audit {
     uint8_t *guilty;                /* [nodes] 1: at fault */
     unsigned first;                 /* one of them, */
     char why[HOST_AUDIT_WHY_BYTES]; /* and the proof */
+    char suspects[40]; /* where nodes worked together; empty: not known */
 };
 
 /* Begins the check, or looks whether it has ended; *passed: the result is

@@ -82,7 +82,7 @@ void host_faults_pinged(struct host_service *service, unsigned node,
     }
 }
 
-/* Who has left has no part in it. */
+/* A node that has left has no part in it. */
 static bool all_vouch(const struct host_service *s)
 {
     for (unsigned i = 0; i < s->machine->nodes; i++) {

@@ -7,8 +7,10 @@
 #include "failure_detector.h"
 #include "faults.h"
 #include "idle_nodes.h"
+#include "host/service/strategies/strategies.h"
 #include "missing_links.h"
 #include "node/totals.h"
+#include "notices.h"
 #include "results.h"
 
 /* A message that no sound node sends: what is wrong with it, as printf. */
@@ -240,29 +242,34 @@ static int take_ready(struct host_service *s,
     return 0;
 }
 
-/* A page that `sender` gave to the reporter is not as it was made here.  The
- * sender does no more work; where that is the host itself, the page was altered
- * on its way to the reporter, or by it: then the reporter does none. */
-static void host_excluded_page(struct host_service *s, unsigned reporter,
-                               unsigned sender, uint32_t page)
+/* A page that `sender` gave to the reporter is not as it was made here.  One of
+ * the two is at fault, and nothing shows which: the user hears of both, and
+ * from now on all pages come from the host alone.  A page of the host's was
+ * altered on its way to the reporter, or by it: then the reporter is refused.
+ */
+static int doubt_page(struct host_service *s, unsigned reporter,
+                      unsigned sender, uint32_t page, struct host_error *error)
 {
-    char why[120];
-    bool by_node = sender != CUBE_HOST;
-    unsigned node = by_node ? sender : reporter;
-    if (s->work.lost[node] || s->node[node].left) {
-        return;
+    char which[32] = "a page cut short", why[120];
+    if (s->work.lost[reporter] || s->node[reporter].left) {
+        return 0;
     }
-    if (page == INCODE_NONE) {
-        snprintf(why, sizeof why, "sent node %u a page cut short", reporter);
-    } else if (by_node) {
-        snprintf(why, sizeof why, "sent node %u a wrong page %u", reporter,
-                 page);
-    } else {
+    if (page != INCODE_NONE) {
+        snprintf(which, sizeof which, "a wrong page %u", page);
+    }
+    if (sender == CUBE_HOST || s->strategy == &host_redo) {
         snprintf(why, sizeof why,
-                 "got page %u altered from the host, by itself or on the way",
-                 page);
+                 "reports %s of the host's, altered by itself or on the way",
+                 which);
+        return host_results_refuse(s, reporter, why, error);
     }
-    host_idle_exclude(s, node, why);
+    host_notice(s, sender,
+                "sent node %u %s, as that node reports; what is left is done "
+                "with pages from the host alone, look after both",
+                reporter, which);
+    host_audit_alone(s);
+    s->loss = true;
+    return 0;
 }
 
 static int take_wrong_page(struct host_service *s,
@@ -279,8 +286,7 @@ static int take_wrong_page(struct host_service *s,
         (wrong.sender != CUBE_HOST && wrong.sender >= s->machine->nodes)) {
         return unsound(message, error, "a wrong page of node %u", wrong.sender);
     }
-    host_excluded_page(s, message->source, wrong.sender, wrong.page);
-    return 0;
+    return doubt_page(s, message->source, wrong.sender, wrong.page, error);
 }
 
 /* What the strategy's roles have to say.  An error that it has set stays. */

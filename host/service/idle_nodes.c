@@ -94,10 +94,10 @@ bool host_idle_leave(struct host_service *service, unsigned node,
     return true;
 }
 
-void host_idle_exclude(struct host_service *service, unsigned node,
-                       const char *why)
+/* The same where it may have had its new start: then it is left aside. */
+static void leave_for_good(struct host_service *s, unsigned node,
+                           const char *why)
 {
-    struct host_service *s = service;
     if (!host_idle_leave(s, node, why)) {
         s->node[node].aside = true;
         s->loss = true;
@@ -125,6 +125,6 @@ void host_idle_check(struct host_service *service, uint64_t elapsed_us)
         }
         snprintf(why, sizeof why, "answers, but has done nothing for %llu s",
                  (unsigned long long)s->patience_us / 1000000);
-        host_idle_exclude(s, who, why);
+        leave_for_good(s, who, why);
     }
 }

@@ -32,8 +32,4 @@ void host_idle_check(struct host_service *service, uint64_t elapsed_us);
 bool host_idle_leave(struct host_service *service, unsigned node,
                      const char *why);
 
-/* The same, and the second time leaves it aside for the rest of the run. */
-void host_idle_exclude(struct host_service *service, unsigned node,
-                       const char *why);
-
 #endif

@@ -142,7 +142,7 @@ int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
         size_t more = runs == 0 ? 64 : 2 * runs;
         void *moved = realloc(ledger->found, more * sizeof *ledger->found);
         if (moved == NULL) {
-            return host_fail_memory(error, "the list of who found what");
+            return host_fail_memory(error, "the list of finders");
         }
         ledger->found = moved;
         ledger->runs_max = more;

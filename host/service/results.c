@@ -35,8 +35,9 @@ static bool is_different(const uint32_t v[4])
            (v[1] != v[3]) & (v[2] != v[3]);
 }
 
-/* Who owns a tetrahedron is looked up only where it is not all the same: as
- * long as none of its bricks is committed, that is at the job's borders. */
+/* Which brick owns a tetrahedron is looked up only where it is not all the
+ * same: as long as none of its bricks is committed, that is at the job's
+ * borders. */
 static bool is_sound(const struct host_service *s, const struct host_job *job,
                      const uint32_t v[4])
 {
@@ -80,32 +81,49 @@ static void describe(const struct host_service *s, const struct host_job *job,
                  : "which is not of its job");
 }
 
-/* A second time it is given up, not the run: unless it is the last. */
+/* It has a new start, where the host can give it one; else it is given up, not
+ * the run: unless it is the last. */
 int host_results_refuse(struct host_service *service, unsigned node,
                         const char *why, struct host_error *error)
 {
     struct host_service *s = service;
-    if (host_idle_leave(s, node, why)) {
+    bool can_start = s->machine->kill != NULL && !s->node[node].started_anew;
+    if (!can_start && !host_audit_is_other(s, node)) {
+        s->node[node].left = true;
+        return host_fail(
+            error, HOST_UNVERIFIED,
+            "node %u: %s%s; no other node is left to do its work; "
+            "are host and node of one version? run make",
+            node, why,
+            s->node[node].started_anew ? ", and had its new start before" : "");
+    }
+    if (can_start && host_idle_leave(s, node, why)) {
         return 0;
     }
-    if (!host_audit_is_other(s, node)) {
-        return host_fail(error, HOST_UNVERIFIED,
-                         "node %u: %s, and had its new start before; no other "
-                         "node is left to do its work; are host and node of "
-                         "one version? run make",
-                         node, why);
-    }
     char again[WHY_BYTES + 20];
-    snprintf(again, sizeof again, "%s, again", why);
+    snprintf(again, sizeof again, "%s%s", why,
+             s->node[node].started_anew ? ", again" : "");
     host_audit_exclude(s, node, again);
     return 0;
 }
 
 /* --- bounds --------------------------------------------------------------- */
 
-/* How many of the tetrahedra, or faces, are judged where a bound is passed,
- * spread over all. */
+/* How many of the tetrahedra, or faces, are judged where a bound is passed: if
+ * half of them were wrong, all of the sample would be right once in 2^64. */
 enum { SAMPLE = 64, SPILLED_A_BRICK = 1024, SPILLED_MIN = 65536 };
+
+/* An index below count that no node can foresee (xorshift: Marsaglia, Journal
+ * of Statistical Software 8, 2003). */
+static uint64_t draw(struct host_service *s, uint64_t count)
+{
+    uint64_t x = s->audit.secret | 1;
+    x ^= x << 13;
+    x ^= x >> 7;
+    x ^= x << 17;
+    s->audit.secret = x;
+    return (x >> 11) % count;
+}
 
 static int compare_rows(const void *p, const void *q)
 {
@@ -140,12 +158,12 @@ static uint32_t (*rows_of_job(const struct host_service *s,
 }
 
 /* Why rows cannot all be tetrahedra of the triangulation; NULL: most are. */
-static const char *why_too_many(const struct host_judge *judge,
+static const char *why_too_many(struct host_service *s,
+                                const struct host_judge *judge,
                                 uint32_t (*rows)[4], uint64_t count)
 {
-    uint64_t step = count / SAMPLE + 1;
-    for (uint64_t i = 0; i < count; i += step) {
-        if (!host_judge_tetrahedron(judge, rows[i])) {
+    for (unsigned i = 0; i < SAMPLE && count > 0; i++) {
+        if (!host_judge_tetrahedron(judge, rows[draw(s, count)])) {
             return "more results than its points allow, and wrong ones";
         }
     }
@@ -175,7 +193,8 @@ static int look_through_rows(struct host_service *s, unsigned node,
         return error->code;
     }
     uint32_t(*rows)[4] = rows_of_job(s, job, &count);
-    const char *why = rows == NULL ? NULL : why_too_many(&judge, rows, count);
+    const char *why =
+        rows == NULL ? NULL : why_too_many(s, &judge, rows, count);
     if (rows == NULL) {
         host_fail_memory(error, "a look at a node's results");
     }
@@ -219,12 +238,12 @@ static int compare_faces(const void *p, const void *q)
 
 /* Why faces cannot all be open ones of the node's front; NULL: most are.  A
  * face is open once in each direction; it begins with its smallest vertex. */
-static const char *why_spilled(const struct host_judge *judge,
+static const char *why_spilled(struct host_service *s,
+                               const struct host_judge *judge,
                                struct incode_face *faces, uint64_t count)
 {
-    uint64_t step = count / SAMPLE + 1;
-    for (uint64_t i = 0; i < count; i += step) {
-        if (!is_facet(judge, faces[i].v)) {
+    for (unsigned i = 0; i < SAMPLE && count > 0; i++) {
+        if (!is_facet(judge, faces[draw(s, count)].v)) {
             return "more spilled faces than its points allow, and wrong ones";
         }
     }
@@ -259,8 +278,10 @@ static int look_through_faces(struct host_service *s, unsigned node,
         return error->code;
     }
     if (host_spill_copy(&s->spill, node, &faces, &count, error) == 0) {
-        const char *why = why_spilled(&judge, faces, count);
-        n->spilled_max = 2 * n->spilled;
+        const char *why = why_spilled(s, &judge, faces, count);
+        /* Of those that are on their way back nothing is known. */
+        n->spilled_max =
+            n->spilled + (count > SPILLED_MIN ? count : SPILLED_MIN);
         if (why != NULL) {
             (void)host_results_refuse(s, node, why, error);
         }

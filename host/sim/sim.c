@@ -149,18 +149,25 @@ static int check_wires(const struct host_sim_run *r, struct host_error *error)
 }
 
 /* What the service mends is a fault all the same, where no node lies: a result
- * that was wrong at first, or a node at fault. */
+ * that was wrong at first, or a node at fault.  Where one lies, no other node
+ * may be blamed. */
 static int check_mended(const struct host_sim_run *r, struct host_error *error)
 {
     const struct host_service *s = &r->service;
+    bool lies = r->plan->wanted[HOST_SIM_LIAR];
     bool mended =
         s->audit.failed > 0 || s->excluded > 0 || s->strategy == &host_redo;
-    return !mended || r->plan->wanted[HOST_SIM_LIAR]
+    if (mended && !lies) {
+        return host_fail(error, HOST_UNVERIFIED,
+                         "host: %u checks of the result failed and %u nodes "
+                         "were excluded, although no node lies; replay it",
+                         s->audit.failed, s->excluded);
+    }
+    return s->excluded <= (lies && s->node[r->plan->liar.node].aside)
                ? 0
-               : host_fail(error, HOST_UNVERIFIED,
-                           "host: %u checks of the result failed and %u nodes "
-                           "were excluded, although no node lies; replay it",
-                           s->audit.failed, s->excluded);
+               : host_fail(error, HOST_CUBE,
+                           "host: a node was excluded that does not lie; "
+                           "replay it");
 }
 
 static int serve(struct host_sim_run *r, struct host_machine *machine,
@@ -180,6 +187,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
     s->setup.setup.build = (uint8_t)p->build;
     s->setup.setup.shuffle_seed = p->shuffle_seed;
     s->setup.page_key = sim_seed(p->seed, 90);
+    s->audit.secret = sim_seed(p->seed, 91);
     s->verifying =
         p->wanted[HOST_SIM_LIAR] ? HOST_VERIFY_ALWAYS : HOST_VERIFY_WHERE_DUE;
     host_sim_faults_prepare(r);

@@ -52,6 +52,9 @@ wrong() {
             ;;
         *) echo "exit $status: $said" ;;
     esac
+    grep -E '^incode: node [0-9]+.*; it is excluded' "$scratch/errors" |
+        grep -vE "^incode: node $1([^0-9]|\$)" |
+        sed 's/^/a node that does not lie is blamed: /'
 }
 
 # lies NODE WAY ONE-IN OPTION...: with --verify and without; one lie at least is

@@ -349,44 +349,46 @@ static void test_passed(void **unused)
     end();
 }
 
-/* Who has sent a wrong page does no more work; where that is the host, the one
- * that got it.  Who does none any more is not named again, and who had its new
- * start has none. */
+/* A wrong page of another node's puts an end to pages between nodes, and names
+ * both, as either may be at fault; one of the host's is refused. */
 static void test_wrong_pages(void **unused)
 {
     (void)unused;
     static const struct {
         struct node_wrong_page_message wrong;
-        unsigned left;
+        bool alone; /* pages come from the host alone already */
         const char *text;
     } reports[] = {
-        {{7, 1}, 1, "node 1 link 0: sent node 3 a wrong page 7"},
-        {{INCODE_NONE, 1}, 1, "node 1 link 0: sent node 3 a page cut short"},
+        {{7, 1}, false, "node 1 link 0: sent node 3 a wrong page 7, as that "},
+        {{INCODE_NONE, 1},
+         false,
+         "node 1 link 0: sent node 3 a page cut short"},
+        {{7, 1}, true, "node 3 link 1: reports a wrong page 7 of the host's, "},
         {{7, CUBE_HOST},
-         3,
-         "node 3 link 1: got page 7 altered from the host, by itself or on the "
-         "way"}};
-    const size_t count = sizeof reports / sizeof reports[0];
-    for (size_t k = 0; k < 2 * count; k++) {
-        const size_t i = k / 2;
+         false,
+         "node 3 link 1: reports a wrong page 7 of the host's, altered by "
+         "itself or on the way"}};
+    for (size_t i = 0; i < sizeof reports / sizeof reports[0]; i++) {
         struct host_error error = {0};
+        bool doubted = reports[i].wrong.sender != CUBE_HOST;
         begin();
         service.work.living = NODES;
-        service.node[reports[i].left].started_anew = k % 2 == 1;
-        for (unsigned time = 0; time < 2; time++) {
-            said[0] = '\0';
-            assert_int_equal(send(3, NODE_WRONG_PAGE, &reports[i].wrong,
-                                  sizeof reports[i].wrong, &error),
-                             0);
-            if (time == 0 &&
-                strncmp(said, reports[i].text, strlen(reports[i].text)) != 0) {
-                fail_msg("%s: not %s", said, reports[i].text);
-            }
-            assert_int_equal(said[0] == '\0', time);
+        if (reports[i].alone) {
+            host_audit_alone(&service);
+        }
+        assert_int_equal(send(3, NODE_WRONG_PAGE, &reports[i].wrong,
+                              sizeof reports[i].wrong, &error),
+                         0);
+        if (strncmp(said, reports[i].text, strlen(reports[i].text)) != 0) {
+            fail_msg("%s: not %s", said, reports[i].text);
         }
         for (unsigned n = 0; n < NODES; n++) {
-            assert_int_equal(service.node[n].aside, n == reports[i].left);
+            assert_int_equal(service.node[n].aside,
+                             n == 3 && (!doubted || reports[i].alone));
         }
+        assert_ptr_equal(service.strategy, doubted || reports[i].alone
+                                               ? &host_redo
+                                               : &host_spatial);
         assert_true(service.loss);
         end();
     }
