@@ -52,7 +52,7 @@ two='--strategy spatial --nodes 2'
     goes_by faces "$scratch/many.npy" $one --memory 640K
     goes_by both "$scratch/many.npy" $one --memory 640K --build points
     # Its ties are rounded: each bound of what is final is needed.
-    goes_by both "$scratch/decimal.xyz" $one --memory 640K --build points
+    goes_by points "$scratch/decimal.xyz" $one --memory 640K --build points
     check builds/decimal "$(stat_of "$scratch/stats.json" tetrahedra)" \
         [ "$(stat_of "$scratch/stats.json" tetrahedra)" = 118098 ]
     # They have the square of their number of tetrahedra.
