@@ -33,36 +33,17 @@ size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes)
     return bits <= bytes / 64 ? bits : 0;
 }
 
-/* The active face list takes three eighths of what the control block leaves
- * (the front of a region of 1,250,000 points, with a tenth to spare), the
- * bricks a sixteenth, page frames the rest. */
-bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
-                         const struct incode_setup *setup, size_t bytes)
+/* Faces, bricks and frames of what the control block leaves; false: too little
+ * of it is left for frames. */
+static bool divide_rest(struct incode_shares *s, struct incode_map *map,
+                        size_t bytes, size_t faces, size_t entries)
 {
-    memset(map, 0, sizeof *map);
-    s->maker = horizon_of(bytes);
     size_t horizon = incode_horizon_bytes(s->maker.boxes, s->maker.copies);
-    map->control = incode_arena_aligned(sizeof(struct incode_triangulator) +
-                                        incode_arena_bits(setup, bytes)) +
-                   horizon;
-    map->local_points = sizeof(struct incode_local_points);
-    map->tasks = (sizeof(struct incode_task) + sizeof(struct incode_search)) *
-                 INCODE_TASKS;
-    if (bytes < map->control)
-        return false;
-    size_t rest = bytes - map->control;
-    size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
-    size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
-    map->afl_faces = rest * 3 / 8 / face;
-    map->brick_entries = rest / 16 / brick;
-    if (map->afl_faces < INCODE_FACES_MIN)
-        map->afl_faces = INCODE_FACES_MIN;
-    if (map->brick_entries < INCODE_ENTRIES_MIN)
-        map->brick_entries = INCODE_ENTRIES_MIN;
-    s->front = (struct incode_front_share){(uint32_t)map->afl_faces,
-                                           (uint32_t)map->brick_entries};
+    map->afl_faces = faces;
+    map->brick_entries = entries;
+    s->front = (struct incode_front_share){(uint32_t)faces, (uint32_t)entries};
     size_t both = incode_front_bytes(&s->front);
-    map->bricks = map->brick_entries * brick;
+    map->bricks = entries * (sizeof(struct incode_touched) + sizeof(uint32_t));
     map->afl = both - map->bricks;
     size_t used = map->control + incode_arena_aligned(both);
     if (bytes < used)
@@ -72,6 +53,39 @@ bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
     map->frames = incode_maker_bytes(&s->maker) - horizon;
     map->total = used + map->frames;
     return map->frame_count >= INCODE_FRAMES_MIN;
+}
+
+/* The active face list takes three eighths of what the control block leaves
+ * (the front of a region of 1,250,000 points, with a tenth to spare), the
+ * bricks a sixteenth, page frames the rest.  Where not all pages have a frame,
+ * the list of a small set is shorter, a third of a face a point at least, and
+ * there are entries for all bricks and for what is kept free of them. */
+bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
+                         const struct incode_setup *setup, size_t bytes)
+{
+    memset(map, 0, sizeof *map);
+    s->maker = horizon_of(bytes);
+    map->control = incode_arena_aligned(sizeof(struct incode_triangulator) +
+                                        incode_arena_bits(setup, bytes)) +
+                   incode_horizon_bytes(s->maker.boxes, s->maker.copies);
+    map->local_points = sizeof(struct incode_local_points);
+    map->tasks = (sizeof(struct incode_task) + sizeof(struct incode_search)) *
+                 INCODE_TASKS;
+    if (bytes < map->control)
+        return false;
+    size_t rest = bytes - map->control, bricks = setup->bricks;
+    size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
+    size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
+    size_t faces = between(INCODE_FACES_MIN, rest * 3 / 8 / face, UINT32_MAX);
+    size_t entries = between(INCODE_ENTRIES_MIN, rest / 16 / brick, UINT32_MAX);
+    bool fits = divide_rest(s, map, bytes, faces, entries);
+    if (map->frame_count > bricks + bricks / 16)
+        return fits;
+    size_t least = bricks * INCODE_BRICK_POINTS / 3;
+    size_t all = incode_front_entries(setup->bricks);
+    faces = between(INCODE_FACES_MIN, least, faces);
+    entries = entries < all ? entries : all;
+    return divide_rest(s, map, bytes, faces, entries);
 }
 
 size_t incode_arena_min(const struct incode_setup *setup)

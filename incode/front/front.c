@@ -54,7 +54,8 @@ void incode_front_move(struct incode_front *front, void *memory,
 {
     uint32_t most = front->afl.count_max;
     INCODE_ASSERT(front->finished && share->faces >= INCODE_FACES_MIN &&
-                  share->entries >= INCODE_ENTRIES_MIN);
+                  (share->entries >= INCODE_ENTRIES_MIN ||
+                   share->entries >= incode_front_entries(front->bricks)));
     incode_afl_init(&front->afl, memory, share->faces, share->entries,
                     front->afl.pause);
     front->afl.count_max = most;

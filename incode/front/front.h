@@ -170,10 +170,16 @@ struct incode_front {
 
 /* What a front is given beside its struct. */
 struct incode_front_share {
-    uint32_t faces; /* open at a time, INCODE_FACES_MIN at least */
-    uint32_t
-        entries; /* bricks touched at a time, INCODE_ENTRIES_MIN at least */
+    uint32_t faces;   /* open at a time, INCODE_FACES_MIN at least */
+    uint32_t entries; /* bricks touched at a time, INCODE_ENTRIES_MIN at least,
+                         or what all bricks take */
 };
+
+/* Entries with which a fourth is free when all of some bricks are touched. */
+static inline uint32_t incode_front_entries(uint32_t bricks)
+{
+    return bricks + bricks / 3 + 1;
+}
 
 /* Bytes of such a share. */
 size_t incode_front_bytes(const struct incode_front_share *share);

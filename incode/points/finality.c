@@ -284,6 +284,7 @@ static bool close_stars(struct incode_insertion *n, const double p[3],
     uint32_t v = incode_complex_add(x, p, id);
     if (v == INCODE_NONE || !incode_complex_insert(x, tally, v, n->near))
         return false;
+    incode_insertion_note(n, id);
     n->vertices++;
     n->near = v;
     return true;
@@ -319,6 +320,10 @@ enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n)
         if (walker->left == 0 && n->next > first)
             return INCODE_INSERTION_WORKED;
         incode_walker_spend(walker, INCODE_INSERTION_UNITS);
+        /* No cell holds a vertex; of one that is released, that is a look at
+         * all of them. */
+        if (incode_insertion_has_noted(n, id))
+            continue;
         if (!n->closing) {
             show_point(n, p);
         } else if (!close_stars(n, p, id)) {

@@ -66,6 +66,9 @@ static void begin_job(struct incode_insertion *n, bool whole)
 {
     uint32_t bricks = n->maker->tree.bricks;
     incode_complex_clear(&n->complex);
+    if (n->inserted != NULL)
+        incode_pause_fill(&n->maker->counts.tally.pause, n->inserted, 0,
+                          bricks * sizeof *n->inserted);
     n->whole = whole;
     n->from = n->to = n->own_first;
     n->sampled = n->thorough = false;
@@ -80,13 +83,23 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
 {
     uint32_t bricks = n->maker->tree.bricks, words = (bricks + 63) / 64;
     size_t bits = words * sizeof(uint64_t), before = 2 * bits;
+    size_t known = bricks * sizeof *n->inserted;
     uint64_t points = (uint64_t)bricks * INCODE_BRICK_POINTS;
     INCODE_ASSERT(first < last && last <= bricks &&
                   bytes >= before + INCODE_INSERTION_LEAST);
+    bool whole = last - first == bricks &&
+                 points <= INCODE_COMPLEX_POINTS_MAX &&
+                 before + incode_insertion_bytes(points) <= bytes;
     n->committed = committed;
     n->touched = memory;
     n->passed = n->touched + words;
     memset(committed, 0, bits);
+    n->inserted = NULL;
+    if (!whole && known <= bytes / INCODE_INSERTION_KNOWN &&
+        before + known + INCODE_INSERTION_LEAST <= bytes) {
+        n->inserted = n->passed + words;
+        before += known;
+    }
     before += -((uintptr_t)memory + before) % ALIGNED;
     n->work = (void *)((uint8_t *)memory + before);
     before += sizeof *n->work;
@@ -95,9 +108,7 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
     n->own_first = first;
     n->own_last = last;
     n->emitted = n->squeezed = n->closed = false;
-    begin_job(n, incode_insertion_owns_all(n) &&
-                     points <= INCODE_COMPLEX_POINTS_MAX &&
-                     2 * bits + incode_insertion_bytes(points) <= bytes);
+    begin_job(n, whole);
 }
 
 /* Bytes of cells that are there, and that there is room for. */
@@ -278,6 +289,7 @@ static enum incode_insertion_step sample(struct incode_insertion *n)
         n->stage = INCODE_INSERTION_REST; /* it has taken the room */
         return INCODE_INSERTION_WORKED;
     }
+    incode_insertion_note(n, id);
     n->vertices++;
     n->near = v;
     return INCODE_INSERTION_WORKED;

@@ -30,10 +30,11 @@
 #include "rest.h"
 
 enum {
-    INCODE_INSERTION_EMITTED = 128,   /* tetrahedra at a time */
-    INCODE_INSERTION_BRICKS = 32,     /* taken in at a time, unless all fit */
-    INCODE_INSERTION_LISTED = 1024,   /* cells */
-    INCODE_INSERTION_LEAST = 40 << 10 /* bytes */
+    INCODE_INSERTION_EMITTED = 128,    /* tetrahedra at a time */
+    INCODE_INSERTION_BRICKS = 32,      /* taken in at a time, unless all fit */
+    INCODE_INSERTION_LISTED = 1024,    /* cells */
+    INCODE_INSERTION_LEAST = 40 << 10, /* bytes */
+    INCODE_INSERTION_KNOWN = 32        /* part of the memory, below */
 };
 
 enum incode_insertion_step {
@@ -57,6 +58,10 @@ struct incode_insertion {
      * be visited. */
     uint64_t *touched;
     uint64_t *passed; /* a bit a brick: it has been visited */
+    /* A word a brick, a bit a point: it has become a vertex before its turn, or
+     * is another's, and may have been released since; NULL: there is no room.
+     */
+    uint64_t *inserted;
     struct incode_insertion_work *work;
     bool whole;    /* all bricks are taken in at once */
     bool emitted;  /* something has been */
@@ -118,7 +123,9 @@ struct incode_insertion_work {
 };
 
 /* Bytes that the triangulation of so many points takes, as a rule, beside two
- * bits a brick. */
+ * bits a brick.  Where not all points are inserted at once, a word a brick
+ * comes to it, if that is no more than a part in INCODE_INSERTION_KNOWN of the
+ * memory. */
 size_t incode_insertion_bytes(uint64_t points);
 
 void incode_insertion_init(struct incode_insertion *n,

@@ -28,6 +28,9 @@ incode gen uniform 3000 -o "$scratch/uniform.npy"
 incode gen sphere 3000 -o "$scratch/sphere.npy"
 incode gen uniform 20000 -o "$scratch/many.npy"
 incode gen lines 3000 -o "$scratch/lines.npy"
+awk 'BEGIN { for (i = 0; i < 28; i++) for (j = 0; j < 28; j++)
+    for (k = 0; k < 28; k++) printf "%.1f %.1f %.1f\n", i / 10, j / 10,
+        k / 10 }' > "$scratch/decimal.xyz"
 one='--strategy sequential --nodes 1'
 two='--strategy spatial --nodes 2'
 # shellcheck disable=SC2086
@@ -48,6 +51,10 @@ two='--strategy spatial --nodes 2'
     goes_by points "$scratch/many.npy" $one --memory $large
     goes_by faces "$scratch/many.npy" $one --memory 640K
     goes_by both "$scratch/many.npy" $one --memory 640K --build points
+    # Its ties are rounded: each bound of what is final is needed.
+    goes_by points "$scratch/decimal.xyz" $one --memory 640K --build points
+    check builds/decimal "$(stat_of "$scratch/stats.json" tetrahedra)" \
+        [ "$(stat_of "$scratch/stats.json" tetrahedra)" = 118098 ]
     # They have the square of their number of tetrahedra.
     goes_by points "$scratch/lines.npy" $one
 }

@@ -1,7 +1,8 @@
 /* Work that sets of hard shapes take face by face, counted and not by the
  * clock: a lattice of a plane and one point beside it, where most regions have
  * no point off the plane at hand; coordinates of very different exponents,
- * whose spheres reach most bricks, with pages for a part of them. */
+ * whose spheres reach most bricks, with pages for a part of them.  And point by
+ * point: a plane, where few cells are known to be final by their boxes. */
 #include <math.h>
 
 #include "tests/unit/incode/solo.h"
@@ -10,8 +11,10 @@ enum {
     SIDE = 72,
     PLANE = SIDE * SIDE + 1,
     MIXED = 4000,
-    EXACT = 100,  /* orient3d that is exact, a tetrahedron */
-    REQUESTS = 20 /* of pages, a tetrahedron */
+    MORE_MIXED = 9000,
+    EXACT = 100,   /* orient3d that is exact, a tetrahedron */
+    REQUESTS = 20, /* of pages, a tetrahedron */
+    SCANS = 100    /* of all cells, by all regions */
 };
 
 static uint64_t state = 1;
@@ -36,11 +39,14 @@ static uint64_t count_by_points(const double (*xyz)[3], uint64_t points)
 
 /* A region by a node of its own, that has learned nothing of others. */
 static struct incode_statistics run(const double (*xyz)[3], uint64_t points,
-                                    uint32_t regions, uint32_t region)
+                                    uint32_t regions, uint32_t region,
+                                    size_t memory)
 {
     struct incode_statistics s;
-    struct solo solo = {
-        .index = INCODE_KD, .build = INCODE_BUILD_FACES, .regions = regions};
+    struct solo solo = {.index = INCODE_KD,
+                        .build = INCODE_BUILD_FACES,
+                        .regions = regions,
+                        .memory = memory};
     solo_open(&solo, xyz[0], points);
     solo_region(&solo, region);
     incode_triangulator_statistics(solo.t, &s);
@@ -71,12 +77,21 @@ static void plane_and_a_point(void **unused)
         uint64_t kept = 0;
         for (uint32_t r = 0; r < regions; r++) {
             struct incode_statistics s =
-                run((const double(*)[3])xyz, PLANE, regions, r);
+                run((const double(*)[3])xyz, PLANE, regions, r, 0);
             kept += s.tetrahedra_kept;
             assert_in_range(s.tally.exact_orient3d, 0,
                             EXACT * s.tetrahedra_built);
         }
         assert_int_equal(kept, all);
+    }
+}
+
+static void make_mixed(double (*xyz)[3], int points)
+{
+    for (int i = 0; i < points; i++) {
+        double scale = ldexp(1, (int)(80 * draw()) - 40);
+        for (int d = 0; d < 3; d++)
+            xyz[i][d] = (2 * draw() - 1) * scale;
     }
 }
 
@@ -86,15 +101,51 @@ static void mixed_exponents(void **unused)
 {
     static double xyz[MIXED][3];
     (void)unused;
-    for (int i = 0; i < MIXED; i++) {
-        double scale = ldexp(1, (int)(80 * draw()) - 40);
-        for (int d = 0; d < 3; d++)
-            xyz[i][d] = (2 * draw() - 1) * scale;
-    }
-    struct incode_statistics s = run((const double(*)[3])xyz, MIXED, 1, 0);
+    make_mixed(xyz, MIXED);
+    struct incode_statistics s = run((const double(*)[3])xyz, MIXED, 1, 0, 0);
     assert_int_equal(s.tetrahedra_kept,
                      count_by_points((const double(*)[3])xyz, MIXED));
     assert_in_range(s.page_requests, 0, REQUESTS * s.tetrahedra_built);
+}
+
+/* 147 pages: with what the active face list and the bricks would take of a
+ * larger set, there were 92 frames, and more than 10 requests a tetrahedron. */
+static void frames_before_faces(void **unused)
+{
+    static double xyz[MORE_MIXED][3];
+    (void)unused;
+    make_mixed(xyz, MORE_MIXED);
+    struct incode_statistics s =
+        run((const double(*)[3])xyz, MORE_MIXED, 4, 0, 376 << 10);
+    assert_in_range(s.page_requests, 0, s.tetrahedra_built);
+}
+
+/* Points of others' bricks are inserted, released, and visited again each time
+ * that memory is short: only a look at all cells would tell that no cell holds
+ * such a point. */
+static void released_vertices(void **unused)
+{
+    static double xyz[PLANE][3];
+    struct solo solo = {.index = INCODE_KD,
+                        .build = INCODE_BUILD_POINTS,
+                        .regions = 4,
+                        .memory = 320 << 10};
+    (void)unused;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        xyz[i][0] = i / SIDE;
+        xyz[i][1] = i % SIDE;
+        xyz[i][2] = 3 * xyz[i][0] + 5 * xyz[i][1];
+    }
+    xyz[SIDE * SIDE][0] = xyz[SIDE * SIDE][1] = SIDE / 2.;
+    xyz[SIDE * SIDE][2] = 10 * SIDE;
+    solo_run(&solo, xyz[0], PLANE);
+    print_message("%llu scans\n",
+                  (unsigned long long)solo.t->insertion.complex.scans);
+    assert_in_range(solo.t->insertion.complex.scans, 0, SCANS);
+    assert_int_equal(solo.by_points, solo.tets.count);
+    assert_int_equal(solo.tets.count,
+                     count_by_points((const double(*)[3])xyz, PLANE));
+    solo_close(&solo);
 }
 
 int main(void)
@@ -102,6 +153,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(plane_and_a_point),
         cmocka_unit_test(mixed_exponents),
+        cmocka_unit_test(frames_before_faces),
+        cmocka_unit_test(released_vertices),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
