@@ -10,8 +10,8 @@
 #ifndef HOST_BEGIN_H
 #define HOST_BEGIN_H
 
-/* First of all.  name: the process is listed by it, also where it was started as
- * /proc/self/exe. */
+/* First of all.  name: the process is listed by it, also where it was started
+ * as /proc/self/exe. */
 void host_begin(const char *name);
 
 #endif
