@@ -375,14 +375,20 @@ static void alter_shared(struct host_liar *l, const uint8_t *data, size_t size)
     }
 }
 
+static bool is_repeated(const double *x, uint32_t i)
+{
+    uint64_t a, b;
+    memcpy(&a, &x[i], sizeof a);
+    memcpy(&b, &x[i - 1], sizeof b);
+    return a == b;
+}
+
 /* The last point is repeated behind it. */
 static uint32_t points_of(const struct incode_brick *brick)
 {
     uint32_t last = INCODE_BRICK_POINTS - 1;
-    while (last > 0 &&
-           memcmp(&brick->x[last], &brick->x[last - 1], sizeof(double)) == 0 &&
-           memcmp(&brick->y[last], &brick->y[last - 1], sizeof(double)) == 0 &&
-           memcmp(&brick->z[last], &brick->z[last - 1], sizeof(double)) == 0) {
+    while (last > 0 && is_repeated(brick->x, last) &&
+           is_repeated(brick->y, last) && is_repeated(brick->z, last)) {
         last--;
     }
     return last + 1;

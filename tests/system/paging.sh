@@ -17,7 +17,7 @@ says() {
 }
 incode gen sphere 10000 -o "$scratch/sphere.npy"
 incode gen uniform 20000 -o "$scratch/uniform.npy"
-asks='a node holds 4[0-9] % of these points at a time, and much of the time'
+asks='a node holds 5[0-9] % of these points at a time, and much of the time'
 says told "incode: --memory 512K: $asks .*; --memory 1M would hold all of them" \
     "$scratch/sphere.npy" --memory 512K --strategy exchange
 says advice '' "$scratch/sphere.npy" --memory 1M --strategy exchange

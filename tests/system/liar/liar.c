@@ -61,7 +61,7 @@ static unsigned long read_orders(void)
         give_up("incode-node-liar: no orders beside it\n");
     }
     close(file);
-    text[size] = '\0';
+    text[size > 0 ? size : 0] = '\0';
     unsigned long node = strtoul(at, &at, 10);
     way = strtok_r(at, " \n", &at);
     while (liar.way < HOST_LIES &&

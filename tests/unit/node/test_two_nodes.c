@@ -121,8 +121,9 @@ static void note_found(const struct mail *m)
  */
 static void alter(struct mail *m)
 {
-    unsigned at = 4 + (7 * world.altered + 1) % (m->size - 4u);
     bool comes = m->type == world.alters_type && m->source == world.alters;
+    unsigned at =
+        comes && m->size > 4 ? 4 + (7 * world.altered + 1) % (m->size - 4u) : 0;
     world.pages += comes;
     if (comes && world.alters_every > 0 &&
         world.pages % world.alters_every == 0) {
