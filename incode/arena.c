@@ -33,8 +33,8 @@ size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes)
     return bits <= bytes / 64 ? bits : 0;
 }
 
-/* Faces, bricks and frames of what the control block leaves; false: too little
- * of it is left for frames. */
+/* Divides the memory beside the control block into faces, bricks and frames;
+ * false: too little of it is left for frames. */
 static bool divide_rest(struct incode_shares *s, struct incode_map *map,
                         size_t bytes, size_t faces, size_t entries)
 {
@@ -57,9 +57,9 @@ static bool divide_rest(struct incode_shares *s, struct incode_map *map,
 
 /* The active face list takes three eighths of what the control block leaves
  * (the front of a region of 1,250,000 points, with a tenth to spare), the
- * bricks a sixteenth, page frames the rest.  Where not all pages have a frame,
- * the list of a small set is shorter, a third of a face a point at least, and
- * there are entries for all bricks and for what is kept free of them. */
+ * bricks a sixteenth, page frames the rest.  If not all pages have a frame,
+ * a small set gets a shorter list, of at least a third of a face a point, and
+ * no more entries than its bricks take with the free part that they need. */
 bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
                          const struct incode_setup *setup, size_t bytes)
 {

@@ -177,8 +177,8 @@ bool incode_triangulator_has(const struct incode_triangulator *t,
 size_t incode_triangulator_copy(const struct incode_triangulator *t,
                                 uint32_t page, void *data);
 
-/* The caller's label of a page that is there or on its way, 0 at first; NULL:
- * it is neither. */
+/* The caller's label of a page that has a frame or is on its way, 0 at first;
+ * NULL: neither. */
 uint64_t *incode_triangulator_label(const struct incode_triangulator *t,
                                     uint32_t page);
 

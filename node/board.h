@@ -100,9 +100,9 @@ struct node_board {
     size_t (*log)(void *context, char *text, size_t size);
     /* Bytes that link d had no room for since the start.  NULL: not known. */
     uint32_t (*lost)(void *context, unsigned d);
-    /* Takes the place of cube_write for all that the node's role sends, and
-     * returns what that does: a test's node that alters its own messages.
-     * NULL: nothing does. */
+    /* Replaces cube_write for all messages of the node's role, with the same
+     * return values.  For tests: a node that alters its own messages.  NULL:
+     * cube_write. */
     int (*write)(void *context, struct node_counted *counted, uint16_t dest,
                  uint8_t type, const void *data, size_t size);
     /* The node's end, for the reason of enum node_reset: a fresh start, or

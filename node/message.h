@@ -196,16 +196,17 @@ struct node_page_head {
     uint32_t tag[2];
 };
 
-/* As much of it as the page has bytes. */
+/* Of data only as many bytes as the page has are sent. */
 struct node_page_message {
     struct node_page_head head;
     uint8_t data[INCODE_PAGE_BYTES];
 };
 
-/* A page that `sender` has sent is not as the host made it, or was not the
- * sender's to send: its number as it came, or INCODE_NONE.  The node has not
- * used it, and asks the host for it if it still wants it.  sender CUBE_HOST: it
- * was altered on the way from the host. */
+/* Reports a page from `sender` that is not as the host made it, or that the
+ * sender should not have sent.  page: its number as it arrived, or INCODE_NONE.
+ * The node has not used the page, and requests it from the host if it still
+ * needs it.  sender CUBE_HOST: the page was altered on the way from the host.
+ */
 struct node_wrong_page_message {
     uint32_t page;
     uint32_t sender;

@@ -65,7 +65,7 @@ int node_result_finder(struct node_result_writer *writer, uint16_t node)
     uint8_t *at = writer->buffer + writer->size;
     bool follows = node >= FINDER_FOLLOWS;
     *at = (uint8_t)(KIND_FINDER | (follows ? FINDER_FOLLOWS : node) << 2);
-    memcpy(at + 1, &node, sizeof node); /* the next record covers it, or not */
+    memcpy(at + 1, &node, sizeof node); /* bytes past size do not count */
     writer->size += follows ? 1 + sizeof node : 1;
     writer->finder = node;
     return 1;
@@ -240,7 +240,7 @@ enum node_result_event node_result_read(struct node_result_reader *reader,
             }
         }
         if (*count > 0 && (*reader->next & 3) == KIND_FINDER) {
-            return NODE_RESULT_ROWS; /* those before it have another */
+            return NODE_RESULT_ROWS; /* they have the finder before */
         }
         size_t size = read_slowly(reader, rows[*count], &rows_read, &committed);
         if (size == 0) {

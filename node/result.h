@@ -8,9 +8,10 @@
  * vertex before it in the batch (0 at its start), a tetrahedron's three apexes
  * from the star's vertex, a committed brick from the brick of that vertex.
  *
- * A finder is the node that has found the tetrahedra from there on, up to the
- * next finder or the end of the batch; at the start it is the sender.  Its
- * number stands in bits 2-7 of the head; 63 there: in two bytes behind it.
+ * A finder record names the node that found the tetrahedra after it, up to the
+ * next finder record or the end of the batch.  Tetrahedra before the first one
+ * were found by the sender.  The node's number is in bits 2-7 of the head; 63
+ * there means that it is in the two bytes behind.
  *
  * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
  * read whatever its bytes are, without reading past its end.
@@ -40,7 +41,7 @@ struct node_result_writer {
     uint8_t *buffer;
     size_t size, size_max; /* bytes written; most that may be written */
     uint32_t vertex;
-    uint16_t finder; /* of what is written next */
+    uint16_t finder; /* of the tetrahedra written next */
 };
 
 /* buffer: size_max + NODE_RESULT_SLACK bytes; sender: the node whose batch it
@@ -48,8 +49,8 @@ struct node_result_writer {
 void node_result_begin(struct node_result_writer *writer, uint8_t *buffer,
                        size_t size_max, uint16_t sender);
 
-/* What is written next was found by that node.  Returns 1, or 0 where a
- * tetrahedron might not fit behind it. */
+/* The tetrahedra written next were found by `node`.  Returns 1, or 0 if a
+ * tetrahedron might not fit behind the record. */
 int node_result_finder(struct node_result_writer *writer, uint16_t node);
 
 /* Writes as many of the star's tetrahedra (vertex, apexes[i]) as are sure to

@@ -87,8 +87,8 @@ static uint32_t ways_to_all(const struct cube *cube, unsigned source)
     return self == source ? ways : ways | (uint32_t)1 << LOCAL;
 }
 
-/* The one link by which messages of that source come here: the host's number,
- * or another node's, counts by no other. */
+/* The one link on which messages of that source arrive here.  A message of that
+ * source on any other link is dropped. */
 static unsigned way_from(const struct cube *cube, unsigned source)
 {
     unsigned self = cube->config.self;
@@ -104,8 +104,8 @@ static unsigned way_from(const struct cube *cube, unsigned source)
     return routes_way_from(&cube->routes, self, source);
 }
 
-/* Of a message that came in by link d; 0: it has lost its way, or its source is
- * not behind that link. */
+/* For a message that arrived on link d; 0: it has lost its way, or its source
+ * is not behind that link. */
 static uint32_t ways_of(const struct cube *cube, unsigned d, unsigned source,
                         unsigned dest)
 {

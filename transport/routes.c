@@ -240,9 +240,9 @@ static unsigned highest_bit(unsigned bits)
     return 31u - (unsigned)__builtin_clz(bits);
 }
 
-/* E-cube changes the bits of an address in ascending order, and so do binomial
- * trees: the last that was changed is the highest in which the two differ.  On
- * the tree the way from a node is the way to it. */
+/* E-cube and binomial trees change the bits of an address in ascending order,
+ * so the bit changed last is the highest bit in which the two numbers differ.
+ * Off the e-cube path, the link from a node is the tree's link to that node. */
 unsigned routes_way_from(const struct routes *routes, unsigned self,
                          unsigned source)
 {

@@ -55,9 +55,9 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring);
  * dest != self. */
 unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest);
 
-/* The link of `self` by which comes what `source` has sent to `self`, to a node
- * behind it, or to all; or ROUTES_NONE: no way leads here from there.
- * source != self. */
+/* The link of `self` on which messages of `source` arrive, whether they are for
+ * `self`, for a node behind it, or for all.  ROUTES_NONE: no path leads from
+ * `source` to `self`.  source != self. */
 unsigned routes_way_from(const struct routes *routes, unsigned self,
                          unsigned source);
 

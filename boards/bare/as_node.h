@@ -41,8 +41,8 @@ struct bare_node {
 /* Time, UARTs and guard. */
 void bare_node_begin(struct bare_node *bare, bool loader);
 
-/* Before the start is counted in the flash, by the first program that runs:
- * waits where there were too many of late (budget.h). */
+/* Waits if there were too many starts of late (budget.h).  Called by the first
+ * program that runs, before the start is counted in the flash. */
 void bare_node_may_start(struct bare_node *bare);
 
 /* What a node needs of its board, and what is known of this start: to be called
@@ -56,7 +56,8 @@ void bare_node_tell_start(const struct bare_node *bare);
  * places. */
 void bare_node_learn(struct bare_node *bare);
 
-/* Between two steps: answers who has typed a line, and counts the time. */
+/* Between two steps: answers a line typed at the console, and counts the time.
+ */
 void bare_node_console(struct bare_node *bare);
 
 /* Sleeps until a link has something to do, at most so long. */

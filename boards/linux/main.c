@@ -299,7 +299,8 @@ int main(int argc, char **argv)
     static struct linux_board linux_board;
     static struct node_board board;
     const char *why = NULL;
-    /* Begun anew, it would have the name of the file in /proc. */
+    /* Without this a restarted node would be listed by its file's name in
+     * /proc. */
     (void)prctl(PR_SET_NAME, "incode-node");
     if (argc == 2 && linux_options_answer(argv[1])) {
         return 0;

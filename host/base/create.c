@@ -25,7 +25,7 @@ FILE *host_create_over(const char *path)
     return file;
 }
 
-/* NULL: the folder is this user's alone. */
+/* Why not to use the folder; NULL: it is this user's alone. */
 static const char *fault_of(int folder)
 {
     struct stat about;
@@ -71,7 +71,7 @@ int host_folder_open_all(const char *path, struct host_error *error)
     memcpy(above, path, length + 1);
     for (char *p = above + 1; (p = strchr(p, '/')) != NULL; p++) {
         *p = '\0';
-        (void)mkdir(above, PRIVATE); /* one that fails shows in the last */
+        (void)mkdir(above, PRIVATE); /* a failure shows at the last folder */
         *p = '/';
     }
     return host_folder_open(path, error);
@@ -86,7 +86,7 @@ static bool is_own_file(int fd)
 
 int host_folder_file(int folder, const char *name, int flags)
 {
-    /* Whoever waits at the other end of a pipe is not waited for. */
+    /* Opening a pipe must not wait for a program at its other end. */
     int fd = openat(folder, name, flags | SAFE | O_NONBLOCK, 0600);
     if (fd >= 0 && !is_own_file(fd)) {
         (void)close(fd);

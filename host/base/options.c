@@ -139,8 +139,8 @@ static int refuse(const struct table *t, char **argv, struct host_error *error)
     return refuse_letter(t, argv[0], word, optopt, error);
 }
 
-/* README.md as make install has put it beside this program's folder; false:
- * this program is not installed. */
+/* The path of README.md as make install has put it; false: this program is not
+ * installed. */
 static bool find_readme(char path[PATH_MAX])
 {
     static const char readme[] = "/../share/doc/incode/README.md";
@@ -159,7 +159,7 @@ static bool find_readme(char path[PATH_MAX])
 
 static char *(*filter_of_table)(int key, const char *text, void *input);
 
-/* As argp asks for it: names the document where it is. */
+/* A filter of argp's help text: gives the path of README.md. */
 static char *name_readme(int key, const char *text, void *input)
 {
     static const char name[] = "README.md";

@@ -21,8 +21,8 @@ enum { HOST_OPTIONS_MAX = 96 }; /* rows of a table, groups and end included */
  * what the parser of `argp` finds as state->input.  That parser tells its own
  * errors with host_fail and returns 0; of --help it hears nothing but what is
  * asked of it.  Not 0: the command ends now with error->code.  --help, -h and
- * --version end the program themselves; where --help says README.md, that is
- * the installed one, by its path, if this program is installed. */
+ * --version end the program themselves.  If this program is installed, --help
+ * names README.md by the path of the installed one. */
 int host_options_parse(const struct argp *argp, int argc, char **argv,
                        unsigned flags, void *input, struct host_error *error);
 

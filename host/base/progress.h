@@ -24,8 +24,8 @@
 /* wanted: false for quiet. */
 void host_progress_begin(bool wanted);
 
-/* The same where standard error is no terminal, as a line of its own every
- * three seconds. */
+/* The same if standard error is no terminal: a line of progress every three
+ * seconds. */
 void host_progress_begin_anywhere(void);
 
 /* What is done from now on, shown at once.  unit: of a million of what is

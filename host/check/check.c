@@ -6,9 +6,9 @@
  * number of times that this boundary winds round the place.  If it is one
  * closed surface, convex at every edge and wound once, it bounds a convex body,
  * winds once round every place inside and not at all round one outside.  So the
- * tetrahedra tile that body.  As none covers another, each facet inside is on
- * one of either side: they meet facet to facet.  Every point is a vertex, so
- * the body is the convex hull of the points.
+ * tetrahedra tile that body.  As none overlaps another, each facet inside has
+ * one tetrahedron on either side: they meet facet to facet.  Every point is a
+ * vertex, so the body is the convex hull of the points.
  *
  * A tiling whose every inner facet has no vertex of one side inside the sphere
  * of the other is the Delaunay triangulation (Delaunay 1934): lifted, it is a
@@ -27,7 +27,7 @@
 #include "judge.h"
 #include "parts.h"
 
-enum { NAMED_MAX = 8 }; /* offences in the report's text */
+enum { NAMED_MAX = 8 }; /* faults in the report's text */
 
 /* --- Faults ----------------------------------------------------------- */
 
@@ -60,7 +60,8 @@ void check_fault(struct check *c, const char *subject, const char *what,
     }
     (void)pthread_mutex_lock(&c->lock);
     c->report->faults++;
-    /* Points without a tetrahedron leave room for facets, which say more. */
+    /* Half of the slots are kept for faults at facets, which say more than
+     * points without a tetrahedron. */
     uint64_t most = tet_count == 0 ? (c->faults_max + 1) / 2 : c->faults_max;
     if (c->faults_kept < most &&
         (c->faults_kept < c->faults_room || make_fault_room(c))) {
@@ -78,7 +79,7 @@ void check_fail(struct check *c, const struct host_error *error)
     (void)pthread_mutex_unlock(&c->lock);
 }
 
-/* The row that the user knows a vertex by. */
+/* The row of the input that a vertex stands for. */
 static unsigned row_of(const struct check *c, uint32_t vertex)
 {
     const struct host_order *order = c->sites->order;
@@ -144,8 +145,8 @@ struct beyond {
     struct host_judge judge;
 };
 
-/* Facets of the boundary with a point beyond them are not of the hull: there
- * tetrahedra are missing, or wrong. */
+/* A facet of the boundary with a point beyond it is not on the hull: a
+ * tetrahedron there is missing or wrong. */
 static void find_beyond(void *context, unsigned number)
 {
     (void)number;

@@ -5,15 +5,16 @@
  * the facets that no second tetrahedron meets form one closed surface, wound
  * once and convex at every edge.  Then every place of the convex hull lies in
  * one tetrahedron, and tetrahedra meet facet to facet (see check.c).  Facets
- * are summed at their vertices by hashes of a random key, so that nobody who
- * does not know the key can make a wrong result pass; a wrong result passes
- * with a probability below 2^-60.
- * Delaunay: besides, no vertex lies inside the sphere of a neighbour under the
- * tie rule; then this is the one Delaunay triangulation.  No hash is involved.
+ * are summed at their vertices by hashes under a random key: without the key, a
+ * wrong result cannot be made to pass, and any wrong result passes with a
+ * probability below 2^-60.
+ * Delaunay: in addition, no vertex lies inside the sphere of a neighbour under
+ * the tie rule.  Then this is the one Delaunay triangulation.  This depth pairs
+ * all facets one by one, and relies on no hash.
  *
- * Memory: 8 (T + 1) + 1 bytes a vertex number on T <= 4 threads, besides 8 a
- * tetrahedron for the Delaunay depth (tiling: 12 for each tetrahedron with
- * three vertices on the hull), and 80 a facet of the hull.  Work: O(n) on all
+ * Memory: on T <= 4 threads 8 (T + 1) + 1 bytes a vertex number; 80 a facet of
+ * the hull; and 8 a tetrahedron for the Delaunay depth, or for tiling 12 for
+ * each tetrahedron with three vertices on the hull.  Work: O(n) on all
  * threads for vertices of bounded degree.  The tetrahedra stay as they are.
  *
  *     struct host_sites sites = host_sites_of_order(&order);
@@ -67,15 +68,14 @@ static inline void host_site(const struct host_sites *sites, uint32_t v,
 
 enum host_check_depth { HOST_CHECK_TILING, HOST_CHECK_DELAUNAY };
 
-/* Where an offence is.  Called from the calling thread when all are found, for
- * `faults_max` of them at most; the report counts all.  tets: the tetrahedra
- * that meet there (indices into tets->v, 0 to 2); vertices: 0 to 5 of the
- * place, those of the tetrahedra at a facet included.
+/* Receives the faults: called on the calling thread when all are found, for at
+ * most `faults_max` of them; the report counts all.  tets: the 0 to 2
+ * tetrahedra that meet at the fault (indices into tets->v).  vertices: 0 to 5
+ * at the fault, with those of the tetrahedra at a facet.
  *
- * Where a tetrahedron of the true triangulation is missing, each of its
- * vertices is named, unless tetrahedra are whole all around that vertex (then
- * they tile, and the Delaunay depth names those whose spheres are not empty).
- */
+ * If a tetrahedron of the true triangulation is missing, each of its vertices
+ * is named, unless the tetrahedra around that vertex are complete.  (Then they
+ * tile, and the Delaunay depth names those whose spheres are not empty.) */
 struct host_check_listener {
     void *context;
     uint64_t faults_max;
@@ -83,14 +83,13 @@ struct host_check_listener {
                   const uint32_t *vertices, int count, const char *what);
 };
 
-/* What was counted, and the first offences, one a line, by rows of the
- * input. */
+/* The counts, and the first faults, one a line, by rows of the input. */
 struct host_check_report {
     uint64_t points;   /* vertex numbers that stand for points */
     uint64_t distinct; /* vertices that there should be */
     uint64_t tetrahedra, hull_facets, hull_vertices;
     uint64_t paired; /* tetrahedra whose facets were paired one by one */
-    uint64_t faults; /* offences found */
+    uint64_t faults; /* found in all */
     char text[2048]; /* the first eight of them, a line each */
 };
 

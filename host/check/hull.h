@@ -1,10 +1,11 @@
 /* Whether facets are the surface of a convex body, each part of it covered
  * once: exact.
  *
- * Two facets at each edge, from opposite sides, no dent at any of them, Euler
- * characteristic 2, and seen from a point inside every facet faces away and one
- * alone lies in a chosen direction.  That is the check of Mehlhorn and others
- * (Computational Geometry 12:85-103, 1999): locally convex, and wound once.
+ * The facets must have Euler characteristic 2.  At each edge two facets must
+ * meet, of opposite orientation, without a dent.  Seen from a point inside,
+ * every facet must face away, and a ray in a chosen direction must cross one
+ * facet only.  This is the check of Mehlhorn and others (Computational Geometry
+ * 12:85-103, 1999): locally convex, and wound once.
  *
  * Memory: 40 bytes a facet, 5 a vertex number.  Work: O(f + vertex numbers), on
  * all threads; about 500 ns a facet.
@@ -24,8 +25,8 @@ struct host_hull_facet {
     uint32_t corner;
 };
 
-/* What host_hull_check finds wrong, called once an offence, from any thread,
- * with 0 to 2 tetrahedra and 0 to 3 vertices. */
+/* Receives the faults that host_hull_check finds: called once for each, on any
+ * thread, with 0 to 2 tetrahedra and 0 to 3 vertices. */
 struct host_hull_listener {
     void *context;
     void (*fault)(void *context, const uint64_t *tets, int tet_count,
@@ -43,8 +44,8 @@ struct host_hull {
 int host_hull_add(struct host_hull *hull, uint64_t tet, uint32_t corner,
                   struct host_error *error);
 
-/* Checks the facets; their tetrahedra must be positive.  Any others may only
- * serve to find a point inside. */
+/* Checks the facets; their tetrahedra must be positive.  Other tetrahedra are
+ * used only to find a point inside. */
 int host_hull_check(struct host_hull *hull,
                     const struct host_hull_listener *listener,
                     struct host_error *error);

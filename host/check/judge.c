@@ -8,8 +8,8 @@
 
 enum { GROUP = INCODE_BRICK_POINTS }; /* bricks a group, points a brick */
 
-/* Every bound below is a sum of at most 64 roundings of its terms' sizes; and
- * what underflows is less than `least` altogether. */
+/* The error of every bound below is at most 64 roundings of its terms' sizes,
+ * and `least` for all underflows together. */
 static const double rounding = 64 * 0x1p-53, least = 1e-290;
 
 /* --- Boxes ------------------------------------------------------------ */
@@ -66,7 +66,7 @@ void host_judge_free(struct host_judge *judge)
     *judge = (struct host_judge){0};
 }
 
-/* --- What is asked ---------------------------------------------------- */
+/* --- The query ---------------------------------------------------- */
 
 /* A half-space n . X > 0, and a ball volume |X|^2 < g . X inside it, where X =
  * x - a; each coefficient with the sum of the sizes of its terms. */
@@ -76,7 +76,7 @@ struct query {
     double at[4][3];
     double n[3], n_size[3];
     double g[3], g_size[3], volume, volume_size;
-    bool ball;  /* the ball is wanted, and known */
+    bool ball;  /* points in the ball are wanted, and it is known */
     bool half;  /* points beyond the facet are wanted */
     bool any;   /* the first hit ends the search */
     bool found; /* a point inside the ball or half-space */
@@ -146,8 +146,8 @@ static inline double lowest_of(double volume, double g, double lo, double hi)
     return low < mid ? low : mid;
 }
 
-/* Which of n <= GROUP boxes from `first` on may hold a point that is wanted:
- * whatever leaves the range of doubles may. */
+/* Which of n <= GROUP boxes from `first` on may hold a point that is wanted; a
+ * box whose bound leaves the range of doubles may. */
 static void mark_boxes(const struct query *q, uint64_t first, uint64_t n,
                        uint8_t *may)
 {
@@ -228,7 +228,7 @@ static void try_group(struct query *q, uint64_t group)
     }
 }
 
-/* The bricks of the query's own vertices first: what they hold makes the ball
+/* The bricks of the query's own vertices come first: their points make the ball
  * small. */
 static void search(struct query *q)
 {

@@ -18,8 +18,8 @@
 
 #include "check.h"
 
-/* Boxes lo[3], hi[3] of bricks, and of 64 bricks each, as arrays for each
- * coordinate.  A judge may be asked from several threads at once. */
+/* Boxes lo[3], hi[3] of bricks, and of groups of 64 bricks, an array for each
+ * coordinate.  Several threads may use a judge at once. */
 struct host_judge {
     struct host_sites sites;
     double *side[6]; /* [bricks + groups] each: lo x y z, hi x y z */
@@ -35,9 +35,9 @@ void host_judge_free(struct host_judge *judge);
 bool host_judge_tetrahedron(const struct host_judge *judge,
                             const uint32_t t[4]);
 
-/* The vertex whose tetrahedron with facet f is Delaunay if any is, on the
- * positive side of f (orient3d(f0, f1, f2, apex) > 0), or INCODE_NONE: no point
- * is there, and f lies on the hull. */
+/* The apex for facet f on its positive side (orient3d(f0, f1, f2, apex) > 0):
+ * if f has a Delaunay tetrahedron there, it is the one with this vertex.
+ * INCODE_NONE: no point is on that side, and f lies on the hull. */
 uint32_t host_judge_apex(const struct host_judge *judge, const uint32_t f[3]);
 
 /* Whether any point lies on the positive side of f. */

@@ -1,5 +1,5 @@
-/* What the parts of the check share: the tetrahedra cut into ranges, one a
- * thread, what is known of vertices, and the faults found.
+/* Data that the parts of the check share: ranges of tetrahedra, one a thread,
+ * marks and sums of vertices, and the faults found.
  *
  * Memory: that of the check.  Work: none of its own.
  *
@@ -26,8 +26,8 @@ enum {
  * candidates: those with a facet that may belong to the hull. */
 struct check_part {
     uint64_t first, last;
-    uint64_t *sum;  /* [count] of a vertex: of hashes, bit 0 set: it is used */
-    uint32_t *list; /* less `first` */
+    uint64_t *sum;  /* [count] of a vertex's hashes; bit 0: it is used */
+    uint32_t *list; /* of candidates, less `first` */
     uint64_t listed;
     uint32_t *end;   /* [count + 1] of the entries of a vertex, see twins.c */
     uint32_t *entry; /* less `first` */
@@ -49,8 +49,8 @@ struct check {
     struct check_part part[CHECK_PARTS_MAX];
     uint64_t key[2];
     uint64_t *mark; /* [count] keyed value of a vertex; 0: it is none */
-    uint8_t *hot;   /* [count] 1: its facets do not cancel */
-    uint64_t *bad;  /* a bit a tetrahedron: it is left out */
+    uint8_t *hot;   /* [count] 1: the vertex's facets do not cancel */
+    uint64_t *bad;  /* a bit a tetrahedron: left out of the check */
     bool any_bad, any_unused;
     struct host_hull hull;
     uint64_t next;        /* first vertex or facet that no thread has taken */
@@ -60,12 +60,12 @@ struct check {
     struct host_error *error;
 };
 
-/* From any thread.  Tetrahedra and vertices are copied. */
+/* Notes a fault, on any thread.  Tetrahedra and vertices are copied. */
 void check_fault(struct check *c, const char *subject, const char *what,
                  const uint64_t *tets, int tet_count, const uint32_t *vertices,
                  int count);
 
-/* The first error stands. */
+/* Notes an error, unless there is one. */
 void check_fail(struct check *c, const struct host_error *error);
 
 static inline bool check_is_bad(const struct check *c, uint64_t tet)
@@ -73,7 +73,8 @@ static inline bool check_is_bad(const struct check *c, uint64_t tet)
     return c->any_bad && (c->bad[tet / 64] >> tet % 64 & 1) != 0;
 }
 
-/* The first of the next `turn` items of `total`; total where there are none. */
+/* Takes the next `turn` items of `total`: the first of them; `total` if none
+ * are left. */
 static inline uint64_t check_take(struct check *c, uint64_t turn,
                                   uint64_t total)
 {
@@ -86,12 +87,12 @@ static inline uint64_t check_end(uint64_t first, uint64_t turn, uint64_t total)
     return total - first < turn ? total : first + turn;
 }
 
-/* sums.c: leaves out tetrahedra that are not positive, finds unused vertices,
- * and which vertices are hot. */
+/* sums.c: leaves out tetrahedra that are not positive, and finds the vertices
+ * that are unused or hot. */
 int check_sums(struct check *c);
 
 /* twins.c: pairs the facets of all tetrahedra, or of those that are listed, and
- * adds what is left to the hull. */
+ * adds the facets without a twin to the hull. */
 int check_twins(struct check *c);
 
 #endif

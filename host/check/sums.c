@@ -1,16 +1,16 @@
 /* Each tetrahedron by itself, and the sums of facets at vertices.
  *
- * A facet has a hash: of its three vertices' marks, which are words that a
- * random key makes of vertex numbers; positive where the facet, seen from
- * outside its tetrahedron, has them in an even order, else negative.  So the
- * two sides of a facet cancel, and at a vertex inside a triangulation the sum
- * is 0.  It is taken modulo 2^63.
+ * Each vertex has a mark, a word made of its number and a random key.  The hash
+ * of a facet is made of its three vertices' marks.  It is positive if the
+ * facet, seen from outside its tetrahedron, has its vertices in an even order,
+ * else negative.  So the two sides of a facet cancel, and at a vertex inside a
+ * triangulation the sum is 0.  Sums are taken modulo 2^63.
  *
- * How a wrong result may be missed: only if some facet that does not cancel has
- * a vertex whose sum is 0 all the same.  Without the key hashes are as random
- * words, and a sum of them that does not cancel, with factors below 2^k, is 0
- * once in 2^(63 - k): for three vertices, and the few facets at one place that
- * factors stand for, less than once in 2^60. */
+ * A wrong result is missed only if a facet that does not cancel has a vertex
+ * whose sum is 0 all the same.  Without the key, hashes are as good as random
+ * words.  A sum of such words with factors below 2^k, not all 0, is 0 once in
+ * 2^(63 - k).  The factors count the tetrahedra at one facet, which are few; so
+ * for three vertices that is less than once in 2^60. */
 #include <stdbool.h>
 #include <string.h>
 
@@ -201,7 +201,7 @@ static inline int64_t facet_hash(int64_t a, int64_t b, int64_t c)
     return (int64_t)x;
 }
 
-/* odd: 0 or -1, which turns the sign. */
+/* odd: 0, or -1 to change the sign. */
 static inline int64_t signed_hash(int64_t hash, int64_t odd)
 {
     return (int64_t)((uint64_t)(hash ^ odd) - (uint64_t)odd);

@@ -3,8 +3,8 @@
  * facets of a tetrahedron but one have its lowest vertex.  At a vertex, a small
  * hash table holds the facets that wait for their twin.
  *
- * Without a fault every facet is on either side of two tetrahedra, or of one:
- * those belong to the boundary. */
+ * Without a fault every facet has a tetrahedron on either side, or on one side
+ * only: then it belongs to the boundary. */
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -191,8 +191,8 @@ static uint64_t pack(uint64_t tet, uint32_t corner, uint32_t side)
     return tet << 3 | corner << 1 | side;
 }
 
-/* Of a facet that belongs to two tetrahedra on one side, or to more than two:
- * the tetrahedra. */
+/* Reports a facet that belongs to two tetrahedra on one side, or to more than
+ * two. */
 static void facet_fault(struct walk *w, uint64_t facet, uint64_t other,
                         const char *what)
 {
@@ -247,7 +247,7 @@ static void add_facet(struct walk *w, uint32_t x, uint32_t y, uint64_t tet,
  * where p is its second vertex. */
 static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet)
 {
-    /* [corner opposite][place of p]: the others, in order seen from outside */
+    /* [corner opposite][index of p]: the others, in order seen from outside */
     static const uint8_t after[4][4][2] = {{{0, 0}, {2, 3}, {3, 1}, {1, 2}},
                                            {{3, 2}, {0, 0}, {0, 3}, {2, 0}},
                                            {{1, 3}, {3, 0}, {0, 0}, {0, 1}},

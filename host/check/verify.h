@@ -11,9 +11,9 @@
 #include "check.h"
 #include "host/mesh/points.h"
 
-/* Whether tets are the Delaunay triangulation of points under the tie rule; a
- * duplicated point stands for its lowest row.  0, HOST_UNVERIFIED or another
- * code. */
+/* Whether tets are the Delaunay triangulation of points under the tie rule; of
+ * equal points only the lowest row counts.  0: they are; HOST_UNVERIFIED: they
+ * are not; another code: the check could not be done. */
 int host_verify(const struct host_points *points,
                 const struct host_tetrahedra *tets,
                 struct host_check_report *report, struct host_error *error);

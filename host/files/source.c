@@ -13,25 +13,25 @@
 #include "host/base/progress.h"
 
 enum {
-    ALWAYS = 16 << 20,     /* may be held, however little memory is left */
-    PLAIN_SHARE = 2,       /* of the memory available, for a file as it is, */
-    PACKED_SHARE = 4,      /* for what unpacks to nobody knows how much */
-    WINDOW = 1 << 20,      /* of a file that is unpacked piece by piece, */
-    WINDOW_MAX = 16 << 20, /* also where it has long lines */
+    ALWAYS = 16 << 20,     /* bytes that a file may always take */
+    PLAIN_SHARE = 2,       /* of the available memory for a plain file, */
+    PACKED_SHARE = 4,      /* and for a packed one, held whole */
+    WINDOW = 1 << 20,      /* of a file that is unpacked piece by piece */
+    WINDOW_MAX = 16 << 20, /* the same, with long lines */
     PACKED_BYTES = 1 << 16
 };
 
 #define DAMAGED                                                                \
     "the packed data is damaged; test it with gzip -t and get it again"
 
-/* A packed file, as far as it is unpacked. */
+/* The state of unpacking a file. */
 struct host_feed {
-    int file;       /* -1: what z has is all */
-    uint64_t size;  /* of a plain file; 0: not known */
-    uint64_t taken; /* bytes of it so far */
-    size_t most;    /* that may be held of it; 0: not looked up yet */
+    int file;       /* -1: z has all packed bytes */
+    uint64_t size;  /* packed; 0: not known */
+    uint64_t taken; /* packed bytes read so far */
+    size_t most;    /* unpacked bytes that may be held; 0: not yet known */
     z_stream z;
-    bool between, ended; /* behind a member, behind the last */
+    bool between, ended; /* after a member, after the last */
     struct host_error fault;
     uint8_t *window;
     size_t capacity;
@@ -50,8 +50,8 @@ int host_source_fail(const struct host_source *source, struct host_error *error,
     return host_fail(error, HOST_INPUT, "%s: %s", source->path, what);
 }
 
-/* To how many bytes it may grow, now that it is to have so many: looked up
- * once, and not for what never matters.  `share`: of what is available. */
+/* How many bytes a file may take that needs `bytes` now.  The available memory
+ * is looked up once, and only for a large file; share: the part of it. */
 static size_t most_bytes(size_t *most, size_t bytes, size_t held,
                          unsigned share)
 {
@@ -187,7 +187,7 @@ static bool fault(struct host_feed *feed, const char *path, const char *what)
     return false;
 }
 
-/* Whether there are packed bytes. */
+/* Whether there are packed bytes left. */
 static bool take_packed(struct host_feed *feed, const char *path)
 {
     ssize_t n = 0;
@@ -209,8 +209,8 @@ static bool take_packed(struct host_feed *feed, const char *path)
     return n > 0;
 }
 
-/* Behind a member: whether another one follows, and not the end, before which a
- * tape or a disk may have put zeros. */
+/* After a member: whether another one follows.  Else the file ends here,
+ * perhaps after zeros with which a tape or a disk has filled it up. */
 static bool begins_another(struct host_feed *feed, const char *path)
 {
     bool padded = false;
@@ -225,7 +225,7 @@ static bool begins_another(struct host_feed *feed, const char *path)
                                    : inflateReset(&feed->z) == Z_OK);
 }
 
-/* Unpacks at most `room` bytes.  0: it is at its end, or has a fault. */
+/* Unpacks at most `room` bytes.  0: the file has ended, or has a fault. */
 static size_t unpack(struct host_feed *feed, const char *path, uint8_t *to,
                      size_t room)
 {
@@ -250,7 +250,7 @@ static size_t unpack(struct host_feed *feed, const char *path, uint8_t *to,
     return room - feed->z.avail_out;
 }
 
-/* Puts more behind what is kept, in a window of at most so many bytes. */
+/* Appends unpacked bytes to those kept, in a window of at most `most` bytes. */
 static bool move_window(const struct host_source *source, const uint8_t **at,
                         const uint8_t **end, size_t most)
 {
@@ -314,8 +314,8 @@ int host_source_fault(const struct host_source *source,
     return error->code;
 }
 
-/* The bytes that the last member of a file says that it has, modulo 2^32: as
- * many or more are to be held. */
+/* The size, modulo 2^32, that the last member of a file claims to unpack to: at
+ * least as many bytes are to be held. */
 static int check_end(const struct host_source *source, struct host_error *error)
 {
     struct host_feed *feed = source->feed;
@@ -349,7 +349,7 @@ int host_source_hold(struct host_source *source, struct host_error *error)
 
 /* --- opening -------------------------------------------------------------- */
 
-/* Takes the file over, or the bytes. */
+/* Takes over the file, or the bytes. */
 static int begin_unpacking(struct host_source *source, int file,
                            struct host_error *error)
 {
@@ -376,7 +376,7 @@ static int begin_unpacking(struct host_source *source, int file,
     }
     source->feed = feed;
     const uint8_t *at = feed->window, *end = at;
-    /* Full, for headers are taken from it, unless the file is shorter. */
+    /* The first window is filled, as readers take headers from it. */
     for (bool more = take_packed(feed, source->path); more;) {
         more = (size_t)(end - at) < WINDOW &&
                move_window(source, &at, &end, WINDOW);

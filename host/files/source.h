@@ -1,11 +1,10 @@
 /* A file as bytes in memory: whole, or, where it is packed, as a window over
  * what it unpacks to.
  *
- * Memory: a file as it is, at most half of what is available when reading
- * begins, for the points need the rest; of a packed one a window of 1 MiB, of
- * 16 where it has long lines; or, where a format needs all of it at once, at
- * most a quarter of what is available; or 16 MiB, if that is more.  Work: one
- * pass.
+ * Memory: for a plain file, at most half of the memory available when reading
+ * begins, as the points need the rest.  For a packed file a window of 1 MiB, or
+ * 16 MiB if it has long lines; if the format needs the whole file, at most a
+ * quarter of the available memory.  16 MiB are always allowed.  Work: one pass.
  *
  *     struct host_source source;
  *     if (host_source_open(&source, "a.xyz.gz", true, &error) != 0)
@@ -29,40 +28,41 @@ struct host_source {
     size_t bytes;
     void *owned; /* what close gives back, `capacity` bytes */
     size_t capacity;
-    size_t most;            /* that it may grow to; 0: not looked up yet */
-    size_t bound;           /* of what its caller takes; 0: none */
-    struct host_feed *feed; /* NULL: data has all of it; else the beginning */
+    size_t most;            /* bytes that it may take; 0: not yet known */
+    size_t bound;           /* most bytes that its caller takes; 0: none */
+    struct host_feed *feed; /* NULL: data is whole; else a beginning */
     const char *what;
 };
 
 /* Whether a name ends in .gz, in letters of either case. */
 bool host_is_packed(const char *path);
 
-/* Opens it ("-": standard input).  One that is told to be packed has its
- * beginning in `data`; another one is there whole.  A missing, unreadable,
- * empty or damaged file, or one too large for the memory: HOST_INPUT. */
+/* Opens it ("-": standard input).  `data` has the beginning of a packed file,
+ * or all of a plain one.  A missing, unreadable, empty or damaged file, or one
+ * too large for the memory: HOST_INPUT. */
 int host_source_begin(struct host_source *source, const char *path, bool packed,
                       struct host_error *error);
 
-/* Has the rest of it in `data` as well; closes it where that fails. */
+/* Reads the rest of it into `data`; closes it if that fails. */
 int host_source_hold(struct host_source *source, struct host_error *error);
 
-/* Both. */
+/* host_source_begin and host_source_hold. */
 int host_source_open(struct host_source *source, const char *path, bool packed,
                      struct host_error *error);
 
-/* Of the window of a packed file: keeps what is from *at to *end, at first a
- * part of `data`, puts more behind it, and says where both are now.  False:
- * there is no more, or a fault, which host_source_fault tells. */
+/* Moves the window over a packed file: keeps the bytes from *at to *end (at
+ * first a part of `data`), appends more, and sets *at and *end to where they
+ * are now. False: the file has ended, or has a fault, which host_source_fault
+ * reports. */
 bool host_source_more(const struct host_source *source, const uint8_t **at,
                       const uint8_t **end);
 
-/* The same with all of the rest: 0, or HOST_INPUT where it is too large. */
+/* The same with all of the rest: 0, or HOST_INPUT if it is too large. */
 int host_source_all(const struct host_source *source, const uint8_t **at,
                     const uint8_t **end, struct host_error *error);
 
-/* What was wrong with a packed file, in the place of what a reader made of its
- * early end; returns error->code. */
+/* If a packed file had a fault, reports it in place of the reader's error,
+ * which its early end has caused.  Returns error->code. */
 int host_source_fault(const struct host_source *source,
                       struct host_error *error);
 
@@ -72,7 +72,7 @@ int host_source_open_bounded(struct host_source *source, const char *path,
                              size_t most, const char *what,
                              struct host_error *error);
 
-/* Begins with bytes of the caller, which are packed if `path` ends in .gz. */
+/* The same for bytes of the caller, which are packed if `path` ends in .gz. */
 int host_source_wrap(struct host_source *source, const char *path,
                      const void *data, size_t bytes, struct host_error *error);
 

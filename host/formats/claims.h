@@ -1,7 +1,7 @@
-/* Which files a command reads and which it will write, so that none is written
- * over that it reads, and none is written twice.  Two names are one file where
- * device and inode are the same, links followed; or, of a file that is not
- * there yet, where its directory and its last name are, links followed as well.
+/* Which files a command reads and which it will write, so that it writes over
+ * no file that it reads, and writes no file twice.  Two names are one file if
+ * they have the same device and inode, links followed.  For a file that does
+ * not exist yet, the directory and the last name are compared, links followed.
  *
  * Memory: a name a file.  Work: a stat a file, and a comparison with each.
  *

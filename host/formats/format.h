@@ -2,10 +2,10 @@
  * it, and what reads and writes points and tetrahedra in it.  A new format is a
  * file of this room that defines one, host_format_NAME, and a row of formats.c.
  *
- * A reader takes bytes in memory; of a packed file, those that are there at
- * first, and then what host_source_more adds, if its format says that it takes
- * pieces. Whatever the bytes, it returns; sizes that a file claims are checked
- * against its length before anything is reserved.
+ * A reader takes bytes in memory.  For a packed file it takes the beginning,
+ * and then what host_source_more adds, if its format sets `pieces`; else all of
+ * it. It returns whatever the bytes are.  Sizes that a file claims are checked
+ * against its length before memory is reserved.
  *
  * Memory: a reader's, what it appends; a writer's, none.  Work: one pass.
  *
@@ -40,8 +40,8 @@ typedef void host_points_writer(struct host_output *out,
                                 const struct host_points *points);
 
 /* tets: sorted, vertices = rows of points.  beside: the outputs of the format's
- * `beside`, in that order; NULL: none of them is wanted, nor
- * is one whose file is below 0.  0, or an error. */
+ * `beside`, in that order.  NULL: none is wanted; an output
+ * whose file is below 0 is not wanted either.  0, or an error. */
 typedef int host_tetrahedra_writer(struct host_output *out,
                                    struct host_output *beside,
                                    const struct host_points *points,

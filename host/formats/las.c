@@ -74,8 +74,8 @@ static int cut_short(const struct host_source *source, const struct las *las,
                      (unsigned long long)las->count);
 }
 
-/* Whether all records are within the file, as far as that is known, and behind
- * the header. */
+/* Whether all records are behind the header, and within the file as far as its
+ * size is known. */
 static int check_bounds(const struct host_source *source, const struct las *las,
                         struct host_error *error)
 {
@@ -126,7 +126,7 @@ static int skip_signature(const struct host_source *source, struct las *las,
     return 0;
 }
 
-/* Goes on by so many bytes; false where the file ends before. */
+/* Skips so many bytes; false if the file ends before. */
 static bool skip(const struct host_source *source, uint64_t bytes,
                  const uint8_t **at, const uint8_t **end)
 {

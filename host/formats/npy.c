@@ -125,9 +125,9 @@ typedef int taker(const struct host_source *source, const struct npy *npy,
                   const uint8_t *from, uint64_t rows, struct host_mesh *mesh,
                   struct host_error *error);
 
-/* All rows, as many at a time as are there.  A file that is there whole has
- * just these; of another one that shows at the end.  Columns behind one another
- * are taken from all of them. */
+/* Takes all rows, as many at a time as are in the window.  A file that is held
+ * whole has been checked to have just these rows; for another file the end
+ * shows it.  Fortran's order needs the whole file. */
 static int take_rows(const struct host_source *source, const struct npy *npy,
                      taker *take, struct host_mesh *mesh,
                      struct host_error *error)

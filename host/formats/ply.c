@@ -118,7 +118,7 @@ static int read_header(struct ply *ply, struct host_error *error)
                            "the header has no end_header; get the file whole");
         }
         if (host_scan_take(&ply->scan, "end_header")) {
-            if (ply->coding != TEXT) { /* no lines follow, which are long */
+            if (ply->coding != TEXT) { /* the rest has no lines */
                 ply->scan.source = NULL;
             }
             host_scan_next_line(&ply->scan);

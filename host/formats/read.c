@@ -52,8 +52,8 @@ static int check_finite(const char *path, const struct host_points *points,
     return 0;
 }
 
-/* Whether it is text whose lines end in CR alone: one comes before the first
- * LF, and not right before it. */
+/* Whether it is text whose lines end in CR alone: the first CR is before the
+ * first LF, and not right before it. */
 static bool ends_in_cr(const struct host_source *source)
 {
     const uint8_t *data = source->data, *end = data + source->bytes;
@@ -67,9 +67,9 @@ static bool ends_in_cr(const struct host_source *source)
            memchr(data, '\0', source->bytes) == NULL;
 }
 
-/* Such ends become those that readers know, in the file's own bytes or, where
- * these are the caller's, in a copy.  A packed file is held whole where it has
- * such ends, or where its format needs that. */
+/* Replaces such CRs by LFs, in the file's own bytes or, if the bytes are the
+ * caller's, in a copy.  A packed file is held whole if its lines end so, or if
+ * its format needs that. */
 static int mend_line_ends(struct host_source *source,
                           const struct host_format *format,
                           struct host_error *error)

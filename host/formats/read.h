@@ -25,7 +25,7 @@ int host_points_read(const char *path, struct host_points *points,
 int host_points_read_as(const char *path, const char *format,
                         struct host_points *points, struct host_error *error);
 
-/* Says on standard error, once, what reading has taken for granted: a line of
+/* Notes on standard error, once, what the reader has assumed: a first line of
  * names, columns passed over. */
 void host_points_note(const char *path, const struct host_points *points);
 

@@ -51,9 +51,9 @@ static int wrong_columns(struct host_scan *s, int columns, enum next next,
 
 /* --- decimal commas ------------------------------------------------------- */
 
-/* What stands between two numbers of a line, for the eye that looks for decimal
- * commas: those that are alone, before a digit; and before a 0 and a digit, as
- * no coordinate begins that is a whole number. */
+/* What is between two numbers of a line, to find decimal commas.  DECIMAL: a
+ * comma alone, before a digit.  ZERO: before a 0 and another digit, with which
+ * no whole number begins. */
 enum { COMMA_NONE = 1, COMMA_DECIMAL = 2, COMMA_ZERO = 4 };
 
 static bool is_digit(char c)
@@ -77,9 +77,9 @@ static unsigned commas_between(const char *from, const char *to,
 /* Commas of a line of more than three numbers. */
 enum commas { COMMAS_PART, COMMAS_DOUBTFUL, COMMAS_DECIMAL };
 
-/* Of a line whose first is between two digits: `1,2,3,4` tells nothing, and
- * `1,5, 2,5, 3` is three numbers.  Anything but whole numbers tells that commas
- * part them. */
+/* For a line whose first comma is between two digits.  `1,2,3,4` may be either;
+ * `1,5, 2,5, 3` is three numbers.  If a number is not whole, commas separate
+ * columns. */
 static enum commas commas_of(const char *at, const char *end)
 {
     unsigned alone = 0, other = 0;
@@ -104,8 +104,8 @@ static enum commas commas_of(const char *at, const char *end)
                                       : COMMAS_PART;
 }
 
-/* Of a line that begins with the number at `line`, more than three of them:
- * what is between the first ones is `seen`. */
+/* Checks a line of more than three numbers, the first of them at `line`; seen:
+ * what is between the first three. */
 static int check_commas(struct host_scan *s, const char *line, unsigned seen,
                         struct host_points *points, struct host_error *error)
 {
@@ -206,20 +206,21 @@ void host_put_line(struct host_output *out, const char *before, uint64_t number,
 
 enum { DOUBLE_BYTES = 40, DIGITS = 17 };
 
-/* The doubles whose shortest decimals are found in 128 bits, integers apart. */
+/* Doubles, besides integers, whose shortest decimals 128 bits can find. */
 static const double fast_least = 1e-5, fast_most = 1e15;
 
-/* What reads back as a double, times a power of ten: all whole numbers from
- * least to most.  It is itself `at` and a fraction. */
+/* The decimals that read back as a double, times a power of ten: all whole
+ * numbers from least to most.  The double itself is `at` and a fraction. */
 struct decimals {
     uint64_t least, most, at;
     enum { PART_NONE, PART_BELOW_HALF, PART_HALF, PART_ABOVE_HALF } part;
     int places; /* the power of ten */
 };
 
-/* value = m 2^-s, of which what lies within half a unit of m reads back: from
+/* value = m 2^-s.  A decimal within half a unit of m reads back as value: from
  * P - T / 2 to P + T / 2, for P = m T and T a power of ten, in units of 2^-s,
- * and with both ends where m is even.  Below a power of two it is half of that.
+ * both ends included if m is even.  Below a power of two half of that
+ * reads back.
  * With `places` such that 10^16 <= P 2^-s < 10^18, T is at most 10^22 and at
  * least 100, and P below 2^127. */
 static struct decimals decimals_of(double value)
@@ -289,9 +290,9 @@ static size_t print_fixed(char *text, bool negative, uint64_t n, int places)
     return sizeof digits - at;
 }
 
-/* By trial, which needs no more than 17 digits; of normal numbers fewer than 15
- * are 15 with zeros behind them.  Some powers of two have 17 where 16 that are
- * not the nearest would do. */
+/* By trial, with at most 17 digits.  Normal numbers are tried from 15 digits
+ * on, as a shorter decimal is one of 15 digits that ends in zeros.  Some powers
+ * of two get 17 digits where 16 that are not the nearest would do. */
 static size_t print_rare(char *text, double value)
 {
     int n = 0, digits = fabs(value) < DBL_MIN ? 1 : DBL_DIG;

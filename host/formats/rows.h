@@ -13,10 +13,11 @@
 #include "format.h"
 #include "scan.h"
 
-/* Appends the point on the line at hand, and goes to the end of that: its first
- * three columns, whatever those behind them hold.  Fewer are HOST_INPUT; so are
- * columns parted by commas that look like decimal ones; where that cannot be
- * told, points->doubtful is set.  In a .csv none of the three is empty. */
+/* Appends the point in the first three columns of the current line, whatever is
+ * in later columns, and goes to the end of the line.  Fewer columns are
+ * HOST_INPUT.  So are columns separated by commas that look like decimal ones;
+ * if they may be either, points->doubtful is set.  In a .csv none of the three
+ * columns may be empty. */
 int host_take_point(struct host_scan *s, bool is_csv,
                     struct host_points *points, struct host_error *error);
 
@@ -33,9 +34,9 @@ int host_take_section_end(struct host_scan *s, struct host_error *error);
 void host_put_line(struct host_output *out, const char *before, uint64_t number,
                    const char *after);
 
-/* x, y and z, blanks between them; -0.0 as 0.0.  Of the numbers that read back
- * as the same double it is the one with the fewest digits, and of these the
- * nearest; 17 digits at most. */
+/* x, y and z, with blanks between them; -0.0 as 0.0.  Each is the decimal with
+ * the fewest digits that reads back as the same double, and the nearest of
+ * these; at most 17 digits. */
 void host_put_xyz(struct host_output *out, const double *xyz);
 
 /* n numbers, each plus base and with a blank before it. */

@@ -17,7 +17,7 @@ struct host_scan host_scan_start(const char *path, const void *data,
     return s;
 }
 
-/* Until the line at hand is whole, or the file has ended. */
+/* Unpacks until the current line is whole, or the file has ended. */
 static void fill(struct host_scan *s)
 {
     const uint8_t *at = (const uint8_t *)s->at, *end = (const uint8_t *)s->end;
@@ -32,7 +32,7 @@ static void fill(struct host_scan *s)
     s->end = (const char *)end;
     s->whole = last == NULL ? s->end : last + 1;
     if (last == NULL) {
-        s->source = NULL; /* there is no more */
+        s->source = NULL; /* the file has ended */
     }
 }
 

@@ -22,21 +22,21 @@ struct host_scan {
     const char *path;
     const char *start, *at, *end;
     uint64_t lines_before; /* of the file, where this is a part of it */
-    /* Of a file that is unpacked line by line; else NULL. */
+    /* A file that is unpacked line by line; else NULL. */
     const struct host_source *source;
-    const char *whole; /* then: where the last line begins, which may go on */
+    const char *whole; /* then: start of the last line, perhaps cut off */
 };
 
-/* Over all of a file.  Where it is packed, what was behind `at` moves whenever
- * a line is left. */
+/* Scans all of a file.  If it is packed, the bytes from `at` on move whenever a
+ * line is left. */
 struct host_scan host_scan_source(const struct host_source *source);
 
 /* A byte order mark at the start is skipped. */
 struct host_scan host_scan_start(const char *path, const void *data,
                                  size_t bytes);
 
-/* Skips blanks, commas and semicolons within the line; true where something
- * follows before its end or a comment (# or //). */
+/* Skips blanks, commas and semicolons within the line; true if anything follows
+ * before its end or a comment (# or //). */
 bool host_scan_more(struct host_scan *s);
 
 /* Whether a comment begins at `at`, which is before `end`. */

@@ -7,7 +7,7 @@
 #include "formats.h"
 #include "host/base/progress.h"
 
-/* Why nothing is written in the format that `path` has not. */
+/* Reports that the extension of `path` names no format to write. */
 static int refuse(const char *path, const char *what, enum host_use use,
                   struct host_error *error)
 {

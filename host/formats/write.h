@@ -32,15 +32,15 @@ int host_points_write_as(const char *path, const char *format,
                          const struct host_points *points,
                          struct host_error *error);
 
-/* Writes the tetrahedra (sorted, vertices = rows of points), and what belongs
- * beside them; "-" as above.  `input` is the file of the points, or NULL: if it
- * is what would be beside them, it stays as it is. */
+/* Writes the tetrahedra (sorted, vertices = rows of points), and the files that
+ * belong beside them; "-" as above.  input: the file of the points, or NULL; it
+ * is never written, even if it is one of the files beside them. */
 int host_write(const char *path, const char *input,
                const struct host_points *points,
                const struct host_tetrahedra *tets, struct host_error *error);
 
-/* Whether `name`, which belongs beside an output, is `input` and of the same
- * format, and so has the points already.  input: NULL is none. */
+/* Whether `name`, a file beside an output, is `input` in the same format, so
+ * that it has the points already.  input: NULL is none. */
 bool host_write_leaves(const char *input, const char *name);
 
 /* 0 where `path` has an extension that host_write knows, else HOST_USAGE with

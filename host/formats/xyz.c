@@ -38,7 +38,7 @@ static int read_csv(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error)
 {
     int status = read_text(source, true, mesh->points, error);
-    mesh->points->named = false; /* as a .csv may well have it */
+    mesh->points->named = false; /* in a .csv, names are usual */
     return status;
 }
 

@@ -118,7 +118,7 @@ bool host_holder_of(struct host_holder *holder, int file)
 /* --- whether a process has a wire open -------------------------------------
  */
 
-/* That the process is still the one that took the place. */
+/* Whether the process still has the user that took the meeting place. */
 static bool is_of_user(const struct host_holder *holder)
 {
     char text[2048];
@@ -138,7 +138,7 @@ static bool is_device(int file, const char *path)
            device.st_rdev == open_file.st_rdev;
 }
 
-/* The process may have called it by a path from where it is. */
+/* The process may have opened the socket by a path relative to its folder. */
 static bool is_called(pid_t pid, const struct sockaddr_un *peer,
                       const char *path)
 {
@@ -194,8 +194,8 @@ static bool is_wire(pid_t pid, int file, const char *wire)
                                          : is_at(&peer.any, path);
 }
 
-/* Looks at each of its open files, by a copy, which the kernel gives to root.
- */
+/* Checks each open file of the process by a copy, which the kernel gives to
+ * root. */
 static bool has_open(const struct host_holder *holder, const char *wire)
 {
     char path[64];

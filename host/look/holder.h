@@ -33,20 +33,22 @@ struct host_holder {
     int64_t since_s;   /* of the epoch, when it began; 0: not known */
 };
 
-/* False: nobody, or this process, or one that is not to be believed. */
+/* The program that is using a wire.  False: none, this process, or one that is
+ * not believed. */
 bool host_holder_find(struct host_holder *holder, const char *wire);
 
 /* "incode run bunny.xyz --cube lab.cube, process 4711 of alice, since 19:02" */
 const char *host_holder_text(const struct host_holder *holder, char *text,
                              size_t size);
 
-/* For look.h and offer.h: the meeting place of a wire, and who is at the other
- * end of a socket there. */
+/* For look.h and offer.h: the meeting place of a wire, and the process at the
+ * other end of a socket there. */
 socklen_t host_holder_address(const char *wire, struct sockaddr_un *address);
 bool host_holder_of(struct host_holder *holder, int file);
 
-/* Anybody may take a meeting place: whether it is of this user, or of root; or,
- * for root, who may look at all, of a process that has that wire open. */
+/* Any user may take a meeting place.  A holder is believed if it belongs to
+ * this user or to root.  Root also believes another user's process that has the
+ * wire open. */
 bool host_holder_believed(const struct host_holder *holder, const char *wire);
 
 #endif

@@ -158,7 +158,7 @@ int host_look_open(struct host_look *look, const char *wire,
                          "with a host elsewhere?",
                          wire);
     }
-    /* Another's word on a cube is not to be taken for the cube's. */
+    /* Another user's program could invent what it says of the cube. */
     if (!host_holder_believed(&look->holder, wire)) {
         return host_fail(error, HOST_CUBE, "%s %s",
                          host_holder_text(&look->holder, text, sizeof text),

@@ -1,26 +1,27 @@
-/* A look at a cube that another program of this machine has: whoever holds its
- * wires, a run, a console, a transfer, can be found by the name of the host's
- * first wire.  Who finds a wire in use learns who has it; the same user's
- * programs, four at once, may also ask what its nodes answer, and touch
- * nothing.
+/* Watches a cube that another program of this machine is using: a run, a
+ * console or a transfer.  That program is found by the name of the host's first
+ * wire.  A command that finds a wire in use learns which program is using it.
+ * Programs of the same user, or of root, up to four at once, may also request
+ * the nodes' answers; they change nothing.
  *
- * The meeting place is an abstract socket: it needs no file, is gone with its
- * process however that ends, and is seen by other users, to whom the kernel
- * vouches for who listens.  No one but root and its own user is answered, and
- * no one else is believed: root believes another user's process that has the
- * wire open.
+ * The meeting place is an abstract socket: it needs no file, and is gone with
+ * its process however that ends.  Other users see it, and the kernel tells them
+ * whose process listens.  The program answers only root and its own user.  A
+ * watcher believes only root and its own user; root also believes another
+ * user's process that has the wire open.
  *
  * A line of JSON each.  Unasked, first: {"incode": VERSION, "protocol":
  * NODE_PROTOCOL, "nodes": N, "dimension": D, "serial_baud": B}, or {"error":
  * "WHAT; NEXT"}.  Then {"ask": WHAT, "nodes": SET} is
  * answered by {"ask": WHAT, "committed": bricks, "bricks": of so many,
  * "tetrahedra": so far, "answers": {"0": HEX, ..}}: what each node answered to
- * that question of node/questions.h, byte for byte; who has not answered in two
- * seconds is left out.  WHAT: "who", "links", "top", "memory", "totals", "log".
+ * that question of node/questions.h, byte for byte; a node that has not
+ * answered in two seconds is left out.  WHAT: "who", "links", "top", "memory",
+ * "totals", "log".
  *
- * Memory: a KB for each who looks, and an answer of up to 2.1 KB a node.  Work:
- * a system call every 50 ms where nobody looks; else a message to each node
- * that is asked for, and its answer.
+ * Memory: a KB for each watcher, and an answer of up to 2.1 KB a node.  Work: a
+ * system call every 50 ms; with a watcher also a message to each node asked
+ * for, and its answer.
  *
  *     struct host_look look;
  *     if (host_look_open(&look, "serial:/dev/ttyUSB0", &error) != 0 ||

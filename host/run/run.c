@@ -113,7 +113,7 @@ static uint64_t at_least(uint64_t count, uint64_t least)
     return count > least ? count : least;
 }
 
-/* Nobody has to guess it: page_check.h. */
+/* It need not be secret from nodes: page_check.h. */
 static uint64_t draw_key(void)
 {
     uint64_t key;
@@ -190,12 +190,13 @@ static int order_points(const struct host_run_options *options,
     return status;
 }
 
-/* What the check has found, and its time, which is not the triangulation's. */
+/* What the check has found, and its time, which is no part of the
+ * triangulation's. */
 static void take_check(struct host_service *service,
                        struct host_run_result *result, int status)
 {
     struct host_audit *audit = &service->audit;
-    host_audit_free(audit); /* it may still run where the run has failed */
+    host_audit_free(audit); /* if the run failed, the check may still run */
     double spent = 1e-6 * (double)audit->spent_us;
     result->check = audit->report;
     result->hull_facets = audit->report.hull_facets;
@@ -235,7 +236,7 @@ static int on_nodes(const struct host_run_options *options,
     service.memory_of = options->cube;
     service.patience_us = options->patience_s * UINT64_C(1000000);
     service.verifying = options->verifying;
-    service.foreign = options->begin != NULL; /* a cube file's, or ranks */
+    service.foreign = options->begin != NULL; /* nodes of a cube file */
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);
     struct stretch stretch = begin_stretch();
@@ -381,8 +382,8 @@ void host_run_clean(const struct host_run_options *options, pid_t writer)
     }
 }
 
-/* Whose .node beside an .ele stays as it is: that of the points, if its name
- * tells its format. */
+/* The file of the points, if its name tells its format: such a .node beside an
+ * .ele is not written again. */
 static const char *points_file(const struct host_run_options *options)
 {
     return options->format == NULL ? options->input : NULL;
@@ -516,7 +517,8 @@ static int run_on(const struct host_run_options *options,
     return status;
 }
 
-/* Says what is not as somebody may think, before time is spent on it. */
+/* Refuses points that are likely a mistake, and notes what the user may not
+ * expect, before the run takes time. */
 static int look_at_points(const struct host_run_options *options,
                           const struct host_points *points,
                           struct host_error *error)
@@ -524,9 +526,9 @@ static int look_at_points(const struct host_run_options *options,
     char list[HOST_FORMAT_LIST_MAX];
     if (points->count == 3 && points->wide) {
         return host_fail(error, HOST_INPUT,
-                         "%s: 3 rows of more than 3 numbers, of which each "
-                         "would be a point; give a row a point, which is the "
-                         "transpose",
+                         "%s: 3 rows of more than 3 numbers, each of which "
+                         "would be a point; save the transpose, with one row "
+                         "for each point",
                          options->input);
     }
     if (options->quiet) {

@@ -51,8 +51,8 @@ struct host_run_options {
     const char *stats;   /* a file for the statistics, or NULL */
     enum host_verifying verifying;
     bool quiet, table, map;
-    bool explain;            /* why `auto` chose what it chose */
-    bool progress, anywhere; /* on a terminal; without one, too */
+    bool explain;            /* print why `auto` chose the strategy */
+    bool progress, anywhere; /* on a terminal; also without one */
     /* For tests. */
     unsigned window;
     uint64_t shuffle_seed;
@@ -93,8 +93,8 @@ struct host_run_result {
     unsigned lost;                  /* nodes that the run had to do without */
     unsigned restarts, generations; /* of nodes; of the cube's wiring */
     unsigned missing_wires;         /* that were named */
-    unsigned excluded;              /* nodes, as their work was wrong */
-    unsigned checks_failed;         /* of the result, which was done again */
+    unsigned excluded;              /* nodes whose work was wrong */
+    unsigned checks_failed;         /* of the result, in part done again */
     uint64_t candidates, candidates_histogram[24];
     uint64_t vertices, vertices_waited;
     uint64_t stars_lent, stars_borrowed,
@@ -103,7 +103,7 @@ struct host_run_result {
     struct host_node_report node[HOST_NODES_MAX];
     bool limited;            /* the kernel held the nodes to their memory */
     const char *memory_held; /* see boards.h; NULL: nothing to say */
-    bool verified;           /* exactly */
+    bool verified;           /* the exact check was made */
     struct host_check_report check;
 };
 

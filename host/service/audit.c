@@ -13,7 +13,7 @@
 #include "service.h"
 
 enum {
-    SMALL = 1 << 19,  /* tetrahedra that are checked at once: in some ms */
+    SMALL = 1 << 19,  /* tetrahedra that are checked in a few ms */
     FAULTS_MAX = 4096 /* that the check locates */
 };
 
@@ -61,7 +61,7 @@ static void redo(struct inquiry *q, uint32_t vertex)
     }
 }
 
-/* The node is at fault, as printf says. */
+/* The node is at fault; the reason is as of printf. */
 __attribute__((format(printf, 3, 4))) static void
 accuse_of(struct inquiry *q, uint32_t node, const char *format, ...)
 {
@@ -93,8 +93,8 @@ static uint32_t owner(const struct inquiry *q, const uint32_t v[4])
     return host_ledger_owner(&q->s->ledger, q->s->order, v);
 }
 
-/* Something is wrong with the work on a brick: with that of the node that
- * committed it, where it worked alone. */
+/* The work on a brick is wrong.  If the node that committed the brick worked
+ * alone, that node is at fault. */
 static void doubt_brick(struct inquiry *q, uint32_t brick, const char *what,
                         const uint32_t v[4])
 {
@@ -143,8 +143,9 @@ static bool same_vertices(const uint32_t v[4], const uint32_t w[4])
 
 /* --- what is missing ------------------------------------------------------ */
 
-/* Right tetrahedra beyond facets of right ones at faults, that may be missing:
- * a table by hash, so that one pass over the result tells which are there. */
+/* Tetrahedra of the triangulation that may be missing in the result: they share
+ * a facet with a right tetrahedron at a fault.  A hash table, so that one pass
+ * over the result finds which of them it has. */
 enum { MISSING_MAX = 8 * HOST_AUDIT_PLACES, TABLE = 4 * MISSING_MAX };
 
 struct missing {
@@ -197,8 +198,8 @@ static void look_beyond(const struct inquiry *q, struct missing *m,
     }
 }
 
-/* Those that are nowhere in the result were left out by the node that committed
- * their brick. */
+/* A tetrahedron that is missing in the result was left out by the node that
+ * committed its brick. */
 static void judge_missing(struct inquiry *q, struct missing *m)
 {
     const struct host_tetrahedra *all = q->s->tets;
@@ -226,8 +227,9 @@ static bool is_judged(const struct inquiry *q, const uint32_t t[4])
     return points && host_judge_tetrahedron(&q->judge, t);
 }
 
-/* A tetrahedron that is not Delaunay proves its sender wrong where that worked
- * alone.  Else the node that found it, or the node that passed it on, is. */
+/* A tetrahedron that is not Delaunay proves its sender at fault if the sender
+ * worked alone.  Else the node that found it, or the node that passed it on, is
+ * at fault. */
 static void judge_wrong(struct inquiry *q, uint64_t tet)
 {
     const struct host_service *s = q->s;
@@ -261,8 +263,8 @@ static void judge_tet(struct inquiry *q, struct missing *m,
     look_beyond(q, m, t);
 }
 
-/* Where points have no tetrahedron at all, and one node has committed all of
- * their bricks, it has left out their tetrahedra, or those around them. */
+/* If points have no tetrahedron at all, and one node has committed all of their
+ * bricks, that node has left out their tetrahedra, or those around them. */
 static void judge_points(struct inquiry *q)
 {
     const struct host_ledger *ledger = &q->s->ledger;
@@ -306,7 +308,7 @@ static void judge_places(struct inquiry *q, struct missing *m)
 
 /* --- what is to be done again --------------------------------------------- */
 
-/* Of nodes at fault nothing is trusted. */
+/* Nothing from nodes at fault is trusted. */
 static void redo_guilty(struct inquiry *q)
 {
     const struct host_service *s = q->s;
@@ -325,8 +327,9 @@ static void redo_guilty(struct inquiry *q)
     }
 }
 
-/* The first time, what is near; then all that nodes did together; at last, or
- * where nothing is near, everything. */
+/* No node could be named.  The first time the bricks near the faults are done
+ * again; the second time, all bricks that nodes did together as well; from the
+ * third time on, or if no brick is near, all bricks. */
 static void redo_unclear(struct inquiry *q)
 {
     const struct host_ledger *ledger = &q->s->ledger;
@@ -490,9 +493,9 @@ static int begin_again(struct host_service *s, struct host_error *error)
                  a->suspects[0] == '\0' ? "" : " at work of ", a->suspects);
         host_notice_line(s, line);
     }
-    a->report.text[0] = '\0'; /* it is mended */
+    a->report.text[0] = '\0'; /* the bricks are done again */
     for (unsigned i = 0; i < s->machine->nodes; i++) {
-        s->ledger.job[i].epoch = 0; /* nothing that comes now counts */
+        s->ledger.job[i].epoch = 0; /* results under way do not count */
     }
     host_progress_phase("triangulating", "Mtet");
     for (uint32_t b = 0; b < s->ledger.bricks; b++) {

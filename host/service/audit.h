@@ -1,27 +1,27 @@
 /* The check of a result before success is reported, and what follows where it
  * fails.  Part of service.h.
  *
- * When every brick is committed, host_check (host/check/check.h) judges the
+ * When every brick is committed, host_check (host/check/check.h) checks the
  * whole result on threads of its own, while the service goes on answering
- * links.  If the check fails, the judge says of the tetrahedra at the faults
- * which ones are wrong, which came twice and which are missing, and the ledger
- * says which node committed their bricks.  A node that worked alone is at
- * fault: it is excluded, and every brick that it committed is done again by
- * others. Where nodes worked together, a wrong brick proves nothing against one
- * of them: the bricks concerned are done again by the strategy host_redo, each
- * range of bricks by one node alone, so that the next check can name the node.
+ * links.  If the check fails, the judge finds which tetrahedra at the faults
+ * are wrong, which came twice and which are missing.  The ledger knows which
+ * node committed their bricks.  A node that worked alone is at fault: it is
+ * excluded, and other nodes do every brick again that it committed.  Where
+ * nodes worked together, a wrong brick proves nothing against any one of them.
+ * Then the strategy host_redo does the bricks concerned again, each range of
+ * bricks by one node alone, so that the next check can name the node.
  *
- * A node is named by the source of its messages.  A node on the way that alters
- * frames of another, and renews the link's checksum, has the other one blamed;
- * the result is right all the same.
+ * A node is named by the source of its messages.  If a node on the path alters
+ * the frames of another node, and renews the link's checksum, the other node is
+ * blamed; the result is right all the same.
  *
- * A run gives up, with HOST_UNVERIFIED, when no other node is left, or when a
- * check fails although everything has been done again and no node is at fault.
+ * A run gives up, with HOST_UNVERIFIED, when no other node is left, or when
+ * more than nodes + 4 checks have failed.
  *
  * Memory: that of the check, a byte a brick and 300 KB; while faults are
- * analysed 48 bytes a brick.  Work: that of the check; to analyse a failure,
- * that of the judge for at most 512 tetrahedra, their facets and those beyond,
- * and a pass over the result.
+ * analysed, 48 bytes a brick as well.  Work: that of the check.  The analysis
+ * of a failure adds the judge's work for at most 512 tetrahedra, their facets
+ * and the tetrahedra beyond these, and a pass over the result.
  *
  *     bool passed = false;
  *     if (host_audit_step(&service, &passed, &error) != 0)
@@ -40,7 +40,7 @@ struct host_service;
 
 /* When the exact check is made besides the cheap one. */
 enum host_verifying {
-    HOST_VERIFY_WHERE_DUE, /* on foreign nodes, and after a loss */
+    HOST_VERIFY_WHERE_DUE, /* with a cube file, and after a loss */
     HOST_VERIFY_ALWAYS,
     HOST_VERIFY_NEVER
 };
@@ -60,11 +60,11 @@ struct host_audit_place {
 struct host_audit {
     uint64_t secret; /* given by the caller: random, nodes do not know it */
     enum { HOST_AUDIT_DUE, HOST_AUDIT_RUNS, HOST_AUDIT_PASSED } state;
-    bool ended;       /* the thread has: atomic */
-    bool exact;       /* this one checks the Delaunay property, too */
+    bool ended;       /* the check's thread has; atomic */
+    bool exact;       /* this check covers the Delaunay property, too */
     bool lost_work;   /* a generation began while there was work */
     unsigned failed;  /* checks in this run */
-    unsigned unclear; /* of these, those that no node was named for */
+    unsigned unclear; /* failed checks after which no node was named */
     struct host_fork fork;
     struct host_check_report report;
     struct host_error error;
@@ -74,26 +74,26 @@ struct host_audit {
     unsigned places;
     uint8_t *redo;                  /* [bricks] 1: to be done again */
     uint8_t *guilty;                /* [nodes] 1: at fault */
-    unsigned first;                 /* one of them, */
-    char why[HOST_AUDIT_WHY_BYTES]; /* and the proof */
-    char suspects[40]; /* where nodes worked together; empty: not known */
+    unsigned first;                 /* a node at fault, */
+    char why[HOST_AUDIT_WHY_BYTES]; /* and the proof against it */
+    char suspects[40]; /* of nodes that worked together; empty: not known */
 };
 
-/* Begins the check, or looks whether it has ended; *passed: the result is
- * right.  Where it has failed, the service goes on with a new generation, or
- * the run is over with HOST_UNVERIFIED. */
+/* Begins the check, or polls whether it has ended; *passed: the result is
+ * right.  If the check has failed, the service goes on with a new generation,
+ * or the run is over with HOST_UNVERIFIED. */
 int host_audit_step(struct host_service *service, bool *passed,
                     struct host_error *error);
 
 /* From now on each brick is the work of one node alone. */
 void host_audit_alone(struct host_service *service);
 
-/* A node is excluded for the rest of the run, and what it committed is not
- * trusted; what: "its result was wrong: ...". */
+/* Excludes a node for the rest of the run; the bricks that it committed are not
+ * trusted.  what: "its result was wrong: ...". */
 void host_audit_exclude(struct host_service *service, unsigned node,
                         const char *what);
 
-/* Whether a node is left that can work, besides that one. */
+/* Whether any node besides `node` is left that can work. */
 bool host_audit_is_other(const struct host_service *service, unsigned node);
 
 /* Ends a check that still runs. */

@@ -12,7 +12,7 @@ enum {
     TELL_US = 1500000,
     NEWS_US = 1000000, /* in which who is there answers */
     TELL_AGAIN_US = 1000000,
-    STEP_US = 500000, /* between two looks at who waits for a processor */
+    STEP_US = 500000, /* between two polls of the time without processor */
     WHY_BYTES = 400,
     START_BYTES = 400 /* of a line that an error has room for */
 };
@@ -189,8 +189,8 @@ static int fail(const struct host_service *s, struct host_error *error)
         m->nodes - missing, m->nodes, next);
 }
 
-/* The longest of the times that a process of a node has waited for a processor
- * since the last look.  Any of them may be on the way to the missing one. */
+/* The longest time that any node's process has waited for a processor since the
+ * last call.  Any node may be on the path to the missing one. */
 static uint64_t starved_us(struct host_service *s)
 {
     const struct host_machine *m = s->machine;

@@ -1,15 +1,16 @@
 /* Nodes that have not come yet.  Part of service.h.
  *
- * Until the first job is given out the host waits for all nodes.  After a
- * second and a half, and whenever something changes, the user is told which
- * node that is, the nearest that is missing, why, and how to start it; and that
- * all are there, when they are.  A node is there if it has answered, or if a
- * neighbour's wire to it has been up: what lies behind a missing node may be
- * silent and there.  When none has come for the length of the patience, the run
- * ends.  Time in which the host did not come to look does not count, nor does
- * time in which a node of this machine waited for a processor: so a busy
- * machine ends no run, and a program that is no node is found at the same time
- * as on a quiet one.
+ * Before the first job is given out, the host waits until all nodes are up.  A
+ * node is up if it has answered, or if a neighbour's wire to it has been up: a
+ * node behind a missing one may be silent and up.  After a second and a half,
+ * and whenever something changes, a notice names the nearest missing node, the
+ * reason, and how to start it.  Another notice says when all nodes are up.
+ *
+ * The run ends when no further node has come up for the length of the patience.
+ * Time in which the host did not poll does not count.  Nor does time in which a
+ * node's process on this machine waited for a processor.  So a busy machine
+ * ends no run, and a program that is no node is found as soon as on a quiet
+ * machine.
  *
  * Memory: none of its own.  Work: a pass over the nodes a check.
  *

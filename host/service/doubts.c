@@ -10,9 +10,9 @@ enum {
     DOUBT_US = 1300000,
     SLOW_US = 10000000, /* of nodes that this machine may keep waiting */
     WIRE_US = 1200000,
-    TIMES = 2,         /* as long as silences that ended of late */
-    FADES = 16,        /* what was a second is none so many seconds later */
-    QUIET_US = 1000000 /* after a doubt silences end that it was the cause of */
+    TIMES = 2,         /* the longest silence that ended of late */
+    FADES = 16,        /* a silence of 1 s is forgotten after so many s */
+    QUIET_US = 1000000 /* silences that end sooner after a doubt: due to it */
 };
 
 /* What may be on the way before an answer: a window each way of the slowest
@@ -31,7 +31,7 @@ static uint64_t doubt_us(const struct host_service *s)
     return s->machine->slow && us < SLOW_US ? SLOW_US : us;
 }
 
-/* The silences that have ended since the last check. */
+/* Notes the silences that have ended since the last check. */
 static void note_silences(struct host_service *s, uint64_t elapsed_us)
 {
     bool doubted = false;
@@ -52,7 +52,7 @@ static void note_silences(struct host_service *s, uint64_t elapsed_us)
     }
 }
 
-/* Below which silence is what the node and its neighbours are used to. */
+/* Silence up to this is usual for the node and its neighbours. */
 static uint64_t usual_us(const struct host_service *s, unsigned i)
 {
     uint64_t most = s->node[i].slow_us;

@@ -1,18 +1,19 @@
-/* Nodes and wires that the user is told of before it is clear what they have:
- * a line when one is silent, and one when it is back.  Part of service.h.
+/* Suspect nodes and wires: a notice when one falls silent, before the cause is
+ * clear, and another when it is back.  Part of service.h.
  *
- * A node that takes nothing off its links holds up others, and who is silent at
- * the host may be anywhere behind.  So nodes say, unasked, by which of their
- * links nothing has come for a second.  A node is doubted that does not answer
- * and is silent to a neighbour who is heard, or to the host, and to none is
- * not; where others hear it, it is the wire that is.
+ * A node that reads nothing from its links holds up messages of other nodes, so
+ * a node that the host does not hear need not be the cause.  Therefore every
+ * node reports, unasked, the links on which nothing has come for a second.  A
+ * node is suspect if it does not answer pings and every neighbour that is
+ * itself up reports it silent.  If some neighbour still hears it, the suspect
+ * is the wire, not the node.
  *
- * Where there are more nodes than processors, or the machine is busy, all of
- * them may be silent for seconds, and answer.  So a node is doubted only when
- * it has been silent for twice as long as it, or any of its neighbours,
- * was of late before it answered.  Silences in which a node was doubted, or
- * after which a node says that a neighbour is silent, do not count: one that
- * stands still holds up what is for others.
+ * If there are more nodes than processors, or the machine is busy, a sound node
+ * may be silent for seconds.  So a node becomes suspect only after twice the
+ * longest silence of late after which that node, or a neighbour of it, answered
+ * again.  A silence does not count if a node was suspect during it, or if the
+ * node reports a silent neighbour after it: a node that stands still also holds
+ * up messages for others.
  *
  * Memory: none of its own.  Work: a pass over the nodes a check, and over links
  * where some are silent.

@@ -82,7 +82,7 @@ void host_faults_pinged(struct host_service *service, unsigned node,
     }
 }
 
-/* A node that has left has no part in it. */
+/* Nodes that have left are not asked. */
 static bool all_vouch(const struct host_service *s)
 {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -93,17 +93,16 @@ static bool all_vouch(const struct host_service *s)
     return true;
 }
 
-/* What nodes send each other may be at fault, where they do; a node that works
- * alone is at fault itself.  The run goes on as long as another node is left.
- */
+/* If nodes work together, another node's message may have caused the fault; a
+ * node that works alone is itself at fault.  The run goes on as long as another
+ * node is left. */
 static int believe(struct host_service *s, struct host_error *error)
 {
     char why[NODE_FAULT_TEXT_MAX + 40];
     unsigned node = s->fault.node;
     s->fault.told = false;
     if (!s->ledger.alone) {
-        host_notice(s, node,
-                    "reports: %s; what is left is done by each node alone",
+        host_notice(s, node, "reports: %s; from now on each node works alone",
                     s->fault.text);
         host_audit_alone(s);
         s->loss = true;

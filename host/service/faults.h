@@ -1,13 +1,15 @@
 /* What nodes report as faults, and whether to believe them.  Part of service.h.
  *
- * Where a node between two others starts again, what was on its way is lost,
- * and what comes after the gap looks false to the one behind it.  So a fault
- * counts only once every living node has answered a ping that was sent after
- * the fault had come, and none has told of a loss: a loss begins a new
- * generation, in which all begin anew.  What no loss explains counts at once.
+ * If a node between two others restarts, messages on their way are lost, and
+ * the messages after the gap look wrong to the node that gets them.  So a fault
+ * counts only once every living node has answered a ping sent after the fault
+ * arrived, and no node has reported a loss.  (A loss begins a new generation,
+ * in which all nodes begin anew.)  A fault that no loss can explain counts at
+ * once.
  *
- * What counts ends the work of that node, not the run, as long as another node
- * is left: first all go on alone, then the node is excluded (audit.h).
+ * A fault that counts does not end the run as long as another node is left.
+ * The first time all nodes go on, each working alone.  If a node then reports
+ * a fault, that node is excluded (audit.h).
  *
  * Memory: none of its own.  Work: one pass over the nodes a fault.
  *

@@ -114,7 +114,8 @@ int host_generation_renew(struct host_service *service, uint64_t now_us,
     unsigned dimension = s->machine->dimension;
     s->loss = false;
     if (s->started && s->ledger.committed == s->ledger.bricks) {
-        /* Nothing is lost that is needed, if the result is right. */
+        /* All bricks are here: if the result is right, this loss costs nothing.
+         */
         s->audit.lost_work = true;
         s->late = true;
         s->over = s->reporting;

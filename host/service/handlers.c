@@ -242,11 +242,11 @@ static int take_ready(struct host_service *s,
     return 0;
 }
 
-/* A page that `sender` gave to the reporter is not as it was made here.  One of
- * the two is at fault, and nothing shows which: the user hears of both, and
- * from now on all pages come from the host alone.  A page of the host's was
- * altered on its way to the reporter, or by it: then the reporter is refused.
- */
+/* The reporter says that a page which `sender` sent it is not as the host made
+ * it.  If the sender is a node, the sender or the reporter is at fault, and
+ * nothing shows which: a notice names both, and from now on all pages come from
+ * the host.  If the sender is the host, the page was altered on its way or by
+ * the reporter, and the reporter is refused. */
 static int doubt_page(struct host_service *s, unsigned reporter,
                       unsigned sender, uint32_t page, struct host_error *error)
 {
@@ -259,13 +259,13 @@ static int doubt_page(struct host_service *s, unsigned reporter,
     }
     if (sender == CUBE_HOST || s->strategy == &host_redo) {
         snprintf(why, sizeof why,
-                 "reports %s of the host's, altered by itself or on the way",
+                 "reports %s of the host's, altered on the way or by that node",
                  which);
         return host_results_refuse(s, reporter, why, error);
     }
     host_notice(s, sender,
-                "sent node %u %s, as that node reports; what is left is done "
-                "with pages from the host alone, look after both",
+                "sent node %u %s, as that node reports; from now on all pages "
+                "come from the host; look after both nodes",
                 reporter, which);
     host_audit_alone(s);
     s->loss = true;

@@ -94,7 +94,7 @@ bool host_idle_leave(struct host_service *service, unsigned node,
     return true;
 }
 
-/* The same where it may have had its new start: then it is left aside. */
+/* The same, but a node that has had its new start already is put aside. */
 static void leave_for_good(struct host_service *s, unsigned node,
                            const char *why)
 {

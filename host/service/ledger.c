@@ -173,8 +173,8 @@ void host_ledger_reopen(struct host_ledger *ledger, uint32_t brick)
     ledger->committed--;
 }
 
-/* Keeps the tetrahedra of committed bricks, in their order, and their finders:
- * what is kept never has more runs than before. */
+/* Keeps the tetrahedra of committed bricks, in their order, and their finders.
+ * The number of runs never grows. */
 static uint64_t keep_committed(struct host_ledger *ledger,
                                const struct host_order *order,
                                struct host_tetrahedra *tets)

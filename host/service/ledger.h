@@ -33,20 +33,20 @@ struct host_job {
     uint32_t epoch; /* 0: the node has no job */
     uint32_t first, last;
     uint32_t committed; /* bricks of [first, last) */
-    uint64_t rows;      /* tetrahedra that have come for it, and how many may */
-    uint64_t rows_max;  /* before they are looked through: results.h */
+    uint64_t rows;     /* tetrahedra that have come for it; how many may come */
+    uint64_t rows_max; /* before they are judged: results.h */
 };
 
-/* Tetrahedra up to `end` (those before it belong to earlier runs) were found by
- * a node. */
+/* A run of tetrahedra that one node has found: from the end of the run before,
+ * or 0, to `end`. */
 struct host_found {
     uint64_t end;
     uint32_t node;
 };
 
 enum {
-    HOST_LEDGER_ROWS_A_POINT = 16, /* of a job, before they are looked through:
-                                      evenly spread points have 6.8 */
+    HOST_LEDGER_ROWS_A_POINT = 16, /* tetrahedra a point of a job, before they
+                                      are judged; uniform points have 6.8 */
     HOST_LEDGER_ROWS_MIN = 4096
 };
 
@@ -69,7 +69,8 @@ struct host_ledger {
 
 #define HOST_LEDGER_ALONE UINT16_C(0x8000)
 
-/* The node that committed a brick last; the number of no node where none has.
+/* The node that committed a brick last; if none has, a number that is no
+ * node's.
  */
 static inline uint32_t host_ledger_by(const struct host_ledger *ledger,
                                       uint32_t brick)
@@ -108,8 +109,8 @@ static inline bool host_ledger_committed(const struct host_ledger *ledger,
     return ledger->open[brick] == 0;
 }
 
-/* The next `count` tetrahedra were found by that node; without memory, the
- * error is set. */
+/* Notes that `node` has found the next `count` tetrahedra.  Sets the error if
+ * there is no memory. */
 int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
                       struct host_error *error);
 

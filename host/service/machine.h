@@ -58,8 +58,8 @@ struct host_machine {
     /* Looks after the nodes, and starts again those that it started itself and
      * that died.  0, or HOST_CUBE where the cube cannot go on. */
     int (*check)(void *context, struct host_error *error);
-    /* Microseconds that the process of a node has waited for a processor since
-     * its start; NULL: that is not known. */
+    /* Microseconds that a node's process has waited for a processor since its
+     * start; NULL: not known. */
     uint64_t (*starved_us)(void *context, unsigned node);
     /* How many nodes `check` has started again so far; NULL: it never does. */
     unsigned (*restarts)(void *context);

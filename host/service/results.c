@@ -81,8 +81,8 @@ static void describe(const struct host_service *s, const struct host_job *job,
                  : "which is not of its job");
 }
 
-/* It has a new start, where the host can give it one; else it is given up, not
- * the run: unless it is the last. */
+/* The node is started again if the host can do that, once.  Else it is
+ * excluded, and the run goes on; if it was the last node, the run ends. */
 int host_results_refuse(struct host_service *service, unsigned node,
                         const char *why, struct host_error *error)
 {
@@ -109,11 +109,11 @@ int host_results_refuse(struct host_service *service, unsigned node,
 
 /* --- bounds --------------------------------------------------------------- */
 
-/* How many of the tetrahedra, or faces, are judged where a bound is passed: if
- * half of them were wrong, all of the sample would be right once in 2^64. */
+/* How many tetrahedra, or faces, are judged when a bound is passed.  If half of
+ * all were wrong, a sample would have no wrong one once in 2^64 times. */
 enum { SAMPLE = 64, SPILLED_A_BRICK = 1024, SPILLED_MIN = 65536 };
 
-/* An index below count that no node can foresee (xorshift: Marsaglia, Journal
+/* An index below count that no node can predict (xorshift: Marsaglia, Journal
  * of Statistical Software 8, 2003). */
 static uint64_t draw(struct host_service *s, uint64_t count)
 {
@@ -157,7 +157,8 @@ static uint32_t (*rows_of_job(const struct host_service *s,
     return rows;
 }
 
-/* Why rows cannot all be tetrahedra of the triangulation; NULL: most are. */
+/* Why rows are not all tetrahedra of the triangulation, each once; NULL: at
+ * least most of them are. */
 static const char *why_too_many(struct host_service *s,
                                 const struct host_judge *judge,
                                 uint32_t (*rows)[4], uint64_t count)
@@ -179,9 +180,9 @@ static const char *why_too_many(struct host_service *s,
     return NULL;
 }
 
-/* The bound of a job's results is passed: they are looked through, and where
- * they are right, as about a hub or on two skew lines, the bound is doubled.
- * So a node makes the host keep twice what is true, and a constant. */
+/* A job has more results than its bound.  They are judged.  If they are right,
+ * as about a hub or on two skew lines, the bound is doubled.  So a node can
+ * make the host keep at most twice the right results, and a constant. */
 static int look_through_rows(struct host_service *s, unsigned node,
                              struct host_error *error)
 {
@@ -217,8 +218,8 @@ static bool is_spilled(const struct host_service *s, const struct host_job *job,
     return is_point(s->order, f[0]) && (mark || face);
 }
 
-/* Whether a face is a facet of the triangulation: of the tetrahedron on one
- * side of it or the other. */
+/* Whether a face is a facet of the triangulation: whether a tetrahedron of the
+ * triangulation lies on either side of it. */
 static bool is_facet(const struct host_judge *judge, const uint32_t f[3])
 {
     for (int side = 0; side < 2; side++) {
@@ -236,8 +237,9 @@ static int compare_faces(const void *p, const void *q)
     return memcmp(p, q, 3 * sizeof(uint32_t));
 }
 
-/* Why faces cannot all be open ones of the node's front; NULL: most are.  A
- * face is open once in each direction; it begins with its smallest vertex. */
+/* Why faces are not all open faces of the node's front, each once; NULL: at
+ * least most of them are.  A face is open once in each direction; it is turned
+ * to begin with its smallest vertex. */
 static const char *why_spilled(struct host_service *s,
                                const struct host_judge *judge,
                                struct incode_face *faces, uint64_t count)
@@ -265,7 +267,7 @@ static const char *why_spilled(struct host_service *s,
     return NULL;
 }
 
-/* As look_through_rows, of the faces that wait here for the node. */
+/* As look_through_rows, for the faces that the host keeps for the node. */
 static int look_through_faces(struct host_service *s, unsigned node,
                               struct host_error *error)
 {
@@ -279,7 +281,7 @@ static int look_through_faces(struct host_service *s, unsigned node,
     }
     if (host_spill_copy(&s->spill, node, &faces, &count, error) == 0) {
         const char *why = why_spilled(s, &judge, faces, count);
-        /* Of those that are on their way back nothing is known. */
+        /* Faces that are on their way back are not judged. */
         n->spilled_max =
             n->spilled + (count > SPILLED_MIN ? count : SPILLED_MIN);
         if (why != NULL) {
@@ -357,7 +359,7 @@ int host_results_take(struct host_service *service,
                 return host_results_refuse(s, message->source, why, error);
             }
         }
-        /* Of one that works alone no other node has found anything. */
+        /* A node that works alone has found all its tetrahedra itself. */
         uint32_t finder =
             s->ledger.alone ? message->source : (uint32_t)reader.finder;
         if (host_ledger_found(&s->ledger, finder, count, error) != 0) {

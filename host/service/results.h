@@ -1,18 +1,19 @@
-/* What a node says of its job: tetrahedra on their way into the list, bricks
- * committed, faces that it spills.  Part of service.h.
+/* The results of a node's job: tetrahedra for the list, bricks committed, faces
+ * spilled.  Part of service.h.
  *
- * Nothing of it is believed: every vertex must be that of a point, the four
- * different, the brick that owns the tetrahedron one of the node's job and not
- * committed; so the three of a face.  A node that says anything else is named,
- * and its job is lost with it (host_idle_leave); what it had committed stays.
+ * Nothing is taken unchecked.  All vertices of a tetrahedron, or of a face,
+ * must be points, and different.  The brick that owns the tetrahedron must
+ * belong to the node's job, and must not be committed.  A node that sends
+ * anything else is named, and loses its job (host_idle_leave); its committed
+ * bricks stay.
  *
- * What a node can make the host keep is bounded.  Where the results of a job
- * pass 16 a point, or the faces that wait for a node 16 a point of its job,
- * they are looked through: repeats and wrong ones are refused, and otherwise
- * the bound is doubled, as a hub or two skew lines have so many.
+ * What a node can make the host keep is bounded.  If a job has more than 16
+ * tetrahedra a point, or a node has more than 16 spilled faces a point of its
+ * job, these are judged.  If some are wrong or come twice, the node is refused;
+ * else the bound is doubled, as a hub or two skew lines have so many.
  *
  * Memory: none of its own; a copy of a job's results or a node's faces while
- * they are looked through.  Work: about 10 ns a tetrahedron.
+ * they are judged.  Work: about 10 ns a tetrahedron.
  *
  *     if (message.type == NODE_RESULT)
  *         status = host_results_take(&service, &message, &error);
@@ -33,8 +34,9 @@ int host_results_spill(struct host_service *service, unsigned node,
                        const struct incode_face *faces, uint32_t count,
                        struct host_error *error);
 
-/* The node is named, and does its job no more: it has a new start, or, where it
- * had one, is excluded.  0, or HOST_UNVERIFIED where no other node is left. */
+/* Names the node and takes its job away.  The node is started again; if it had
+ * its new start already, or the host cannot start it, it is excluded.  0, or
+ * HOST_UNVERIFIED if no other node is left. */
 int host_results_refuse(struct host_service *service, unsigned node,
                         const char *why, struct host_error *error);
 

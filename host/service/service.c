@@ -15,7 +15,7 @@
 
 enum {
     IDLE_US_MAX = 20000,
-    AUDIT_US_MAX = 1000, /* the end of the check wakes nobody */
+    AUDIT_US_MAX = 1000, /* the end of the check does not wake the loop */
     FAREWELL_US_MAX = 2000000,
     CREDITS_MIN = 8,
     CREDITS_SHARED = 128
@@ -192,8 +192,8 @@ static bool all_reported(const struct host_service *s)
     return true;
 }
 
-/* All bricks are here: checks the result, and asks for the statistics when it
- * is right. */
+/* All bricks are here: checks the result, and requests the statistics if it is
+ * right. */
 static int conclude(struct host_service *s, struct host_error *error)
 {
     bool passed;

@@ -78,9 +78,9 @@ struct host_node {
     uint64_t silent_us;     /* that it has not answered */
     bool cut_off;           /* no live wire leads to it */
     uint32_t silent;        /* links by which it hears nothing */
-    uint64_t silence_us;    /* the same at the last check, */
-    uint64_t slow_us;       /* and before it answered of late: doubts.h */
-    uint64_t starved_us;    /* that the machine has told of it: bring_up.h */
+    uint64_t silence_us;    /* silent_us at the last check */
+    uint64_t slow_us;       /* its longest silence of late: doubts.h */
+    uint64_t starved_us;    /* it waited for a processor: bring_up.h */
     bool doubted;           /* the user was told so: doubts.h; */
     uint32_t wires_doubted; /* and of these links, */
     uint64_t wires_us;      /* after so long */
@@ -92,7 +92,7 @@ struct host_node {
     struct node_finished_message before;
     uint64_t unreported;
     /* Faces that it has spilled and not got back, and how many there may be
-     * before they are looked through: results.h. */
+     * before they are judged: results.h. */
     uint64_t spilled, spilled_max;
 };
 
@@ -123,7 +123,7 @@ struct host_service {
     unsigned window;                 /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     enum host_verifying verifying;
-    bool foreign; /* its nodes are not this program's processes */
+    bool foreign; /* the nodes are those of a cube file */
     /* Of a node, and the cube file that says so (NULL: an option does), for
      * what paging.h tells; 0: it tells nothing. */
     uint64_t memory;
@@ -137,7 +137,7 @@ struct host_service {
     unsigned restarts;                   /* of nodes, by the machine */
     unsigned generations;                /* of the cube's wiring; 1: no loss */
     unsigned missing_wires;              /* that were named: missing_links.h */
-    unsigned excluded;                   /* nodes, as their work was wrong */
+    unsigned excluded;                   /* nodes whose work was wrong */
     /* Private. */
     struct cube *cube;
     void *cube_memory;

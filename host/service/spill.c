@@ -307,7 +307,7 @@ int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
     return 0;
 }
 
-/* The faces of a list's blocks, behind those that are there. */
+/* Appends the faces of a list's blocks. */
 static int copy_list(const struct host_spill *s,
                      const struct host_spill_list *list,
                      struct incode_face *faces, uint64_t *count,

@@ -2,8 +2,8 @@
  * of faces by node and brick, in memory first, then in a temporary file that
  * has no name and is gone when the program is.
  *
- * Marks of vertices that were reached come many times over and say the same: a
- * list keeps one a vertex, a bit each.
+ * The mark that a vertex was reached comes many times over.  A list keeps it
+ * once, as one bit for the vertex.
  *
  * Memory: blocks of 512 bytes up to blocks_memory, and 48 bytes a list; beyond
  * it, disk.  Work: constant a block.
@@ -61,7 +61,7 @@ int host_spill_put(struct host_spill *spill, uint32_t node,
 struct host_spill_list host_spill_detach(struct host_spill *spill,
                                          uint32_t node, uint32_t brick);
 
-/* All faces of a node that are in the store, marks apart, in a new list that
+/* All faces of a node that are in the store, but no marks, in a new array that
  * the caller frees. */
 int host_spill_copy(const struct host_spill *spill, uint32_t node,
                     struct incode_face **faces, uint64_t *count,

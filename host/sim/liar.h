@@ -1,8 +1,8 @@
-/* A faulty node: sound but for its messages, of which some are altered on their
- * way out.  It lies about what it has found, about pages that it sends to other
- * nodes, or about work that it lends, once in so many chances, in one of the
- * ways of enum host_lie.  The simulator's nodes lie by it, and the processes of
- * tests/system/liar.
+/* A faulty node for tests: it works correctly, but some of its messages are
+ * altered as they leave.  Altered are tetrahedra that it has found, pages that
+ * it sends to other nodes, or work that it lends: once in so many chances, in
+ * one of the ways of enum host_lie.  The simulator uses it, and so do the
+ * processes of tests/system/liar.
  *
  * Memory: the struct, 16 KB.  Work: a pass over each message that may be
  * altered.
@@ -48,8 +48,8 @@ struct host_liar {
     uint32_t one_in; /* 1 or more: a lie in so many tetrahedra, answers, lent
                         faces or pages */
     uint64_t random;
-    uint64_t told;    /* lies that have left the node */
-    unsigned pending; /* and those of the message at hand */
+    uint64_t told;    /* lies sent so far */
+    unsigned pending; /* lies in the current message */
     bool floods;
     /* A tetrahedron of a message before. */
     bool keeps;
@@ -64,13 +64,13 @@ struct host_liar {
     uint8_t out[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK];
 };
 
-/* What leaves in the place of that message: liar->out, so many bytes, with
- * liar->pending lies. */
+/* Makes the message that leaves in place of that one: liar->out, with
+ * liar->pending lies.  Returns its bytes. */
 size_t host_liar_alter(struct host_liar *liar, uint16_t dest, uint8_t type,
                        const void *data, size_t size);
 
-/* For struct node_board: sends the message altered, or floods the host with
- * others and keeps it back. */
+/* For struct node_board: sends the message altered, or keeps it back and floods
+ * the host with others. */
 int host_liar_write(struct host_liar *liar, struct node_counted *counted,
                     uint16_t dest, uint8_t type, const void *data, size_t size);
 

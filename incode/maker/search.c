@@ -78,8 +78,8 @@ void incode_hull_learn(struct incode_maker *m, const struct incode_query *q)
 /* ---- the search of the whole set ---- */
 
 /* Begins a walk.  Where pages are replaced, one walk goes up and the next down:
- * it begins with the pages that the one before has left, of which the least
- * recently used would be gone each time that it comes to them. */
+ * it begins with the pages that the last walk used last.  Walks in one
+ * direction would find each page evicted just before they come to it. */
 static void begin_walk(struct incode_maker *m, struct incode_query *q)
 {
     m->walks_down = !m->walks_down && !incode_pager_has_free(&m->pager);

@@ -49,7 +49,7 @@ bool incode_hull_known(struct incode_maker *m, const double pv[3],
 void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
                           const double below[3]);
 
-/* The same for a hull facet that was searched. */
+/* Remembers a hull facet that a search has found. */
 void incode_hull_learn(struct incode_maker *m, const struct incode_query *q);
 
 /* The coordinates of a vertex; false: *page is missing. */

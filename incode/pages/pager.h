@@ -97,8 +97,8 @@ struct incode_pager {
 
 size_t incode_pager_bytes(uint32_t frames);
 
-/* memory: aligned to 64 bytes; 1 <= frames < INCODE_NO_FRAME.  pause: is told
- * of the work, which grows with the frames. */
+/* memory: aligned to 64 bytes; 1 <= frames < INCODE_NO_FRAME.  pause: counts
+ * the work, which grows with the frames. */
 void incode_pager_init(struct incode_pager *pager, void *memory,
                        uint32_t frames, uint32_t bricks,
                        struct incode_pause *pause);

@@ -58,9 +58,9 @@ struct incode_insertion {
      * be visited. */
     uint64_t *touched;
     uint64_t *passed; /* a bit a brick: it has been visited */
-    /* A word a brick, a bit a point: it has become a vertex before its turn, or
-     * is another's, and may have been released since; NULL: there is no room.
-     */
+    /* A word a brick, a bit a point: the point became a vertex before its turn,
+     * or belongs to another node, and may have been released since.  NULL: the
+     * memory has no room for it. */
     uint64_t *inserted;
     struct incode_insertion_work *work;
     bool whole;    /* all bricks are taken in at once */
@@ -123,8 +123,8 @@ struct incode_insertion_work {
 };
 
 /* Bytes that the triangulation of so many points takes, as a rule, beside two
- * bits a brick.  Where not all points are inserted at once, a word a brick
- * comes to it, if that is no more than a part in INCODE_INSERTION_KNOWN of the
+ * bits a brick.  If not all points are inserted at once, a word a brick is
+ * added, unless that is more than one part in INCODE_INSERTION_KNOWN of the
  * memory. */
 size_t incode_insertion_bytes(uint64_t points);
 

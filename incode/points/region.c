@@ -6,16 +6,16 @@
 #include "incode/maker/sphere.h"
 #include "incode/predicates/simd.h"
 
-/* A test that has to find it leaves one of these bounds out. */
+/* A planted fault leaves out one of these bounds; a test must find it. */
 #ifndef INCODE_PLANT_BOUND
 #define INCODE_PLANT_BOUND(name, value) (value)
 #endif
 
 /* All bounds here are of F(p) = D |p - o|^2 - X (p - o), D = 1 for a sphere and
  * 0 for a half-space, where X is known up to |x - X| <= e, component by
- * component; u = 2^-53.  A box is told apart only if F > 0 is certain for all
- * its points, so that a point with F = 0, which ties may count as inside, never
- * is. */
+ * component; u = 2^-53.  A box is ruled out only if F > 0 is certain for all
+ * its points.  So a point with F = 0, which the tie rule may count as inside,
+ * is never ruled out. */
 
 /* The ball's centre c is o + x/2, rounded.  For p in the sphere
  *
@@ -183,7 +183,8 @@ static uint32_t clear_of(const struct incode_regions *r, unsigned i,
         incode_vd_less(incode_vd_load(r->square + i), square));
 }
 
-/* The same of planes that the box is all before: incode_region_is_behind. */
+/* The same for a plane with all of the box in front: incode_region_is_behind.
+ */
 static uint32_t before(const struct incode_regions *r, unsigned i,
                        const double lo[3], const double hi[3])
 {

@@ -39,7 +39,7 @@ struct incode_pause {
 /* Calls `look`, and sets what is left. */
 void incode_pause_look(struct incode_pause *pause);
 
-/* Fills memory with a byte, and looks on the way. */
+/* Fills memory with a byte, and yields on the way. */
 void incode_pause_fill(struct incode_pause *pause, void *memory, int byte,
                        size_t bytes);
 

@@ -1,8 +1,7 @@
-/* How often what others can order may wear a board's flash, or keep its loader
- * from its work: a number of times at once, then one in each period, whoever
- * orders it.  It is kept in memory that a restart leaves alone, so that a
- * restart gives nothing back; only a loss of power does, and no wire can cause
- * that.
+/* Limits on what messages can order that wears a board's flash or keeps its
+ * loader busy: a number of times at once, then one in each period, whatever
+ * orders it.  The counts are in memory that outlasts a restart.  Only a loss of
+ * power resets them, and no message can cause that.
  *
  * |            | at once | then one in | what it bounds |
  * |------------|---------|-------------|----------------|
@@ -11,9 +10,9 @@
  * |            |         |             | transfer |
  * | false      |       6 | 10 s        | proofs of signatures that were false |
  *
- * A flash that bears 100,000 erasures of a sector, with sectors of 4 KB and so
- * 256 records each, so lasts for 96 years of starts without a pause, and 15
- * years of transfers.
+ * So a flash that bears 100,000 erasures of a sector lasts for 96 years of
+ * starts at the limit, as a sector of 4 KB holds 256 records, and for 15 years
+ * of transfers at the limit.
  *
  * Memory: the struct.  Work: a CRC of it a call.
  *
@@ -37,20 +36,20 @@ enum loader_expense {
 
 struct loader_budget {
     uint32_t magic;
-    uint32_t debt_s[LOADER_EXPENSES]; /* after so long all is free again */
-    uint32_t passed_s; /* of this start, that are counted already */
+    uint32_t debt_s[LOADER_EXPENSES]; /* until the full number is free again */
+    uint32_t passed_s; /* since this start, already subtracted from the debts */
     uint32_t crc;
 };
 
-/* At a start, of whatever program: goes on with what the start before has left;
- * what is none of this begins anew. */
+/* At a start of any program: goes on with the counts of the start before.
+ * Memory without valid counts begins with none. */
 void loader_budget_open(struct loader_budget *budget);
 
-/* now_us: since the start.  To be called once a second or more often; what is
- * not counted is not given back. */
+/* now_us: since the start.  To be called at least once a second: time that is
+ * not counted frees nothing. */
 void loader_budget_pass(struct loader_budget *budget, uint64_t now_us);
 
-/* Whether it may be done now; taken: it is. */
+/* Whether `what` may be done now; _take also counts it as done. */
 bool loader_budget_has(const struct loader_budget *budget,
                        enum loader_expense what);
 bool loader_budget_take(struct loader_budget *budget, enum loader_expense what);

@@ -50,7 +50,7 @@ enum loader_fault {
     LOADER_WRONG_SIGNATURE,
     LOADER_WRONG_DIGEST, /* the code is not what was signed */
     LOADER_WORN,         /* the flash does not hold what it was given */
-    LOADER_TOO_OFTEN,    /* so many transfers, or false ones: budget.h */
+    LOADER_TOO_OFTEN,    /* too many transfers, or false ones: budget.h */
     LOADER_FAULTS
 };
 

@@ -72,7 +72,7 @@ static void refuse(struct loader_incoming *in, enum loader_fault fault)
     in->work = LOADER_NO_WORK;
 }
 
-/* False: there were too many of these of late, and the transfer ends. */
+/* False: too many of them of late; the transfer ends. */
 static bool affords(struct loader_incoming *in, bool affordable)
 {
     if (!affordable) {
@@ -197,9 +197,9 @@ static unsigned begun_slot(const struct loader_incoming *in)
     return 0;
 }
 
-/* Erasures begin with this.  Of a sector there are at most three for each slot
- * that is made ready: as it is, of what was brought where that is false, and
- * once more, where parts of it had been there before. */
+/* Erasures begin here.  Each time that a slot is made ready, a sector is erased
+ * at most three times: for the first block, again if what was brought is false,
+ * and once more if parts of it had been there before. */
 static void make_ready(struct loader_incoming *in, unsigned slot)
 {
     struct loader_budget *budget = in->slots->rules->budget;

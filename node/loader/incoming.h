@@ -9,9 +9,9 @@
  * that needs it.  The header's page follows when the digest is right, and then
  * the record that the next start is of this slot.
  *
- * Nothing is erased or programmed before the header's signature was proved, and
- * how often a slot is made ready, and false signatures are proved, is bounded
- * by time (budget.h).
+ * Nothing is erased or programmed before the header's signature has been
+ * verified.  How often a slot is made ready, and how often a false signature is
+ * verified, is limited (budget.h).
  *
  * Memory: struct loader_incoming.  Work: a step erases a sector, programs a
  * block, looks at 4 blocks, hashes a slice, or proves a signature.
@@ -77,7 +77,7 @@ void loader_incoming_block(struct loader_incoming *incoming, uint32_t number,
 /* If all blocks are held: LOADER_VERIFIED, or it is refused. */
 void loader_incoming_verify(struct loader_incoming *incoming);
 
-/* Once it is not busy: whether it is of an image whose signature was proved. */
+/* Once it is not busy: whether the signature of its image has been verified. */
 static inline bool
 loader_incoming_proved(const struct loader_incoming *incoming)
 {

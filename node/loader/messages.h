@@ -51,11 +51,11 @@ struct loader_ask_message {
 enum loader_order {
     LOADER_VERIFY = 1, /* what has come whole: digest and signature */
     LOADER_BOOT,       /* restart, and start the newest good image */
-    LOADER_NAME        /* takes `serial` for its number, if it has none; counts
-                          within a transfer alone, whose signature was proved */
+    LOADER_NAME        /* takes `serial` for its number, if it has none; only
+                          within a transfer whose signature was verified */
 };
 
-/* To one, or all who are in that transfer. */
+/* To one board, or to all boards in that transfer. */
 struct loader_do_message {
     uint32_t transfer; /* 0: whatever it is in */
     uint32_t what;     /* enum loader_order */

@@ -45,7 +45,7 @@ struct loader_rules {
     /* Called while loader_slots_choose, or loader_look_copy, has long work, so
      * that a watchdog waits.  NULL: nobody does. */
     void (*alive)(void);
-    struct loader_budget *budget; /* of transfers; NULL: they are not counted */
+    struct loader_budget *budget; /* limits transfers; NULL: no limit */
 };
 
 /* What a record in the flash says; all zeros: there was none. */

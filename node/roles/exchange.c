@@ -187,7 +187,7 @@ static void exchange_message(void *self, const struct cube_message *message,
 
 /* ---- work ---- */
 
-/* What others have found at stars that they borrowed. */
+/* Tetrahedra that other nodes have found at stars that they borrowed. */
 static bool use_found(struct exchange *e, uint32_t units)
 {
     struct node_outlet *outlet = &e->triangulation.outlet;

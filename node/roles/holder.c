@@ -11,7 +11,7 @@ struct frame {
     struct node_page_message message; /* with the page's number */
     uint16_t size;                    /* of its data; 0: nothing here */
     bool loading;                     /* the host has been asked */
-    bool fresh; /* there, but not yet passed on to who it was got for */
+    bool fresh; /* here, but not yet passed on to the node that wants it */
 };
 
 struct holder {
@@ -108,7 +108,7 @@ static void take_request(struct holder *h, const struct cube_message *message)
     }
 }
 
-/* One that came altered is asked for again, as those who want it still wait. */
+/* A page that arrived altered is requested again: nodes still wait for it. */
 static void take_page(struct holder *h, const struct cube_message *message)
 {
     struct node_page page;

@@ -129,7 +129,7 @@ void node_lending_take(struct node_lending *lending,
     }
 }
 
-/* As they come in order, it is known which one was altered. */
+/* Pages to all come in order, so the number of an altered one is known. */
 uint32_t node_lending_take_to_all(struct node_lending *lending,
                                   struct node_page_check *check,
                                   struct incode_triangulator *triangulator,

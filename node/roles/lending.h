@@ -70,8 +70,9 @@ void node_lending_came(struct node_lending *lending, uint32_t page);
 void node_lending_take(struct node_lending *lending,
                        const struct cube_message *message);
 
-/* NODE_PAGE_TO_ALL, for a triangulator.  The page, where it came altered, or
- * INCODE_NONE: the triangulator does not have it, and may wait for it. */
+/* Gives NODE_PAGE_TO_ALL to a triangulator.  Returns the page's number if it
+ * arrived altered: then the triangulator does not have it, and may wait for it.
+ * Else INCODE_NONE. */
 uint32_t node_lending_take_to_all(struct node_lending *lending,
                                   struct node_page_check *check,
                                   struct incode_triangulator *triangulator,

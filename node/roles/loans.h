@@ -81,7 +81,7 @@ void node_loans_init(struct node_loans *loans, void *memory,
 void node_loans_take(struct node_loans *loans,
                      const struct cube_message *message);
 
-/* Whose loan `use` goes on with: what that emits, this node has found. */
+/* The borrower whose loan `use` goes on with: it found what `use` emits. */
 uint16_t node_loans_finder(const struct node_loans *loans);
 
 /* A step with what came back, or with what is borrowed, of about so many units;

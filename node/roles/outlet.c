@@ -8,7 +8,7 @@
 enum {
     HEADER_BYTES = sizeof(struct node_result_header),
     BATCH_BYTES = CUBE_PAYLOAD_MAX - HEADER_BYTES,
-    /* Tetrahedra that a batch takes however they come: a star and a finder
+    /* Tetrahedra that always fit a batch, even with a star and a finder record
      * each. */
     BATCH_TETRAHEDRA =
         BATCH_BYTES / (NODE_RESULT_FINDER_MAX + NODE_RESULT_STAR_MAX +

@@ -22,7 +22,7 @@ struct node_outlet {
     struct node_counted *counted;
     struct node_fault *fault;
     uint32_t epoch;             /* of the job */
-    uint16_t finder;            /* of what the front emits now */
+    uint16_t finder;            /* of the tetrahedra emitted now */
     struct node_outbox results; /* leave under credit */
     uint32_t credit, sent;      /* results allowed, results sent */
     struct node_result_writer writer;
@@ -47,8 +47,8 @@ struct incode_front_outside node_outlet_outside(struct node_outlet *outlet);
 /* A job begins: what leaves from now on is of its epoch. */
 void node_outlet_begin(struct node_outlet *outlet, uint32_t epoch);
 
-/* What the front emits from now on was found by that node; before the first
- * call, by this one. */
+/* The tetrahedra that the front emits from now on were found by that node;
+ * before the first call, by this node. */
 void node_outlet_found_by(struct node_outlet *outlet, uint16_t node);
 
 /* Whether it takes the results of a step; without room, a front waits. */

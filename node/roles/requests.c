@@ -6,8 +6,8 @@
 #include "incode/predicates/check.h"
 #include "node/keepers.h"
 
-/* In a wanted page's number: it is to come from the host, whoever keeps it.  No
- * page has so high a number. */
+/* A bit in a wanted page's number: the page is to come from the host, even if a
+ * node keeps it.  No page has so high a number. */
 #define OF_HOST (UINT32_C(1) << 31)
 
 void node_requests_init(struct node_requests *requests,
@@ -100,8 +100,8 @@ struct incode_page_source node_requests_source(struct node_requests *requests)
     return (struct incode_page_source){requests, outside_request};
 }
 
-/* A page that nobody here waits for.  The host sends one twice at most where
- * another node's was altered twice. */
+/* A page that nothing here waits for.  The host may send a page twice if
+ * another node's copies of it were altered twice. */
 static void refuse(struct node_requests *r, const struct node_page *page,
                    const char *words)
 {

@@ -1,9 +1,9 @@
-/* The pages that a role with a maker asks for, of the host or of the nodes that
- * keep them: holders, or those of an exchange.  It is the maker's source of
- * pages (incode/pages/pager.h).
+/* The pages that a role with a maker requests from the host, or from the nodes
+ * that keep them: holders, or those of an exchange.  It is the maker's source
+ * of pages (incode/pages/pager.h).
  *
- * A page that was altered (node/page_check.h) is reported, and asked for again,
- * of the host.
+ * A page that was altered (node/page_check.h) is reported, and requested again
+ * from the host.
  *
  * Memory: the struct, about 1 KB.  Work: a pass over the pages that are wanted,
  * a call.
@@ -33,8 +33,8 @@ struct node_requests {
     uint32_t holders;             /* as in the setup */
     struct node_lending *lending; /* of an exchange, or NULL */
     struct node_page_check check;
-    bool altered; /* a page has come so */
-    /* NODE_WANTED_MAX pages at most, and those that came altered. */
+    bool altered; /* a page has arrived altered */
+    /* At most NODE_WANTED_MAX pages, and those that arrived altered. */
     uint32_t wanted[NODE_PAGES_IN_FLIGHT_MAX];
     uint32_t wanted_count, in_flight;
     uint64_t bytes_out;
@@ -49,35 +49,36 @@ void node_requests_init(struct node_requests *requests,
 /* As a maker sees them. */
 struct incode_page_source node_requests_source(struct node_requests *requests);
 
-/* NODE_PAGE: true with *page, for whoever wanted it, and then `judge`.  False
- * with its number: it was altered, and if it is still on its way, it is to be
- * asked for `again`.  False with INCODE_NONE: it was not asked for, or is not
- * sound; a fault where it is the host's, and else it is reported. */
+/* Takes NODE_PAGE.  True with *page: the caller uses it, and then calls _judge.
+ * False with its number: the page was altered; if it is still awaited, the
+ * caller calls _again.  False with INCODE_NONE: the page was not requested, or
+ * is not sound; that is a fault if the host sent it, and else it is reported.
+ */
 bool node_requests_take(struct node_requests *requests,
                         const struct cube_message *message,
                         struct node_page *page);
 
-/* status: 0, or why the page is not taken, as in incode/triangulator.h. */
+/* status: 0, or why the page was not used, as in incode/triangulator.h. */
 void node_requests_judge(struct node_requests *requests, int status,
                          const struct node_page *page);
 
-/* The page is to come from the host; `asked`: it was asked for here before, or
- * else was to come unasked. */
+/* Requests the page from the host.  asked: it was requested here before; else
+ * it was to come unasked. */
 void node_requests_again(struct node_requests *requests, uint32_t page,
                          bool asked);
 
-/* Whether few pages are wanted: where there is other work, more may join.  A
- * report does not wait. */
+/* Whether few pages are wanted: then sending may wait for more, while there is
+ * other work.  A report is sent at once. */
 static inline bool node_requests_few(const struct node_requests *requests)
 {
     return requests->wanted_count < NODE_REQUESTS_FEW && !requests->check.owed;
 }
 
-/* Sends for wanted pages, one message for each node that has some, and a report
- * that waits; the number of pages and reports. */
+/* Requests the wanted pages, one message for each node that has some, and sends
+ * a report that waits.  Returns the number of pages and reports. */
 unsigned node_requests_send(struct node_requests *requests);
 
-/* Pages that are wanted, or on their way, and a report that waits. */
+/* The number of pages wanted or on their way, and of reports that wait. */
 uint32_t node_requests_held(const struct node_requests *requests);
 
 #endif

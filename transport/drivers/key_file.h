@@ -1,8 +1,8 @@
-/* The file with a cube's key: 64 hexadecimal digits.  Others who can write it,
- * its owner, its group or all, can join the cube, so that such a file is
- * refused; so can those who can read it, of which the user is to be told.  From
- * then on the process leaves no core, and the user's other programs cannot look
- * into it.
+/* The file with a cube's key: 64 hexadecimal digits.  A user who can write the
+ * file, or read it, can join the cube.  So a file is refused if it belongs to
+ * another user than this one or root, or if its group or others can write it.
+ * If they can read it, the caller should warn.  After a key has been read, the
+ * process leaves no core, and the user's other programs cannot read its memory.
  *
  * Memory: none.  Work: reads the digits.
  *
@@ -21,7 +21,7 @@ enum key_file_state {
     KEY_FILE_GOOD,
     KEY_FILE_SEEN,       /* good, but others can read it */
     KEY_FILE_WRITABLE,   /* its group or others can write it */
-    KEY_FILE_FOREIGN,    /* it is neither this user's nor root's */
+    KEY_FILE_FOREIGN,    /* belongs neither to this user nor to root */
     KEY_FILE_UNREADABLE, /* and errno */
     KEY_FILE_NO_KEY      /* not 64 digits */
 };

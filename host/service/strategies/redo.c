@@ -1,7 +1,7 @@
-/* What is left after nodes were found at fault: ranges of bricks, each done by
- * one node alone with pages from the host, so that a wrong brick names its
- * node.  As long as there are two, a brick is not given to the node that
- * committed it last.  No user chooses this strategy; audit.h does. */
+/* The strategy after a fault: ranges of bricks, each done by one node alone
+ * with pages from the host, so that a wrong brick names its node.  As long as
+ * there are two nodes, a brick is not given to the node that committed it last.
+ * audit.h chooses this strategy; the user cannot. */
 #include "regions.h"
 
 static void set_up(const struct host_work *work, unsigned node,
@@ -15,7 +15,7 @@ static void set_up(const struct host_work *work, unsigned node,
     }
 }
 
-/* The next range as far as it is for this node. */
+/* The part of the next range that this node may do. */
 static bool next(struct host_work *work, unsigned node, struct incode_job *job)
 {
     struct host_ledger *ledger = work->ledger;

@@ -27,7 +27,7 @@
 #define HOST_STRATEGY_DECLARE(name)                                            \
     extern const struct host_strategy host_##name;
 HOST_STRATEGIES(HOST_STRATEGY_DECLARE)
-/* Of none of the rows: what the service goes on with after a wrong result. */
+/* In no row: the strategy that the service goes on with after a fault. */
 HOST_STRATEGY_DECLARE(redo)
 
 /* Row i of the table; NULL past the last. */

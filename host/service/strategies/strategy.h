@@ -52,7 +52,7 @@ struct host_work {
     const struct host_order *order;
     struct host_ledger *ledger;
     struct host_tetrahedra *tets; /* that have come, of vertex numbers */
-    uint32_t frames;   /* pages that each node has room for, from `first` on */
+    uint32_t frames;   /* pages that each node has slots for, from `first` on */
     uint64_t page_key; /* of the setup */
     void *state;       /* the strategy's own, state_bytes */
     /* Sends a counted message, of at most CUBE_PAYLOAD_MAX bytes; false: there
