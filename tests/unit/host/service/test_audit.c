@@ -239,7 +239,7 @@ static void passes(void)
     assert_int_equal(service.audit.state, HOST_AUDIT_PASSED);
 }
 
-static void gives_up(const char *text)
+static struct host_error gives_up(const char *text)
 {
     bool passed;
     struct host_error error = {0};
@@ -249,8 +249,8 @@ static void gives_up(const char *text)
     if (strncmp(error.text, text, strlen(text)) != 0) {
         fail_msg("%s: not %s", error.text, text);
     }
-    assert_null(strchr(error.text, '\n'));
     assert_non_null(strstr(error.text, "; "));
+    return error;
 }
 
 /* That node, and no other; NOBODY. */
@@ -278,7 +278,8 @@ static bool is_open(uint32_t brick)
 
 /* --- who is at fault ------------------------------------------------------ */
 
-/* Node 1 alone; one tetrahedron that node 3 sent was of node 1's finding. */
+/* Node 1 alone; one tetrahedron that node 3 sent was of node 1's finding, and
+ * it has committed a brick of which node 2 has found all. */
 static void test_alone(void **unused)
 {
     (void)unused;
@@ -296,13 +297,16 @@ static void test_alone(void **unused)
         given.helper = 1;
         uint32_t helped = owner_of(truth.v[given.helped]);
         work_all();
+        uint32_t taken = order.region[2].first;
+        service.ledger.by[taken] = HOST_LEDGER_ALONE | 1;
         fails();
         excluded_is(1);
         snprintf(text, sizeof text, "node 1 link 0: its result is wrong: %s",
                  texts[i]);
         said_is(text);
         for (uint32_t b = 0; b < order.bricks; b++) {
-            assert_int_equal(is_open(b), node_of(b) == 1 || b == helped);
+            assert_int_equal(is_open(b),
+                             node_of(b) == 1 || b == helped || b == taken);
         }
         finish();
     }
@@ -519,12 +523,13 @@ static void test_no_other(void **unused)
     given.alone = ~0u;
     given.twice = inside(1);
     work_all();
-    gives_up("node 1: its result is wrong: it sent twice the tetrahedron of "
-             "rows ");
+    (void)gives_up(
+        "node 1: its result is wrong: it sent twice the tetrahedron of "
+        "rows ");
     finish();
 }
 
-/* It does not go on for ever. */
+/* It does not go on for ever, and the first offence is told. */
 static void test_no_end(void **unused)
 {
     (void)unused;
@@ -538,7 +543,13 @@ static void test_no_end(void **unused)
     work_all();
     spoil(1);
     spoil(2);
-    gives_up("check: ");
+    const struct host_error error = gives_up("check: ");
+    const char *found = service.audit.report.text;
+    size_t line = strcspn(found, "\n");
+    assert_true(strlen(found) > line + 1);
+    assert_memory_equal(error.text + strlen("check: "), found, line);
+    const char *advice = error.text + strlen("check: ") + line;
+    assert_int_equal(strncmp(advice, "; doing it again did not help", 29), 0);
     finish();
 }
 
