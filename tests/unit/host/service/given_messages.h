@@ -117,8 +117,8 @@ static void end(void)
 
 static bool gap; /* messages do not say how many went before them */
 
-static int send(uint16_t source, uint8_t type, const void *data, size_t size,
-                struct host_error *error)
+static inline int send(uint16_t source, uint8_t type, const void *data,
+                       size_t size, struct host_error *error)
 {
     /* A copy of the right size, so that a sanitizer sees reads past it. */
     uint8_t *copy = malloc(size + 1);
@@ -146,7 +146,8 @@ enum { JOB_OF_NODE_1 = 2 };
 
 /* A batch of one tetrahedron of node 1, and the commit of a brick of its job.
  */
-static size_t batch_of(uint8_t *data, const uint32_t v[4], uint32_t brick)
+static inline size_t batch_of(uint8_t *data, const uint32_t v[4],
+                              uint32_t brick)
 {
     struct node_result_writer writer;
     struct node_result_header header = {JOB_OF_NODE_1, 0};
