@@ -236,7 +236,7 @@ static int on_nodes(const struct host_run_options *options,
     service.memory_of = options->cube;
     service.patience_us = options->patience_s * UINT64_C(1000000);
     service.verifying = options->verifying;
-    service.foreign = options->begin != NULL; /* nodes of a cube file */
+    service.foreign = options->begin != NULL; /* a cube file, or ranks */
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);
     struct stretch stretch = begin_stretch();

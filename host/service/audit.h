@@ -40,7 +40,7 @@ struct host_service;
 
 /* When the exact check is made besides the cheap one. */
 enum host_verifying {
-    HOST_VERIFY_WHERE_DUE, /* with a cube file, and after a loss */
+    HOST_VERIFY_WHERE_DUE, /* of a cube file or ranks; after a loss */
     HOST_VERIFY_ALWAYS,
     HOST_VERIFY_NEVER
 };

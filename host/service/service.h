@@ -123,7 +123,7 @@ struct host_service {
     unsigned window;                 /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     enum host_verifying verifying;
-    bool foreign; /* the nodes are those of a cube file */
+    bool foreign; /* the nodes are of a cube file, or ranks */
     /* Of a node, and the cube file that says so (NULL: an option does), for
      * what paging.h tells; 0: it tells nothing. */
     uint64_t memory;

@@ -366,8 +366,8 @@ static void test_wrong_pages(void **unused)
         {{7, 1}, true, "node 3 link 1: reports a wrong page 7 of the host's, "},
         {{7, CUBE_HOST},
          false,
-         "node 3 link 1: reports a wrong page 7 of the host's, altered by "
-         "itself or on the way"}};
+         "node 3 link 1: reports a wrong page 7 of the host's, altered on the "
+         "way or by that node"}};
     for (size_t i = 0; i < sizeof reports / sizeof reports[0]; i++) {
         struct host_error error = {0};
         bool doubted = reports[i].wrong.sender != CUBE_HOST;
