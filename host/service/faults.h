@@ -4,7 +4,8 @@
  * and what comes after the gap looks false to the one behind it.  So a fault
  * counts only once every living node has answered a ping that was sent after
  * the fault had come, and none has told of a loss: a loss begins a new
- * generation, in which all begin anew.  What no loss explains counts at once.
+ * generation, in which all begin anew.  What no loss explains counts at once,
+ * but for a list that nodes share and that is too small for one of them.
  *
  * What counts ends the work of that node, not the run, as long as another node
  * is left: first all go on alone, then the node is excluded (audit.h).
