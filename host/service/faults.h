@@ -5,7 +5,8 @@
  * counts only once every living node has answered a ping sent after the fault
  * arrived, and no node has reported a loss.  (A loss begins a new generation,
  * in which all nodes begin anew.)  A fault that no loss can explain counts at
- * once.
+ * once, but for a list that nodes share and that is too small for one of them:
+ * that of a node which works alone may suffice.
  *
  * A fault that counts does not end the run as long as another node is left.
  * The first time all nodes go on, each working alone.  If a node then reports

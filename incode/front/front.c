@@ -285,24 +285,28 @@ bool incode_front_drain(struct incode_front *front)
 /* ---- spilling ---- */
 
 /* The position from which on bricks are to be spilled: half way between the
- * one at work and the farthest one touched. */
+ * one at work and the farthest one touched.  Bricks before the one at work are
+ * passed, but for others' and those of an exchange, whose faces wait for what
+ * others send: where nothing farther is left, the first touched one counts. */
 static uint32_t spill_position(const struct incode_front *front)
 {
-    uint32_t nearest = front->current, farthest = 0;
+    uint32_t nearest = UINT32_MAX, farthest = 0, work = front->current;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
         const struct incode_touched *entry = &front->afl.touched[i];
         incode_afl_breathe_at(&front->afl, i);
         if (!incode_touched_used(entry))
             continue;
         uint32_t position = incode_position(front, entry->brick);
-        if (front->foreign && position < nearest)
-            nearest = position;
+        nearest = position < nearest ? position : nearest;
         if (position < front->spill_from && position > farthest)
             farthest = position;
     }
-    if (farthest < nearest)
-        farthest = nearest;
-    return nearest + 1 + (farthest - nearest) / 2;
+    bool passed = front->exchange.on && work + 1 >= front->spill_from;
+    if ((front->foreign || passed) && nearest < work)
+        work = nearest;
+    if (farthest < work)
+        farthest = work;
+    return work + 1 + (farthest - work) / 2;
 }
 
 /* Moves a brick's faces and marks out, as far as there is room for them; true:

@@ -257,13 +257,75 @@ static void waits_to_ask(void **unused)
     host_points_free(&points);
 }
 
+/* Sends the last node what it is to hear of, as long as it has fewer faces than
+ * so many: what has the vertex, or, without one, every other one, so that few
+ * of the faces close. */
+static void tell_last(struct several *all, uint32_t vertex, uint32_t faces)
+{
+    uint32_t last = all->solo.regions - 1;
+    struct incode_triangulator *t = all->node[last].solo.t;
+    for (size_t i = all->share_count; i-- > 0 && t->front.afl.count < faces;) {
+        const struct several_share share = all->share[i];
+        if (share.to != last || (vertex == INCODE_NONE && i % 2 != 0) ||
+            !incode_triangulator_may_take(t, 1) ||
+            (vertex != INCODE_NONE && share.v[0] != vertex &&
+             share.v[1] != vertex && share.v[2] != vertex &&
+             share.v[3] != vertex))
+            continue;
+        all->share[i] = all->share[--all->share_count];
+        assert_int_equal(incode_triangulator_take(t, share.v), 0);
+    }
+}
+
+/* A lattice of a plane and a point beside it, which the last node hears of from
+ * lower ones.  What they send opens more faces than there is room for, all in
+ * bricks before the one at work: those are spilled, too. */
+static void spills_before_work(void **unused)
+{
+    enum { SIDE = 72, POINTS = SIDE * SIDE + 1, PRESSURE = 300 };
+    static double xyz[POINTS][3];
+    static struct several all;
+    struct solo solo = {.index = INCODE_KD,
+                        .build = INCODE_BUILD_POINTS,
+                        .regions = 1,
+                        .memory = 16 << 20};
+    (void)unused;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        xyz[i][0] = i / SIDE;
+        xyz[i][1] = i % SIDE;
+        xyz[i][2] = 3 * xyz[i][0] + 5 * xyz[i][1];
+    }
+    xyz[SIDE * SIDE][0] = xyz[SIDE * SIDE][1] = SIDE / 2.;
+    xyz[SIDE * SIDE][2] = 5 * SIDE;
+    solo_run(&solo, xyz[0], POINTS);
+    all = (struct several){
+        .seed = 5,
+        .solo = {.index = INCODE_KD, .regions = 4, .pressure = PRESSURE}};
+    several_open(&all, xyz[0], POINTS);
+    struct solo *last = &all.node[3].solo;
+    struct incode_front *front = &last->t->front;
+    for (int i = 0; i < 30000; i++)
+        (void)solo_step(&all.node[i % 3].solo, 1);
+    while (front->current + 1 < last->job.last - last->job.first) {
+        (void)solo_step(last, 1);
+        tell_last(&all, last->job.first * INCODE_BRICK_POINTS, PRESSURE / 2);
+    }
+    tell_last(&all, INCODE_NONE, 4 * PRESSURE);
+    assert_in_range(front->afl.count, 3 * PRESSURE, 4 * PRESSURE + 4);
+    several_work(&all);
+    several_gather(&all);
+    assert_string_equal(all.solo.digest.text, solo.digest.text);
+    several_close(&all);
+    solo_close(&solo);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(made_sets),      cmocka_unit_test(degenerate_sets),
         cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),
         cmocka_unit_test(twice),          cmocka_unit_test(waits_for_room),
-        cmocka_unit_test(waits_to_ask),
+        cmocka_unit_test(waits_to_ask),   cmocka_unit_test(spills_before_work),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -250,6 +250,34 @@ static void test_doubtful_fault(void **unused)
     }
 }
 
+/* A list that nodes share may be too small where one that is a node's alone is
+ * not: what is left is done by each node alone, and only then the run fails. */
+static void test_shared_list_too_small(void **unused)
+{
+    static const char text[] = "the active face list of one brick does not "
+                               "fit; give the nodes more memory";
+    (void)unused;
+    for (unsigned alone = 0; alone < 2; alone++) {
+        struct host_error error = {0};
+        begin();
+        service.ledger.alone = alone;
+        for (unsigned i = 0; i < NODES; i++) {
+            service.report[i].up = true;
+            service.node[i].start = 7;
+        }
+        assert_int_equal(send(1, NODE_FAULT, text, sizeof text - 1, &error),
+                         alone ? HOST_CUBE : 0);
+        for (unsigned i = 0; i < NODES && !alone; i++) {
+            host_faults_pinged(&service, i, 1);
+            assert_int_equal(pong_of(i, 1, 7, &error), 0);
+        }
+        assert_int_equal(service.loss, !alone);
+        assert_int_equal(service.excluded, 0);
+        assert_ptr_equal(service.strategy, alone ? &host_spatial : &host_redo);
+        end();
+    }
+}
+
 /* What to do about it is said once, also where the node says it itself. */
 static void test_fault_with_its_cure(void **unused)
 {
@@ -470,6 +498,7 @@ int main(void)
         cmocka_unit_test(test_starts),
         cmocka_unit_test(test_fault),
         cmocka_unit_test(test_doubtful_fault),
+        cmocka_unit_test(test_shared_list_too_small),
         cmocka_unit_test(test_fault_with_its_cure),
         cmocka_unit_test(test_strategy),
         cmocka_unit_test(test_passed),
