@@ -1,6 +1,5 @@
-/* The check of a result at the end of a run, on results that are wrong in a
- * chosen place: who is excluded, what is done again, and when the run gives
- * up. */
+/* Results that are wrong in a chosen place: which node is excluded, what is done
+ * again, and when the run gives up. */
 #include "given_messages.h"
 
 #include "host/service/generations.h"
@@ -90,8 +89,7 @@ static bool is_of(unsigned node, const uint32_t t[4])
     return is;
 }
 
-/* A tetrahedron that lies inside the region of a node, and so do all that share
- * a vertex with it. */
+/* A tetrahedron inside a node's region, as all that share a vertex with it. */
 static int64_t inside(unsigned node)
 {
     for (uint64_t i = 0; i < truth.count; i++) {
@@ -111,8 +109,7 @@ static int64_t inside(unsigned node)
     return NO_TET;
 }
 
-/* Another vertex in the place of one, in a tetrahedron that is positive and of
- * the same brick. */
+/* Another vertex in the place of one: positive, and of the same brick. */
 static void exchange(uint32_t t[4])
 {
     uint32_t brick = owner_of(t), v = brick * INCODE_BRICK_POINTS;
@@ -276,8 +273,6 @@ static bool is_open(uint32_t brick)
     return !host_ledger_committed(&service.ledger, brick);
 }
 
-/* --- who is at fault ------------------------------------------------------ */
-
 /* Node 1 alone; one tetrahedron that node 3 sent was of node 1's finding, and
  * it has committed a brick of which node 2 has found all. */
 static void test_alone(void **unused)
@@ -357,8 +352,7 @@ static void test_suspect(void **unused)
     finish();
 }
 
-/* Where there is no tetrahedron at all, the one node that did the points alone
- * left them out; of two that did them, or together with others, none did. */
+/* One node that did such points alone left them out; of two, or many, none. */
 static void test_no_tetrahedra(void **unused)
 {
     (void)unused;
@@ -422,8 +416,6 @@ static void test_far_point(void **unused)
     truth = near_truth;
 }
 
-/* --- what is done again --------------------------------------------------- */
-
 /* A tetrahedron of that node's region is wrong. */
 static void spoil(unsigned node)
 {
@@ -435,8 +427,7 @@ static void spoil(unsigned node)
     exchange(tets.v[i]);
 }
 
-/* Failures without a node at fault: what is near, then all that nodes did
- * together, then everything. */
+/* What is near, then all that nodes did together, then everything. */
 static void test_unclear(void **unused)
 {
     (void)unused;
@@ -474,8 +465,7 @@ static void test_unclear(void **unused)
     finish();
 }
 
-/* A brick is another node's than the one that committed it last, as long as
- * there are two. */
+/* As long as there are two, a brick goes to the other node. */
 static void test_redo(void **unused)
 {
     (void)unused;
@@ -506,8 +496,6 @@ static void test_redo(void **unused)
     assert_int_equal(job.last, first + 4);
     finish();
 }
-
-/* --- when the run gives up ------------------------------------------------ */
 
 static void test_no_other(void **unused)
 {
@@ -552,8 +540,6 @@ static void test_no_end(void **unused)
     assert_int_equal(strncmp(advice, "; doing it again did not help", 29), 0);
     finish();
 }
-
-/* --- the exact check ------------------------------------------------------ */
 
 static void is_exact(enum host_verifying verifying, bool foreign, bool exact)
 {
