@@ -1,5 +1,5 @@
-/* Results that are wrong in a chosen place: which node is excluded, what is done
- * again, and when the run gives up. */
+/* Results that are wrong in a chosen place: the node that is excluded, what is
+ * done again, and when the run gives up. */
 #include "given_messages.h"
 
 #include "host/service/generations.h"
