@@ -110,7 +110,6 @@ const char *loader_fault_text(enum loader_fault fault)
         [LOADER_WRONG_SIGNATURE] = "its signature is false",
         [LOADER_WRONG_DIGEST] = "its code is not what was signed",
         [LOADER_WORN] = "the board's flash does not hold it",
-        [LOADER_TOO_OFTEN] = "too many transfers have begun since the board "
-                             "was switched on, or false ones just now"};
+        [LOADER_TOO_OFTEN] = "too many transfers, or false ones, have begun"};
     return (unsigned)fault < LOADER_FAULTS ? texts[fault] : "it is refused";
 }
