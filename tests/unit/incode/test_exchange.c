@@ -291,8 +291,9 @@ static void spills_before_work(void **unused)
                         .memory = 16 << 20};
     (void)unused;
     for (int i = 0; i < SIDE * SIDE; i++) {
-        xyz[i][0] = i / SIDE;
-        xyz[i][1] = i % SIDE;
+        const int row = i / SIDE, column = i % SIDE;
+        xyz[i][0] = row;
+        xyz[i][1] = column;
         xyz[i][2] = 3 * xyz[i][0] + 5 * xyz[i][1];
     }
     xyz[SIDE * SIDE][0] = xyz[SIDE * SIDE][1] = SIDE / 2.;

@@ -66,8 +66,9 @@ static void plane_and_a_point(void **unused)
     static double xyz[PLANE][3];
     (void)unused;
     for (int i = 0; i < SIDE * SIDE; i++) {
-        xyz[i][0] = i / SIDE;
-        xyz[i][1] = i % SIDE;
+        const int row = i / SIDE, column = i % SIDE;
+        xyz[i][0] = row;
+        xyz[i][1] = column;
         xyz[i][2] = -(xyz[i][0] + xyz[i][1]);
     }
     xyz[SIDE * SIDE][0] = xyz[SIDE * SIDE][1] = SIDE / 2.;
@@ -132,8 +133,9 @@ static void released_vertices(void **unused)
                         .memory = 320 << 10};
     (void)unused;
     for (int i = 0; i < SIDE * SIDE; i++) {
-        xyz[i][0] = i / SIDE;
-        xyz[i][1] = i % SIDE;
+        const int row = i / SIDE, column = i % SIDE;
+        xyz[i][0] = row;
+        xyz[i][1] = column;
         xyz[i][2] = 3 * xyz[i][0] + 5 * xyz[i][1];
     }
     xyz[SIDE * SIDE][0] = xyz[SIDE * SIDE][1] = SIDE / 2.;

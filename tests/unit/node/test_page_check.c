@@ -54,8 +54,8 @@ static void test_vectors(void **unused)
     const uint64_t key = 0x0706050403020100;
     uint8_t bytes[64];
     uint32_t words[16];
-    for (uint8_t i = 0; i < sizeof bytes; i++) {
-        bytes[i] = i;
+    for (unsigned i = 0; i < sizeof bytes; i++) {
+        bytes[i] = (uint8_t)i;
     }
     memcpy(words, bytes, sizeof words);
     for (size_t i = 0; i < sizeof vectors / sizeof vectors[0]; i++) {

@@ -353,7 +353,8 @@ static void give_regions(void)
         message.first[i] = order.region[i].first;
     }
     message.first[NODES] = order.bricks;
-    for (uint16_t i = 0; i < NODES; i++) {
+    for (unsigned k = 0; k < NODES; k++) {
+        const uint16_t i = (uint16_t)k;
         const struct host_region *r = &order.region[i];
         assert_true(post(CUBE_HOST, i, NODE_REGIONS, &message, sizeof message));
         give_job(i, r->first, r->last, r->lo, r->hi);

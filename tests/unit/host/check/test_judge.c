@@ -125,9 +125,10 @@ static void judged_on_lattices(void **unused)
         struct fixture f;
         double xyz[3 * POINTS];
         for (int k = 0; k < POINTS; k++) {
-            xyz[3 * k] = k % SIDE / parts[i][0];
-            xyz[3 * k + 1] = k / SIDE % SIDE / parts[i][1];
-            xyz[3 * k + 2] = k / SIDE / SIDE / parts[i][2];
+            const int cell[3] = {k % SIDE, k / SIDE % SIDE, k / SIDE / SIDE};
+            for (int d = 0; d < 3; d++) {
+                xyz[3 * k + d] = cell[d] / parts[i][d];
+            }
         }
         open_points(&f, xyz, POINTS);
         judge_all(&f, UINT64_MAX);

@@ -431,7 +431,7 @@ static void spoil(unsigned node)
 static void test_unclear(void **unused)
 {
     (void)unused;
-    bool again[64];
+    bool again[64] = {false};
     prepare();
     assert_true(order.bricks <= 64);
     given.alone = 1 << 0;
