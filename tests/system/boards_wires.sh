@@ -24,6 +24,8 @@ computes 'wires/node 1 reset' '--strategy exchange' reset_board 1
 tells 'wires/node 1 reset: is noticed' '.generations > 1'
 computes 'wires/node 0 reset' '--strategy exchange' reset_board 0
 tells 'wires/node 0 reset: is noticed' '.generations > 1'
+# No restart of the run before is left for the next one.
+computes 'wires/after the resets' '--strategy exchange'
 computes 'wires/node 1 stopped' '--strategy exchange' stop_board 1 3
 tells 'wires/node 1 stopped: is waited for' '.generations == 1'
 computes 'wires/node 1 killed' '--strategy exchange' kill_board 1
