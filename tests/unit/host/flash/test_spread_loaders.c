@@ -109,7 +109,7 @@ static bool is_named(const struct board *b, const uint8_t *serial)
            memcmp(has, serial, sizeof has) == 0;
 }
 
-/* A board takes a name from who has an image for it that its signer signed. */
+/* A board takes a name only with an image that the board's signer signed. */
 static void a_name_counts_within_a_transfer_alone(void **unused)
 {
     struct loader_do_message name = {.what = LOADER_NAME,

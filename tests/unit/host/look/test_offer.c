@@ -37,7 +37,7 @@ static struct host_node_set all;
 /* --- who has the cube ------------------------------------------------------
  */
 
-/* Its time passes faster than that of who looks.  clock: both wait for minutes.
+/* Its time passes faster than the watcher's.  clock: both wait for minutes.
  */
 static uint64_t holder_us(void *context)
 {

@@ -517,7 +517,7 @@ static void test_no_other(void **unused)
     finish();
 }
 
-/* It does not go on for ever, and the first offence is told. */
+/* A run gives up after a bounded number of checks, and reports one offence. */
 static void test_no_end(void **unused)
 {
     (void)unused;

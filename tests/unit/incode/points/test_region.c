@@ -141,7 +141,7 @@ static void set_corner(struct corner *c, const double p[3],
     set_radius(&c->lifted, q);
 }
 
-/* ---- what is told apart ---- */
+/* ---- regions against boxes of points ---- */
 
 static struct incode_regions regions;
 
