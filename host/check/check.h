@@ -7,15 +7,16 @@
  * one tetrahedron, and tetrahedra meet facet to facet (see check.c).  Facets
  * are summed at their vertices by hashes under a random key: without the key, a
  * wrong result cannot be made to pass, and any wrong result passes with a
- * probability below 2^-60.
+ * probability below 2^-50 (see sums.c).
  * Delaunay: in addition, no vertex lies inside the sphere of a neighbour under
  * the tie rule.  Then this is the one Delaunay triangulation.  This depth pairs
  * all facets one by one, and relies on no hash.
  *
- * Memory: on T <= 4 threads 8 (T + 1) + 1 bytes a vertex number; 80 a facet of
- * the hull; and 8 a tetrahedron for the Delaunay depth, or for tiling 12 for
- * each tetrahedron with three vertices on the hull.  Work: O(n) on all
- * threads for vertices of bounded degree.  The tetrahedra stay as they are.
+ * Memory: on T <= 4 threads 8 T + 2 bytes a vertex number; 80 a facet of the
+ * hull; and 8 a tetrahedron for the Delaunay depth, or for tiling 12 for each
+ * tetrahedron whose lowest or second vertex is the lowest of a facet of the
+ * hull.  Work: O(n) on all threads for vertices of bounded degree.  The
+ * tetrahedra stay as they are.
  *
  *     struct host_sites sites = host_sites_of_order(&order);
  *     if (host_check(&sites, &tets, HOST_CHECK_TILING, NULL, &report,

@@ -48,10 +48,12 @@ struct check {
     unsigned parts;
     struct check_part part[CHECK_PARTS_MAX];
     uint64_t key[2];
-    uint64_t *mark; /* [count] keyed value of a vertex; 0: it is none */
-    uint8_t *hot;   /* [count] 1: the vertex's facets do not cancel */
-    uint64_t *bad;  /* a bit a tetrahedron: left out of the check */
-    bool any_bad, any_unused;
+    uint8_t *used; /* [count] 1: third or fourth vertex of a tetrahedron */
+    uint8_t *hot;  /* [count] 1: facets with it as their lowest vertex do not
+                      cancel */
+    uint64_t *bad; /* a bit a tetrahedron: left out of the check */
+    bool careful;  /* some vertices are false: all are looked at */
+    bool any_bad, any_unused, any_false;
     struct host_hull hull;
     uint64_t next;        /* first vertex or facet that no thread has taken */
     pthread_mutex_t lock; /* of what follows, and of the hull */
@@ -85,6 +87,16 @@ static inline uint64_t check_take(struct check *c, uint64_t turn,
 static inline uint64_t check_end(uint64_t first, uint64_t turn, uint64_t total)
 {
     return total - first < turn ? total : first + turn;
+}
+
+/* The lowest two vertices. */
+static inline void check_lowest_two(const uint32_t t[4], uint32_t low[2])
+{
+    uint32_t a = t[0] < t[1] ? t[0] : t[1], b = t[0] < t[1] ? t[1] : t[0];
+    uint32_t c = t[2] < t[3] ? t[2] : t[3], d = t[2] < t[3] ? t[3] : t[2];
+    uint32_t higher = a < c ? c : a, other = b < d ? b : d;
+    low[0] = a < c ? a : c;
+    low[1] = higher < other ? higher : other;
 }
 
 /* sums.c: leaves out tetrahedra that are not positive, and finds the vertices

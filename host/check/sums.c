@@ -1,16 +1,18 @@
 /* Each tetrahedron by itself, and the sums of facets at vertices.
  *
- * Each vertex has a mark, a word made of its number and a random key.  The hash
- * of a facet is made of its three vertices' marks.  It is positive if the
- * facet, seen from outside its tetrahedron, has its vertices in an even order,
- * else negative.  So the two sides of a facet cancel, and at a vertex inside a
- * triangulation the sum is 0.  Sums are taken modulo 2^63.
+ * Each vertex v has a mark m(v), an odd word made of its number and a random
+ * key.  A facet with the vertices a < b < c is summed at a, by m(b) m(c) modulo
+ * 2^63.  The sign is that of the permutation in which the facet has its
+ * vertices, seen from outside its tetrahedron.  So the two sides of a facet
+ * cancel, and where all facets have two sides each sum is 0.
  *
- * A wrong result is missed only if a facet that does not cancel has a vertex
- * whose sum is 0 all the same.  Without the key, hashes are as good as random
- * words.  A sum of such words with factors below 2^k, not all 0, is 0 once in
- * 2^(63 - k).  The factors count the tetrahedra at one facet, which are few; so
- * for three vertices that is less than once in 2^60. */
+ * A wrong result is missed only if facets do not cancel and the sum at their
+ * lowest vertex is 0 all the same.  Such a sum is a polynomial of two factors a
+ * term.  Without the key, marks are as good as random odd words.  The factor
+ * c of one mark, itself a sum of marks, ends in j zeros once in 2^j, and then
+ * c m + d is 0 once in 2^(62 - j).  Together that is less than 62 in 2^62, and
+ * 2^k times as much if one facet is there 2^k times: below 2^-50 for any number
+ * of repeats that a run lets through. */
 #include <stdbool.h>
 #include <string.h>
 
@@ -20,31 +22,14 @@
 
 enum { BLOCK = 64 }; /* tetrahedra at a time: a word of `bad` */
 
-/* A well-mixed word (the finaliser of Steele, Lea and Flood's SplitMix64). */
-static uint64_t mix(uint64_t x)
+/* The mark of a vertex: the finaliser of Steele, Lea and Flood's SplitMix64,
+ * with a second key between its two steps. */
+static inline uint64_t mark_of(uint32_t vertex, const uint64_t key[2])
 {
-    x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+    uint64_t x = key[0] + vertex;
+    x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9) ^ key[1];
     x = (x ^ x >> 27) * UINT64_C(0x94d049bb133111eb);
-    return x ^ x >> 31;
-}
-
-/* --- Marks ------------------------------------------------------------ */
-
-static void make_marks(void *context, unsigned part)
-{
-    (void)part;
-    struct check *c = context;
-    uint64_t count = c->sites->count, i, distinct = 0;
-    while ((i = check_take(c, CHECK_VERTICES, count)) < count) {
-        uint64_t end = check_end(i, CHECK_VERTICES, count);
-        for (; i < end; i++) {
-            if (host_site_is_vertex(c->sites, (uint32_t)i)) {
-                c->mark[i] = mix(mix(c->key[0] + i) ^ c->key[1]) | 1;
-                distinct++;
-            }
-        }
-    }
-    (void)__atomic_fetch_add(&c->report->distinct, distinct, __ATOMIC_RELAXED);
+    return (x ^ x >> 31) | 1;
 }
 
 /* --- A block of tetrahedra -------------------------------------------- */
@@ -54,10 +39,13 @@ struct block {
     uint64_t first;
     uint32_t n;
     const uint32_t (*v)[4];
-    uint32_t kept[BLOCK][4]; /* vertex 0 instead of numbers out of range */
-    uint64_t bad;            /* a bit each */
+    uint32_t kept[BLOCK][4];   /* vertex 0 instead of numbers out of range */
+    uint64_t bad;              /* a bit each */
+    uint32_t sorted[4][BLOCK]; /* its vertices, lowest first */
+    uint32_t odd[BLOCK];       /* 1: that is an odd permutation, else 0 */
+    uint64_t sum[2][BLOCK];    /* at the lowest vertex, and at the second */
     double p[4][3][BLOCK];
-    int64_t mark[4][BLOCK], sum[4][BLOCK], sure[BLOCK];
+    int64_t sure[BLOCK];
     struct incode_tally tally;
 };
 
@@ -69,54 +57,69 @@ static void leave_out(struct block *b, uint32_t i, const char *what)
     b->bad |= UINT64_C(1) << i;
 }
 
-/* Numbers out of range must not be looked up. */
-static void check_range(struct block *b)
+/* What is wrong with a vertex number; NULL: it is a vertex. */
+static const char *vertex_fault(const struct host_sites *sites, uint32_t v)
 {
-    uint64_t count = b->c->sites->count;
-    uint32_t last = (uint32_t)(count - 1), over = count == 0;
-    for (uint32_t i = 0; i < b->n; i++) {
-        for (int k = 0; k < 4; k++) {
-            over |= b->v[i][k] > last;
-        }
+    if (v >= sites->count) {
+        return "has a vertex that is no row of the points";
     }
-    if (over == 0) {
-        return;
-    }
+    return host_site_is_vertex(sites, v) ? NULL
+           : sites->order == NULL ? "uses a row that repeats an earlier one"
+                                  : "has a vertex that is no point";
+}
+
+/* Leaves out tetrahedra whose numbers must not be looked up. */
+static void check_vertices(struct block *b)
+{
     memcpy(b->kept, b->v, b->n * sizeof *b->v);
     b->v = (const uint32_t(*)[4])b->kept;
     for (uint32_t i = 0; i < b->n; i++) {
-        uint32_t *t = b->kept[i];
-        if (count == 0 || t[0] > last || t[1] > last || t[2] > last ||
-            t[3] > last) {
-            leave_out(b, i, "has a vertex that is no row of the points");
-            memset(t, 0, sizeof b->kept[i]);
+        const char *what = NULL;
+        for (int k = 0; k < 4 && what == NULL; k++) {
+            what = vertex_fault(b->c->sites, b->kept[i][k]);
+        }
+        if (what != NULL) {
+            leave_out(b, i, what);
+            memset(b->kept[i], 0, sizeof b->kept[i]);
         }
     }
 }
 
-static void gather_marks(struct block *b)
+static inline void order_two(uint32_t *a, uint32_t *b, uint32_t *odd)
 {
-    const uint64_t *mark = b->c->mark;
-    int64_t none = 0;
+    uint32_t low = *a < *b ? *a : *b, high = *a < *b ? *b : *a;
+    *odd ^= *a > *b;
+    *a = low;
+    *b = high;
+}
+
+/* Sorts the vertices of each tetrahedron, and checks their numbers: those out
+ * of range at once, other wrong ones once any is known to be there. */
+static void sort_vertices(struct block *b)
+{
+    uint32_t most = 0;
     for (uint32_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 4; k++) {
-            b->mark[k][i] = (int64_t)mark[b->v[i][k]];
+            b->sorted[k][i] = b->v[i][k];
         }
     }
-    for (int k = 0; k < 4; k++) {
-        for (uint32_t i = 0; i < b->n; i++) {
-            none |= b->mark[k][i] == 0;
-        }
+    for (uint32_t i = 0; i < BLOCK; i++) {
+        uint32_t v0 = b->sorted[0][i], v1 = b->sorted[1][i];
+        uint32_t v2 = b->sorted[2][i], v3 = b->sorted[3][i], odd = 0;
+        order_two(&v0, &v1, &odd);
+        order_two(&v2, &v3, &odd);
+        order_two(&v0, &v2, &odd);
+        order_two(&v1, &v3, &odd);
+        order_two(&v1, &v2, &odd);
+        b->sorted[0][i] = v0;
+        b->sorted[1][i] = v1;
+        b->sorted[2][i] = v2;
+        b->sorted[3][i] = v3;
+        b->odd[i] = odd;
+        most = v3 > most ? v3 : most;
     }
-    for (uint32_t i = 0; i < b->n && none != 0; i++) {
-        if ((b->bad >> i & 1) == 0 &&
-            (b->mark[0][i] == 0 || b->mark[1][i] == 0 || b->mark[2][i] == 0 ||
-             b->mark[3][i] == 0)) {
-            leave_out(b, i,
-                      b->c->sites->order == NULL
-                          ? "uses a row that repeats an earlier one"
-                          : "has a vertex that is no point");
-        }
+    if (most >= b->c->sites->count || b->c->careful) {
+        check_vertices(b);
     }
 }
 
@@ -193,54 +196,56 @@ static void check_orientation(struct block *b)
     }
 }
 
-static inline int64_t facet_hash(int64_t a, int64_t b, int64_t c)
+/* x, or -x if odd is 1. */
+static inline uint64_t with_sign(uint64_t x, uint32_t odd)
 {
-    uint64_t x = (uint64_t)a + (uint64_t)b + (uint64_t)c;
-    x = (x ^ x >> 32) * UINT64_C(0xbf58476d1ce4e5b9);
-    x = (x ^ x >> 29) * UINT64_C(0x94d049bb133111eb);
-    return (int64_t)x;
+    uint64_t all = (uint64_t)0 - odd;
+    return (x ^ all) - all;
 }
 
-/* odd: 0, or -1 to change the sign. */
-static inline int64_t signed_hash(int64_t hash, int64_t odd)
-{
-    return (int64_t)((uint64_t)(hash ^ odd) - (uint64_t)odd);
-}
-
-/* What the facets at each vertex add to its sum: of the four facets (1 2 3),
- * (0 3 2), (0 1 3), (0 2 1), all but the one opposite. */
+/* What the facets of a, b, c, d (sorted) add: -bc + bd - cd at a, and cd at b,
+ * negated for an odd permutation. */
 static void sum_facets(struct block *b)
 {
+    const uint64_t *key = b->c->key;
     for (uint32_t i = 0; i < BLOCK; i++) {
-        int64_t v0 = b->mark[0][i], v1 = b->mark[1][i], v2 = b->mark[2][i],
-                v3 = b->mark[3][i];
-        int64_t below01 = -(int64_t)(v0 < v1), below02 = -(int64_t)(v0 < v2),
-                below03 = -(int64_t)(v0 < v3), below12 = -(int64_t)(v1 < v2),
-                below13 = -(int64_t)(v1 < v3), below23 = -(int64_t)(v2 < v3);
-        uint64_t f[4], all;
-        f[0] = (uint64_t)signed_hash(facet_hash(v1, v2, v3),
-                                     below12 ^ below23 ^ below13);
-        f[1] = (uint64_t)signed_hash(facet_hash(v0, v2, v3),
-                                     ~(below02 ^ below23 ^ below03));
-        f[2] = (uint64_t)signed_hash(facet_hash(v0, v1, v3),
-                                     below01 ^ below13 ^ below03);
-        f[3] = (uint64_t)signed_hash(facet_hash(v0, v1, v2),
-                                     ~(below01 ^ below12 ^ below02));
-        all = f[0] + f[1] + f[2] + f[3];
-        for (int k = 0; k < 4; k++) {
-            b->sum[k][i] = (int64_t)((all - f[k]) << 1);
-        }
+        uint64_t m1 = mark_of(b->sorted[1][i], key);
+        uint64_t m2 = mark_of(b->sorted[2][i], key);
+        uint64_t m3 = mark_of(b->sorted[3][i], key);
+        uint64_t last = m2 * m3;
+        b->sum[0][i] = with_sign(m1 * (m3 - m2) - last, b->odd[i]) << 1;
+        b->sum[1][i] = with_sign(last, b->odd[i]) << 1;
     }
 }
 
-static void add_sums(const struct block *b, uint64_t *sum)
+/* Bit 0 of a sum: the vertex is used.  The other two vertices' bytes say so. */
+static inline void add_one(const struct block *b, uint32_t i, uint64_t *sum,
+                           uint8_t *used)
 {
+    uint64_t *low = &sum[b->sorted[0][i]], *second = &sum[b->sorted[1][i]];
+    *low = (*low + b->sum[0][i]) | 1;
+    *second = (*second + b->sum[1][i]) | 1;
+    __atomic_store_n(&used[b->sorted[2][i]], 1, __ATOMIC_RELAXED);
+    __atomic_store_n(&used[b->sorted[3][i]], 1, __ATOMIC_RELAXED);
+}
+
+/* A whole block in four places in turn: neighbours in the list often have the
+ * same lowest vertex, and an addition waits for the one before. */
+static void add_sums(const struct block *b, uint64_t *sum, uint8_t *used)
+{
+    enum { TURNS = BLOCK / 4 };
+    if (b->n == BLOCK && b->bad == 0) {
+        for (uint32_t i = 0; i < TURNS; i++) {
+            add_one(b, i, sum, used);
+            add_one(b, i + TURNS, sum, used);
+            add_one(b, i + 2 * TURNS, sum, used);
+            add_one(b, i + 3 * TURNS, sum, used);
+        }
+        return;
+    }
     for (uint32_t i = 0; i < b->n; i++) {
         if ((b->bad >> i & 1) == 0) {
-            for (int k = 0; k < 4; k++) {
-                uint64_t *s = &sum[b->v[i][k]];
-                *s = (*s + (uint64_t)b->sum[k][i]) | 1;
-            }
+            add_one(b, i, sum, used);
         }
     }
 }
@@ -255,11 +260,10 @@ static void sum_part(void *context, unsigned number)
         b.n = (uint32_t)(check_end(i, BLOCK, part->last) - i);
         b.v = (const uint32_t(*)[4])c->tets->v + i;
         b.bad = 0;
-        check_range(&b);
-        gather_marks(&b);
+        sort_vertices(&b);
         check_orientation(&b);
         sum_facets(&b);
-        add_sums(&b, part->sum);
+        add_sums(&b, part->sum, c->used);
         if (b.bad != 0) {
             c->bad[i / BLOCK] = b.bad;
             __atomic_store_n(&c->any_bad, true, __ATOMIC_RELAXED);
@@ -273,24 +277,38 @@ static void find_hot(void *context, unsigned number)
 {
     (void)number;
     struct check *c = context;
-    uint64_t count = c->sites->count, i;
+    uint64_t count = c->sites->count, i, distinct = 0;
     while ((i = check_take(c, CHECK_VERTICES, count)) < count) {
         uint64_t end = check_end(i, CHECK_VERTICES, count);
         for (; i < end; i++) {
-            uint64_t sum = 0, used = 0;
+            uint64_t sum = 0, used = c->used[i];
+            uint32_t v = (uint32_t)i;
+            bool is_vertex = host_site_is_vertex(c->sites, v);
             for (unsigned k = 0; k < c->parts; k++) {
                 sum += c->part[k].sum[i] & ~UINT64_C(1);
                 used |= c->part[k].sum[i];
             }
             c->hot[i] = sum != 0;
-            if ((used & 1) == 0 && c->mark[i] != 0) {
-                uint32_t v = (uint32_t)i;
+            distinct += is_vertex;
+            if ((used & 1) != 0 && !is_vertex) {
+                __atomic_store_n(&c->any_false, true, __ATOMIC_RELAXED);
+            } else if ((used & 1) == 0 && is_vertex) {
                 check_fault(c, "point", "is a vertex of no tetrahedron", NULL,
                             0, &v, 1);
                 __atomic_store_n(&c->any_unused, true, __ATOMIC_RELAXED);
             }
         }
     }
+    (void)__atomic_fetch_add(&c->report->distinct, distinct, __ATOMIC_RELAXED);
+}
+
+/* Out of line, so that the loop below stays short: a third of its time. */
+static __attribute__((noinline)) bool is_candidate(const uint8_t *hot,
+                                                   const uint32_t t[4])
+{
+    uint32_t low[2];
+    check_lowest_two(t, low);
+    return (hot[low[0]] | hot[low[1]]) != 0;
 }
 
 static void list_part(void *context, unsigned number)
@@ -298,15 +316,18 @@ static void list_part(void *context, unsigned number)
     struct check *c = context;
     struct check_part *part = &c->part[number];
     const uint8_t *hot = c->hot;
+    uint64_t listed = 0;
     for (uint64_t i = part->first; i < part->last; i++) {
         const uint32_t *t = c->tets->v[i];
-        if (check_is_bad(c, i) || (hot[t[0]] | hot[t[1]]) == 0) {
-            continue; /* at most two are hot: most */
+        if (check_is_bad(c, i) ||
+            (hot[t[0]] | hot[t[1]] | hot[t[2]] | hot[t[3]]) == 0) {
+            continue; /* most */
         }
-        if (hot[t[0]] + hot[t[1]] + hot[t[2]] + hot[t[3]] >= 3) {
-            part->list[part->listed++] = (uint32_t)(i - part->first);
+        if (is_candidate(hot, t)) {
+            part->list[listed++] = (uint32_t)(i - part->first);
         }
     }
+    part->listed = listed;
 }
 
 /* --- All together ----------------------------------------------------- */
@@ -315,7 +336,7 @@ static bool make_room(struct check *c)
 {
     size_t count = (size_t)c->sites->count;
     bool enough = true;
-    c->mark = host_map(count * sizeof *c->mark);
+    c->used = host_map(count);
     c->hot = host_map(count);
     c->bad = host_map(((size_t)c->tets->count / 64 + 1) * sizeof *c->bad);
     for (unsigned i = 0; i < c->parts; i++) {
@@ -328,7 +349,7 @@ static bool make_room(struct check *c)
             enough = enough && part->list != NULL;
         }
     }
-    return enough && c->mark != NULL && c->hot != NULL && c->bad != NULL;
+    return enough && c->used != NULL && c->hot != NULL && c->bad != NULL;
 }
 
 static void run(struct check *c, unsigned threads,
@@ -338,13 +359,35 @@ static void run(struct check *c, unsigned threads,
     host_fork_all(threads, function, c);
 }
 
+static void sum_all(struct check *c)
+{
+    run(c, c->parts, sum_part);
+    run(c, host_threads(), find_hot);
+}
+
+/* Once more, with a look at each vertex. */
+static void sum_carefully(struct check *c)
+{
+    size_t count = (size_t)c->sites->count;
+    for (unsigned i = 0; i < c->parts; i++) {
+        memset(c->part[i].sum, 0, count * sizeof *c->part[i].sum);
+    }
+    memset(c->used, 0, count);
+    memset(c->bad, 0, ((size_t)c->tets->count / 64 + 1) * sizeof *c->bad);
+    c->any_bad = c->any_unused = false;
+    c->faults_kept = c->report->faults = c->report->distinct = 0;
+    c->careful = true;
+    sum_all(c);
+}
+
 int check_sums(struct check *c)
 {
-    size_t bytes = (size_t)c->sites->count * sizeof(uint64_t);
+    size_t count = (size_t)c->sites->count;
     if (make_room(c)) {
-        run(c, host_threads(), make_marks);
-        run(c, c->parts, sum_part);
-        run(c, host_threads(), find_hot);
+        sum_all(c);
+        if (c->any_false) {
+            sum_carefully(c);
+        }
         if (c->depth == HOST_CHECK_TILING) {
             run(c, c->parts, list_part);
         }
@@ -352,10 +395,10 @@ int check_sums(struct check *c)
         host_fail_memory(c->error, "the check");
     }
     for (unsigned i = 0; i < c->parts; i++) {
-        host_unmap(c->part[i].sum, bytes);
+        host_unmap(c->part[i].sum, count * sizeof *c->part[i].sum);
         c->part[i].sum = NULL;
     }
-    host_unmap(c->mark, bytes);
-    c->mark = NULL;
+    host_unmap(c->used, count);
+    c->used = NULL;
     return c->error->code;
 }

@@ -28,24 +28,6 @@ static uint32_t tet_of(const struct check_part *part, uint64_t i)
     return part->list == NULL ? (uint32_t)i : part->list[i];
 }
 
-static inline uint32_t lower(uint32_t a, uint32_t b)
-{
-    return a < b ? a : b;
-}
-
-static inline uint32_t higher(uint32_t a, uint32_t b)
-{
-    return a < b ? b : a;
-}
-
-static inline void lowest_two(const uint32_t t[4], uint32_t low[2])
-{
-    uint32_t a = lower(t[0], t[1]), b = higher(t[0], t[1]);
-    uint32_t c = lower(t[2], t[3]), d = higher(t[2], t[3]);
-    low[0] = lower(a, c);
-    low[1] = lower(higher(a, c), lower(b, d));
-}
-
 /* Counts, then fills: end[v + 1] becomes the first entry of v and, as it is
  * filled, the end of the entries. */
 static void list_entries(void *context, unsigned number)
@@ -61,7 +43,7 @@ static void list_entries(void *context, unsigned number)
             if (check_is_bad(c, part->first + tet)) {
                 continue;
             }
-            lowest_two(v[tet], low);
+            check_lowest_two(v[tet], low);
             if (fill == 0) {
                 next[low[0]]++;
                 next[low[1]]++;
@@ -222,7 +204,7 @@ static void pair(struct walk *w, uint64_t facet, uint64_t twin)
 static void add_facet(struct walk *w, uint32_t x, uint32_t y, uint64_t tet,
                       uint32_t corner)
 {
-    uint64_t others = (uint64_t)lower(x, y) << 32 | higher(x, y);
+    uint64_t others = x < y ? (uint64_t)x << 32 | y : (uint64_t)y << 32 | x;
     uint64_t facet = pack(tet, corner, x < y);
     size_t i = (size_t)((others * UINT64_C(0x9e3779b97f4a7c15)) >> 32);
     i &= w->mask;
@@ -253,7 +235,6 @@ static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet)
                                            {{1, 3}, {3, 0}, {0, 0}, {0, 1}},
                                            {{2, 1}, {0, 2}, {1, 0}, {0, 0}}};
     const uint32_t *t = w->c->tets->v[tet];
-    const uint8_t *hot = w->c->depth == HOST_CHECK_TILING ? w->c->hot : NULL;
     int place = 0, least = -1;
     for (int k = 0; k < 4; k++) {
         place = t[k] == p ? k : place;
@@ -263,10 +244,8 @@ static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet)
         if (k == place || (least >= 0 && k != least)) {
             continue;
         }
-        uint32_t x = t[after[k][place][0]], y = t[after[k][place][1]];
-        if (hot == NULL || (hot[p] & hot[x] & hot[y]) != 0) {
-            add_facet(w, x, y, tet, (uint32_t)k);
-        }
+        add_facet(w, t[after[k][place][0]], t[after[k][place][1]], tet,
+                  (uint32_t)k);
     }
 }
 
