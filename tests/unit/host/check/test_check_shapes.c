@@ -258,6 +258,41 @@ static void two_bodies_are_found(void **unused)
     close_set(&f);
 }
 
+/* All tetrahedra at one vertex get a false vertex: a number out of range, which
+ * is seen at once, or an unused slot, for which all is summed anew.  Both times
+ * the same faults are counted, each once, with the vertex left alone. */
+static void false_vertices_count_once(void **unused)
+{
+    (void)unused;
+    struct fixture f;
+    struct host_check_report r[2];
+    uint32_t free_slot = 0, alone;
+    open_set(&f, "uniform", 300, 1);
+    while (host_site_is_vertex(&f.sites, free_slot)) {
+        free_slot++;
+    }
+    assert_in_range(free_slot, 1, f.sites.count - 1);
+    alone = f.right.v[0][0];
+    for (int run = 0; run < 2; run++) {
+        restore(&f);
+        for (uint64_t i = 0; i < f.tets.count; i++) {
+            uint32_t *t = f.tets.v[i];
+            if (t[0] == alone || t[1] == alone || t[2] == alone ||
+                t[3] == alone) {
+                t[t[0] == alone] =
+                    run == 0 ? (uint32_t)f.sites.count : free_slot;
+            }
+        }
+        assert_int_equal(check(&f, HOST_CHECK_DELAUNAY, &r[run]),
+                         HOST_UNVERIFIED);
+        assert_true(f.named[alone]);
+    }
+    assert_int_equal(r[0].faults, r[1].faults);
+    assert_int_equal(r[0].distinct, 300);
+    assert_int_equal(r[1].distinct, 300);
+    close_set(&f);
+}
+
 /* Whether three vertices lie on one side of the box of the points. */
 static bool is_on_box(const struct fixture *f, const uint32_t v[3])
 {
@@ -317,6 +352,7 @@ int main(void)
         cmocka_unit_test(a_left_out_point_is_found),
         cmocka_unit_test(only_spheres_tell_a_flip),
         cmocka_unit_test(a_body_twice_is_found),
+        cmocka_unit_test(false_vertices_count_once),
         cmocka_unit_test(flat_ones_are_found),
         cmocka_unit_test(a_surface_wound_twice_is_found),
         cmocka_unit_test(two_bodies_are_found),
