@@ -3,9 +3,10 @@
  *
  *     ask PATH WORD
  *
- * Who is not answered types it again: a line that comes while a board begins
- * anew is lost.  1: there was no whole answer within two minutes, whatever else
- * the board said.
+ * Without an answer the line is typed again: one that comes while a board
+ * begins anew is lost, or its first letters are, and then the board says that
+ * it does not know the rest.  1: there was no whole answer within two minutes,
+ * whatever else the board said.
  */
 #include <poll.h>
 #include <stdbool.h>
@@ -52,18 +53,36 @@ static bool find_answer(int fd, int64_t end_ms)
     return false;
 }
 
-/* To its end, 00, which frames may come behind; false: it has none in time. */
-static bool print_answer(int fd, int64_t end_ms)
+/* Whether the answer is that the board does not know the end of the word. */
+static bool is_torn(const char *text, const char *word)
 {
-    static char text[BYTES_MAX];
+    static const char unknown[] = ": no such word";
+    text += strspn(text, "\n");
+    for (const char *tail = word + 1; word[0] != 0 && *tail != 0; tail++) {
+        size_t length = strlen(tail);
+        if (strncmp(text, tail, length) == 0 &&
+            strncmp(text + length, unknown, sizeof unknown - 1) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* To its end, 00, which frames may come behind; false: it has none in time, or
+ * it answers the end of the word. */
+static bool print_answer(int fd, int64_t end_ms, const char *word)
+{
+    static char text[BYTES_MAX + 1];
     size_t size = 0;
     int byte;
     while ((byte = next(fd, end_ms)) > 0) {
-        if (byte != '\r' && size < sizeof text) {
+        if (byte != '\r' && size < BYTES_MAX) {
             text[size++] = (char)byte;
         }
     }
-    return byte == 0 && fwrite(text, 1, size, stdout) == size;
+    text[size] = 0;
+    return byte == 0 && !is_torn(text, word) &&
+           fwrite(text, 1, size, stdout) == size;
 }
 
 int main(int argc, char **argv)
@@ -88,7 +107,7 @@ int main(int argc, char **argv)
         if (send(fd, line, (size_t)size, MSG_NOSIGNAL | MSG_DONTWAIT) != size) {
             break;
         }
-        if (find_answer(fd, again_ms) && print_answer(fd, again_ms)) {
+        if (find_answer(fd, again_ms) && print_answer(fd, again_ms, argv[2])) {
             return 0;
         }
     }

@@ -15,8 +15,8 @@ tetrahedra=$(stat_of "$scratch/first.json" tetrahedra)
 # slowed SECONDS [OPTION...]: one whose host reads slowly for so long.
 start() {
     rm -f "$scratch/out.npy" "$scratch/stats.json"
-    "$INCODE" run "$points" -q --nodes 8 -o "$scratch/out.npy" \
-        --stats "$scratch/stats.json" "$@" 2> "$scratch/errors" &
+    "$INCODE" run "$points" --progress --nodes 8 -o "$scratch/out.npy" \
+        --stats "$scratch/stats.json" "$@" > /dev/null 2> "$scratch/errors" &
     host=$!
 }
 
@@ -41,6 +41,15 @@ look_for() {
         case $words in *"--node $1 "*) found=$pid; return ;; esac
     done
     ! kill -0 $host 2> /dev/null
+}
+
+# Until progress shows tetrahedra: all nodes are up and at work.
+at_work() {
+    await shows_work && kill -0 $host 2> /dev/null
+}
+shows_work() {
+    grep -q 'triangulating *[1-9]' "$scratch/errors" ||
+        ! kill -0 $host 2> /dev/null
 }
 
 # strike SIGNAL NODE: false where the run is over already.
@@ -133,8 +142,10 @@ for strategy in spatial sequential; do
         'a stopped node was given up' test \
         "$(stat_of "$scratch/stats.json" node_restarts)" = 0
 done
-# clock: until they are given up
-amid 'strike STOP 0 && strike STOP 5' --strategy spatial --patience 3
+# clock: until they are given up.  Nodes that are stopped before they answer for
+# the first time end the run: those here have begun to work.
+amid 'at_work && strike STOP 0 && strike STOP 5' --strategy spatial \
+    --patience 3
 survives 'two nodes stopped for longer than --patience'
 check 'survival/they were started again' 'not both' test \
     "$(stat_of "$scratch/stats.json" node_restarts)" -ge 2
