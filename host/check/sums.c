@@ -219,8 +219,9 @@ static void sum_facets(struct block *b)
 }
 
 /* Bit 0 of a sum: the vertex is used.  The other two vertices' bytes say so. */
-static inline void add_one(const struct block *b, uint32_t i, uint64_t *sum,
-                           uint8_t *used)
+static inline void
+add_one(const struct block *b, uint32_t i, uint64_t *sum,
+        uint8_t *used /* NOLINT(readability-non-const-parameter): atomic */)
 {
     uint64_t *low = &sum[b->sorted[0][i]], *second = &sum[b->sorted[1][i]];
     *low = (*low + b->sum[0][i]) | 1;
